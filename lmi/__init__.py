@@ -1,0 +1,1 @@
+"""Diagonal Lyapunov matrices of real matrices."""

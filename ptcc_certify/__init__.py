@@ -1,0 +1,1 @@
+"""Certify prescribed-time coordination control on signed digraphs."""

@@ -1,0 +1,431 @@
+"""Signed digraphs: immutable, labelled, sparse, with exact weights.
+
+``w_kl != 0`` iff there is an edge ``v_l -> v_k``: information flows from ``l`` to ``k``, *k listens to l*. A
+positive weight means ally, a negative one opponent. Rows of every matrix are listeners, columns are sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.rationals import as_fraction, format_exact, shorten
+
+if TYPE_CHECKING:
+    import networkx as nx
+    from scipy import sparse
+
+_INT64_LIMIT = 2**62
+_SMALLEST, _LARGEST = 2.3e-308, 1.7e308
+_INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
+
+Exact = Fraction | int | float | str
+
+
+class Weights:
+    """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
+
+    def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
+        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None)."""
+        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+            table: np.ndarray = values.astype(np.float64)
+            self.kind, self.scale = "float64", 1
+        else:
+            fractions = [Fraction(v) for v in values]
+            scale = 1
+            for value in fractions:
+                scale = math.lcm(scale, value.denominator)
+                if scale > _INT64_LIMIT:
+                    break
+            if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
+                table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
+                self.kind, self.scale = "int64", scale
+            elif all(Fraction(float(v)) == v for v in fractions):
+                table = np.array([float(v) for v in fractions])
+                self.kind, self.scale = "float64", 1
+            else:
+                table = np.empty(len(fractions), dtype=object)
+                table[:] = fractions
+                self.kind, self.scale = "fraction", 1
+        self.table = table if codes is None else table[codes]
+
+    def take(self, index: np.ndarray) -> Weights:
+        """Return the weights at ``index``, in that order."""
+        new = object.__new__(Weights)
+        new.kind, new.scale, new.table = self.kind, self.scale, self.table[index]
+        return new
+
+    def as_float(self) -> np.ndarray:
+        """Return the weights rounded to float64."""
+        if self.kind == "int64":
+            # One rounding only: int64 / scale in float64 would round the numerator first.
+            if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
+                return self.table / float(self.scale)
+            return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
+        return np.array(self.table, dtype=np.float64)
+
+    def fraction(self, i: int) -> Fraction:
+        """Return weight ``i`` exactly."""
+        value = self.table[i]
+        return Fraction(int(value), self.scale) if self.kind == "int64" else Fraction(value)
+
+    def signs(self) -> np.ndarray:
+        """Return +1 or -1 for each weight."""
+        return np.where(self.table > 0, 1, -1).astype(np.int8)
+
+
+class SignedDigraph:
+    """A signed digraph with exact weights.
+
+    Build one with :meth:`from_edges`, :meth:`from_matrix`, :meth:`from_networkx` or
+    :func:`ptcc_certify.read_graph`. Nodes carry text labels; edge arrays are sorted by (target, source) index.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Node labels in index order: by value when all are integers, otherwise by first appearance.
+    source, target : (n_edges,) int array
+        Information flows from ``source`` to ``target``: the target listens.
+    sign : (n_edges,) int8 array
+        +1 ally, -1 opponent.
+    read : mapping
+        How the data were read: ``orientation``, ``duplicates``, ``self_loops``, ``undirected``, ``notes``.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([("a", "b", 2), ("b", "a", "-0.5")])
+    >>> g
+    SignedDigraph(2 nodes, 2 edges, 1 negative)
+    >>> g.laplacian().toarray()
+    array([[ 0.5,  0.5],
+           [-2. ,  2. ]])
+    """
+
+    def __init__(
+        self,
+        labels: Iterable[str],
+        source: np.ndarray,
+        target: np.ndarray,
+        weights: Weights,
+        read: Mapping[str, Any] | None = None,
+    ):
+        self.labels = tuple(labels)
+        n = len(self.labels)
+        if n == 0:
+            raise GraphError("the graph has no nodes; give at least one edge, or a row with one label")
+        if len(set(self.labels)) != n:
+            raise GraphError("two nodes bear the same label; rename one of them")
+        source, target = np.asarray(source, dtype=np.int64), np.asarray(target, dtype=np.int64)
+        order = np.lexsort((source, target))
+        self.source, self.target = source[order], target[order]
+        self._weights = weights.take(order)
+        self.sign = self._weights.signs()
+        self.read = dict(_READ_DEFAULT, **(read or {}))
+        for array in (self.source, self.target, self._weights.table, self.sign):
+            array.flags.writeable = False
+        self._refuse_bad_edges()
+
+    def _refuse_bad_edges(self) -> None:
+        source, target = self.source, self.target
+        loops = np.flatnonzero(source == target)
+        if loops.size:
+            label = self.labels[source[loops[0]]]
+            raise GraphError(f"self-loop at node {shorten(label)}; remove it, or drop all with --drop-self-loops")
+        twice = np.flatnonzero((source[1:] == source[:-1]) & (target[1:] == target[:-1]))
+        if twice.size:
+            raise GraphError(f"two edges {self._edge_text(int(twice[0]))}; keep one, or merge with --duplicates")
+        table = self._weights.table
+        if self._weights.kind == "float64" and not np.isfinite(table).all():
+            where = int(np.flatnonzero(~np.isfinite(table))[0])
+            raise GraphError(f"weight {table[where]} of edge {self._edge_text(where)} is not a finite number")
+        if (zero := np.flatnonzero(table == 0)).size:
+            raise GraphError(
+                f"weight 0 of edge {self._edge_text(int(zero[0]))}: an unknown sign is not an edge; "
+                "remove it or give a weight"
+            )
+        size = np.abs(self.weights)
+        if (odd := np.flatnonzero((size < _SMALLEST) | (size > _LARGEST))).size:
+            raise GraphError(
+                f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
+            )
+
+    def _edge_text(self, edge: int) -> str:
+        return f"{shorten(self.labels[self.source[edge]])} -> {shorten(self.labels[self.target[edge]])}"
+
+    # ------------------------------------------------------------------ constructors
+
+    @classmethod
+    def from_edges(
+        cls,
+        edges: Iterable[tuple[Hashable, Hashable, Exact]],
+        nodes: Iterable[Hashable] = (),
+        *,
+        orientation: str = "information",
+    ) -> SignedDigraph:
+        """Build a graph from ``(source, target, weight)`` triples.
+
+        Parameters
+        ----------
+        edges : iterable of (label, label, weight)
+            A weight is an int, Fraction, float (the dyadic number it is) or a text of the exact grammar.
+        nodes : iterable of labels, optional
+            Further nodes, and the wish for an order: these come first unless all labels are integers.
+        orientation : {"information", "listens"}
+            ``information``: information flows first -> second. ``listens``: the first listens to the second.
+
+        Raises
+        ------
+        GraphError
+            A weight is zero or not finite, an edge occurs twice, or an edge is a loop.
+
+        Examples
+        --------
+        >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
+        ('b', 'a', Fraction(1, 1))
+        """
+        if orientation not in ("information", "listens"):
+            raise GraphError(f'orientation "{orientation}" is unknown; use "information" or "listens"')
+        index: dict[str, int] = {}
+        original: dict[str, Hashable] = {}
+
+        def number(node: Hashable) -> int:
+            label = str(node)
+            if label in original and original[label] != node:
+                raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
+            original.setdefault(label, node)
+            return index.setdefault(label, len(index))
+
+        for node in nodes:
+            number(node)
+        heads, tails, values = [], [], []
+        for edge in edges:
+            try:
+                first, second, weight = edge
+            except (TypeError, ValueError):
+                raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight)") from None
+            heads.append(number(first))
+            tails.append(number(second))
+            try:
+                values.append(as_fraction(weight, "weight"))  # type: ignore[arg-type]
+            except NumberError as error:
+                raise GraphError(f"edge {shorten(str(first))} -> {shorten(str(second))}: {error}") from None
+        if orientation == "listens":
+            heads, tails = tails, heads
+        labels, rank = ordered_labels(list(index))
+        source = rank[np.array(heads, dtype=np.int64)]
+        target = rank[np.array(tails, dtype=np.int64)]
+        return cls(labels, source, target, Weights(values), {"orientation": orientation})
+
+    @classmethod
+    def from_matrix(cls, matrix: Any, labels: Iterable[Hashable] | None = None) -> SignedDigraph:
+        """Build a graph from an adjacency matrix ``W``: **row = listener**, ``w_kl`` is what k makes of l.
+
+        Parameters
+        ----------
+        matrix : (N, N) array or SciPy sparse matrix
+            Integers are exact, floats are the dyadic numbers they are; the diagonal must be zero. Entries of an
+            object array may be Fractions.
+        labels : iterable of N labels, optional
+            ``1 .. N`` by default.
+
+        Examples
+        --------
+        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]]).edges
+        (('2', '1', Fraction(-1, 1)),)
+        """
+        if hasattr(matrix, "tocoo"):
+            coo = matrix.tocoo()
+            if len(coo.shape) != 2:
+                raise GraphError(f"an adjacency matrix has two dimensions, not {len(coo.shape)}")
+            coo.sum_duplicates()
+            shape, target, source, values = coo.shape, coo.row, coo.col, coo.data
+            keep = values != 0
+            target, source, values = target[keep], source[keep], values[keep]
+        else:
+            try:
+                dense = np.asarray(matrix)
+            except ValueError:
+                raise GraphError("the adjacency matrix has rows of different lengths") from None
+            if dense.ndim != 2:
+                raise GraphError(f"an adjacency matrix has two dimensions, not {dense.ndim}")
+            shape = dense.shape
+            if dense.dtype.kind not in "biufO":
+                raise GraphError(f"an adjacency matrix holds real numbers, not {dense.dtype}")
+            target, source = np.nonzero(dense)
+            values = dense[target, source]
+        if shape[0] != shape[1]:
+            raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
+        if values.dtype.kind not in "biufO":
+            raise GraphError(f"an adjacency matrix holds real numbers, not {values.dtype}")
+        names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
+        if len(names) != shape[0]:
+            raise GraphError(f"{len(names)} labels for {shape[0]} rows")
+        if values.dtype.kind == "f":
+            weights = Weights(values.astype(np.float64))
+        else:
+            try:
+                weights = Weights([as_fraction(v) for v in values.tolist()])
+            except NumberError as error:
+                raise GraphError(f"the adjacency matrix: {error}") from None
+        return cls(names, source, target, weights, {"orientation": "matrix"})
+
+    @classmethod
+    def from_networkx(cls, graph: nx.DiGraph, weight: str = "weight") -> SignedDigraph:
+        """Build a graph from a networkx ``DiGraph``: an edge ``l -> k`` with its ``weight`` flows from l to k.
+
+        Raises
+        ------
+        GraphError
+            ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, or an edge has no weight.
+        """
+        if graph.is_multigraph():
+            raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
+        if not graph.is_directed():
+            raise GraphError("the networkx graph is undirected; pass graph.to_directed() if both ends listen")
+        triples = []
+        for u, v, data in graph.edges(data=True):
+            if weight not in data:
+                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"')
+            triples.append((u, v, data[weight]))
+        return cls.from_edges(triples, graph.nodes)
+
+    # ------------------------------------------------------------------ reading
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes ``N``."""
+        return len(self.labels)
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges."""
+        return int(self.source.size)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Map of label to node index."""
+        return {label: i for i, label in enumerate(self.labels)}
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(n_edges,) float64 array: the weights, each rounded once."""
+        values = self._weights.as_float()
+        values.flags.writeable = False
+        return values
+
+    def exact_weight(self, edge: int) -> Fraction:
+        """Return the weight of edge number ``edge`` exactly."""
+        return self._weights.fraction(edge)
+
+    @property
+    def edges(self) -> tuple[tuple[str, str, Fraction], ...]:
+        """All edges as ``(source label, target label, exact weight)``, sorted by (target, source) index."""
+        return tuple(self._edges())
+
+    def _edges(self) -> Iterator[tuple[str, str, Fraction]]:
+        labels = self.labels
+        for i, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
+            yield labels[s], labels[t], self._weights.fraction(i)
+
+    def adjacency(self) -> sparse.csr_array:
+        """(N, N) sparse float64 matrix ``W``; rows are listeners."""
+        from scipy import sparse
+
+        n = self.n_nodes
+        return sparse.csr_array((self.weights, (self.target, self.source)), shape=(n, n))
+
+    def laplacian(self) -> sparse.csr_array:
+        """(N, N) sparse float64 signed Laplacian ``L = D - W``, ``D = diag(sum_l |w_kl|)``."""
+        from scipy import sparse
+
+        return sparse.csr_array(sparse.diags_array(self.in_weight()) - self.adjacency())
+
+    def in_weight(self) -> np.ndarray:
+        """(N,) float64 array: ``D_k = sum_l |w_kl|``, how much node k listens in total."""
+        return np.bincount(self.target, np.abs(self.weights), minlength=self.n_nodes)
+
+    def exact_laplacian(self) -> list[list[Fraction]]:
+        """Return the signed Laplacian as N rows of N rationals (small graphs)."""
+        n = self.n_nodes
+        rows = [[Fraction(0)] * n for _ in range(n)]
+        for edge, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
+            weight = self._weights.fraction(edge)
+            rows[t][s] = -weight
+            rows[t][t] += abs(weight)
+        return rows
+
+    def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
+        """Return the graph induced by the node indices ``nodes``, in that order."""
+        nodes = np.asarray(nodes, dtype=np.int64)
+        position = np.full(self.n_nodes, -1, dtype=np.int64)
+        position[nodes] = np.arange(nodes.size)
+        keep = np.flatnonzero((position[self.source] >= 0) & (position[self.target] >= 0))
+        return SignedDigraph(
+            [self.labels[i] for i in nodes.tolist()],
+            position[self.source[keep]],
+            position[self.target[keep]],
+            self._weights.take(keep),
+            self.read,
+        )
+
+    @cached_property
+    def sha256(self) -> str:
+        r"""SHA-256 of the canonical edge list, independent of the order of nodes and edges.
+
+        One JSON array per line: first ``[label]`` of every node, then ``[source, target, weight]`` of every edge
+        with the weight as ``p`` or ``p/q`` in lowest terms, each group sorted; UTF-8, ``\n`` after each line.
+        """
+        digest = hashlib.sha256()
+        for label in sorted(self.labels):
+            digest.update((json.dumps([label], ensure_ascii=False) + "\n").encode("utf-8", "surrogatepass"))
+        for s, t, w in sorted(self._edges()):
+            line = json.dumps([s, t, format_exact(w)], ensure_ascii=False) + "\n"
+            digest.update(line.encode("utf-8", "surrogatepass"))
+        return digest.hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        """Two graphs are equal when they have the same labelled nodes and the same exact edges."""
+        return isinstance(other, SignedDigraph) and self.sha256 == other.sha256
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    def __repr__(self) -> str:
+        negative = int((self.sign < 0).sum())
+        return f"SignedDigraph({self.n_nodes} nodes, {self.n_edges} edges, {negative} negative)"
+
+
+_READ_DEFAULT: dict[str, Any] = {
+    "orientation": "information",
+    "duplicates": "refused",
+    "self_loops": "refused",
+    "undirected": False,
+    "notes": (),
+}
+
+
+def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
+    """Order labels by value if all are integers, else as they came; also return the rank of each old position.
+
+    Examples
+    --------
+    >>> ordered_labels(["10", "2"])
+    (['2', '10'], array([1, 0]))
+    """
+    n = len(labels)
+    if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
+        order = sorted(range(n), key=lambda i: (int(labels[i]), labels[i]))
+    else:
+        order = list(range(n))
+    rank = np.empty(n, dtype=np.int64)
+    rank[order] = np.arange(n)
+    return [labels[i] for i in order], rank
