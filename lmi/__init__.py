@@ -1,1 +1,47 @@
-"""Diagonal Lyapunov matrices of real matrices."""
+"""Diagonal Lyapunov matrices of real matrices: search, coupling of blocks, proof in exact arithmetic.
+
+The package knows nothing of graphs and is useful on any matrix: ``Omega A + A' Omega > 0`` with a positive diagonal
+``Omega`` certifies that ``x' = -A x`` decays.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_EXPORTS = {
+    "LMIError": "lmi.errors",
+    "MatrixError": "lmi.errors",
+    "NoCertificate": "lmi.errors",
+    "NotAnHMatrix": "lmi.errors",
+    "comparison_matrix": "lmi.matrices",
+    "is_h_matrix": "lmi.matrices",
+    "is_m_matrix": "lmi.matrices",
+    "is_z_matrix": "lmi.matrices",
+    "m_matrix_witness": "lmi.matrices",
+    "CoupledCertificate": "lmi.diagonal",
+    "DiagonalCertificate": "lmi.diagonal",
+    "FixedLeader": "lmi.diagonal",
+    "FreeLeader": "lmi.diagonal",
+    "coupled_lyapunov": "lmi.diagonal",
+    "diagonal_lyapunov": "lmi.diagonal",
+    "diagonal_margin": "lmi.diagonal",
+    "h_matrix_lyapunov": "lmi.diagonal",
+    "Coupling": "lmi.coupling",
+    "RhoInterval": "lmi.coupling",
+    "schur_positive_definite": "lmi.coupling",
+    "DefinitenessProof": "lmi.exact",
+    "prove_generalized_margin": "lmi.exact",
+    "prove_margin": "lmi.exact",
+    "prove_positive_definite": "lmi.exact",
+    "round_to_bits": "lmi.exact",
+}
+__all__ = sorted(_EXPORTS)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _EXPORTS:
+        return getattr(import_module(_EXPORTS[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

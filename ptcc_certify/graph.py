@@ -326,6 +326,10 @@ class SignedDigraph:
         """Return the weight of edge number ``edge`` exactly."""
         return self._weights.fraction(edge)
 
+    def equal_weights(self, other: np.ndarray) -> np.ndarray:
+        """Tell for each edge ``i`` whether its weight equals that of edge ``other[i]``, exactly."""
+        return np.asarray(self._weights.table == self._weights.table[other], dtype=bool)
+
     @property
     def edges(self) -> tuple[tuple[str, str, Fraction], ...]:
         """All edges as ``(source label, target label, exact weight)``, sorted by (target, source) index."""

@@ -141,17 +141,3 @@ def format_exact(value: Fraction) -> str:
     if (value.numerator.bit_length() + value.denominator.bit_length()) * 0.30103 > MAX_CHARACTERS - 6:
         raise NumberError("a rational is too long to be written in the exact grammar")
     return str(value.numerator) if value.denominator == 1 else f"{value.numerator}/{value.denominator}"
-
-
-def round_to_bits(value: float, bits: int) -> Fraction:
-    """Round a finite float to the nearest dyadic rational with ``bits`` significant bits.
-
-    Examples
-    --------
-    >>> round_to_bits(0.1, 4)
-    Fraction(13, 128)
-    """
-    if value == 0:
-        return Fraction(0)
-    mantissa, exponent = math.frexp(value)
-    return Fraction(round(math.ldexp(mantissa, bits))) * Fraction(2) ** (exponent - bits)

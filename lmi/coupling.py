@@ -1,0 +1,181 @@
+"""Coupling leaders and followers: admissible and best factor ``rho`` of a block-triangular composite.
+
+With a leader block of Lyapunov matrix ``Omega_L`` and decrease ``Gamma > 0``, followers ``A_F`` with diagonal
+``Omega_F`` and ``S_F = Omega_F A_F + A_F' Omega_F > 0``, the composite ``diag(Omega_L, rho Omega_F)`` decreases at
+least by
+
+    Phi(rho) = [[Gamma, rho A_FL' Omega_F], [rho Omega_F A_FL, rho S_F]].
+
+By the Schur complement (Lemma 5) ``Phi(rho) > 0`` iff ``Gamma - rho R > 0``, ``R = A_FL' Omega_F S_F^-1 Omega_F A_FL``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lmi.errors import MatrixError
+
+
+@dataclass(frozen=True)
+class RhoInterval:
+    """Upper ends of ``0 < rho < ...``; infinite when the leaders do not drive the followers.
+
+    Attributes
+    ----------
+    printed : float
+        The paper's sufficient end ``lmin / lmax(R)``.
+    exact : float
+        The supremum ``1 / lmax(Gamma^-1/2 R Gamma^-1/2)``.
+    """
+
+    printed: float
+    exact: float
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A composite of leaders and followers, ready to be asked about ``rho``; see the module for the symbols.
+
+    Attributes
+    ----------
+    gamma : (n_L, n_L) array
+        Decrease of the leaders, positive definite.
+    omega_L, omega_F : (n_L,), (n_F,) arrays
+    A_FL, A_F : (n_F, n_L), (n_F, n_F) arrays
+    printed_numerator : float
+        The paper's numerator of the printed interval, ``lmin(Gamma)`` by default.
+    """
+
+    gamma: np.ndarray
+    omega_L: np.ndarray
+    omega_F: np.ndarray
+    A_FL: np.ndarray
+    A_F: np.ndarray
+    printed_numerator: float | None = None
+
+    def __post_init__(self) -> None:
+        n_L, n_F = len(self.omega_L), len(self.omega_F)
+        if self.gamma.shape != (n_L, n_L) or self.A_FL.shape != (n_F, n_L) or self.A_F.shape != (n_F, n_F):
+            raise MatrixError("the blocks of the composite do not fit together")
+
+    def follower_decrease(self) -> np.ndarray:
+        """``S_F = Omega_F A_F + A_F' Omega_F``."""
+        S = self.omega_F[:, None] * self.A_F
+        return S + S.T
+
+    def schur_term(self) -> np.ndarray:
+        """``R = A_FL' Omega_F S_F^-1 Omega_F A_FL``."""
+        C = self.omega_F[:, None] * self.A_FL
+        R = C.T @ np.linalg.solve(self.follower_decrease(), C)
+        return (R + R.T) / 2
+
+    def phi(self, rho: float) -> np.ndarray:
+        """Return ``Phi(rho)``."""
+        C = rho * self.omega_F[:, None] * self.A_FL
+        return np.block([[self.gamma, C.T], [C, rho * self.follower_decrease()]])
+
+    def rate(self, rho: float) -> float:
+        """Return the paper's rate ``lmin(Phi(rho)) / lmax(diag(Omega_L, rho Omega_F))``."""
+        top = max(float(self.omega_L.max(initial=0.0)), rho * float(self.omega_F.max(initial=0.0)))
+        return float(np.linalg.eigvalsh(self.phi(rho))[0]) / top
+
+    def interval(self) -> RhoInterval:
+        """Return the printed and the exact upper end of the admissible ``rho``.
+
+        Examples
+        --------
+        >>> c = Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1.0]]), np.array([[1.0]]))
+        >>> c.interval()
+        RhoInterval(printed=2.0, exact=2.0)
+        """
+        R = self.schur_term()
+        top = float(np.linalg.eigvalsh(R)[-1]) if R.size else 0.0
+        if not top > 0:
+            return RhoInterval(math.inf, math.inf)
+        numerator = self.printed_numerator
+        if numerator is None:
+            numerator = float(np.linalg.eigvalsh(self.gamma)[0])
+        factor = np.linalg.cholesky(self.gamma)
+        half = np.linalg.solve(factor, R)
+        whole = np.linalg.solve(factor, half.T)
+        return RhoInterval(numerator / top, 1 / float(np.linalg.eigvalsh((whole + whole.T) / 2)[-1]))
+
+    def best_rho(self) -> float:
+        """Return the ``rho`` of the exact interval with the largest :meth:`rate`, by golden section.
+
+        ``lmin(Phi(rho))`` is concave with value 0 at 0, so the rate falls once ``rho Omega_F`` exceeds ``Omega_L``:
+        the best ``rho`` lies below that crossing and the end of the interval; there the rate is concave in ``rho``.
+
+        Examples
+        --------
+        >>> c = Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1.0]]), np.array([[1.0]]))
+        >>> round(c.best_rho(), 6), round(c.rate(c.best_rho()), 6)
+        (0.5, 0.5)
+        """
+        crossing = float(self.omega_L.max()) / float(self.omega_F.max())
+        end = min(self.interval().exact, crossing)
+        return golden_section(self.rate, 0.0, end)
+
+
+def schur_positive_definite(S1: Any, S2: Any, S3: Any) -> bool:
+    """Lemma 5: with ``S3 > 0``, ``S1 - S2' S3^-1 S2 > 0`` iff ``[[S1, S2'], [S2, S3]] > 0``; decided by the former.
+
+    Parameters
+    ----------
+    S1 : (n, n) array
+        Symmetric.
+    S2 : (m, n) array
+    S3 : (m, m) array
+        Symmetric, positive definite.
+
+    Returns
+    -------
+    bool
+        As far as floating-point eigenvalues tell; :func:`lmi.prove_positive_definite` decides exactly.
+
+    Raises
+    ------
+    MatrixError
+        ``S3`` is not positive definite.
+
+    Examples
+    --------
+    >>> schur_positive_definite([[2.0]], [[1.0]], [[1.0]]), schur_positive_definite([[1.0]], [[2.0]], [[1.0]])
+    (True, False)
+    """
+    S1, S2, S3 = (np.asarray(S, dtype=np.float64) for S in (S1, S2, S3))
+    if not np.linalg.eigvalsh(S3)[0] > 0:
+        raise MatrixError("S3 is not positive definite")
+    complement = S1 - S2.T @ np.linalg.solve(S3, S2)
+    return bool(np.linalg.eigvalsh((complement + complement.T) / 2)[0] > 0)
+
+
+def golden_section(function: Any, low: float, high: float, tolerance: float = 1e-10) -> float:
+    """Maximise a quasiconcave function on ``[low, high]``; returns the best point that was evaluated.
+
+    Examples
+    --------
+    >>> round(golden_section(lambda x: -(x - 1) ** 2, 0.0, 3.0), 6)
+    1.0
+    """
+    ratio = (math.sqrt(5) - 1) / 2
+    inner, outer = high - ratio * (high - low), low + ratio * (high - low)
+    f_inner, f_outer = function(inner), function(outer)
+    best, f_best = max(((inner, f_inner), (outer, f_outer), (high, function(high))), key=lambda pair: pair[1])
+    while high - low > tolerance * high:
+        if f_inner < f_outer:
+            low, inner, f_inner = inner, outer, f_outer
+            outer = low + ratio * (high - low)
+            f_outer = function(outer)
+        else:
+            high, outer, f_outer = outer, inner, f_inner
+            inner = high - ratio * (high - low)
+            f_inner = function(inner)
+        for point, value in ((inner, f_inner), (outer, f_outer)):
+            if value > f_best:
+                best, f_best = point, value
+    return best

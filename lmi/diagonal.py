@@ -1,0 +1,322 @@
+"""The search for diagonal Lyapunov matrices with cvxpy and Clarabel.
+
+The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
+certificate is proved elsewhere (:mod:`lmi.exact`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix
+from lmi.matrices import is_h_matrix, square
+
+if TYPE_CHECKING:
+    import cvxpy as cp
+
+
+@dataclass(frozen=True)
+class DiagonalCertificate:
+    """A diagonal Lyapunov matrix ``Omega = diag(omega)`` of ``A``, scaled to ``max omega = 1``.
+
+    Attributes
+    ----------
+    omega : (n,) array
+        Positive.
+    margin : float
+        ``lmin(Omega A + A' Omega)``, from eigenvalues of the returned matrix.
+    rate : float
+        ``margin / max(omega)``: ``V = x' Omega x`` obeys ``V' <= -rate V`` along ``x' = -A x``.
+    condition : float
+        ``max(omega) / min(omega)``.
+    """
+
+    omega: np.ndarray
+    margin: float
+    rate: float
+    condition: float
+
+
+def diagonal_margin(A: Any, omega: np.ndarray) -> float:
+    """Return ``lmin(Omega A + A' Omega)`` with ``Omega = diag(omega)``.
+
+    Examples
+    --------
+    >>> diagonal_margin([[1.0, 0.0], [0.0, 2.0]], [1.0, 1.0])
+    2.0
+    """
+    S = np.asarray(omega)[:, None] * square(A)
+    return float(np.linalg.eigvalsh(S + S.T)[0])
+
+
+def diagonal_lyapunov(A: Any, *, objective: str = "margin", tolerance: float = 1e-9) -> DiagonalCertificate:
+    """Find the diagonal ``Omega > 0`` that decays fastest in the sense of the quotient ``lmin / lmax``.
+
+    Solves
+
+        maximise t   subject to   Omega A + A' Omega >= t I,   0 <= Omega <= I,
+
+    whose optimum is the largest ``lmin(Omega A + A' Omega) / lmax(Omega)``. Such an ``Omega`` exists for every
+    nonsingular H-matrix with positive diagonal (Lemma 4) and for the Laplacian of every strongly connected
+    structurally unbalanced signed digraph (Lemma 3.2), but the function takes any real square matrix.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+        Any real matrix; a diagonal Lyapunov matrix exists only if all its eigenvalues have positive real part (not
+        a sufficient condition).
+    objective : {"margin"}
+        What to maximise.
+    tolerance : float
+        Relative gap asked of the solver.
+
+    Returns
+    -------
+    DiagonalCertificate
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not square, not finite, or ``objective`` is unknown.
+    NoCertificate
+        The margin of what the solver returned is not positive: no diagonal Lyapunov matrix exists, or precision ends.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = diagonal_lyapunov([[2.0, -1.0], [-1.0, 2.0]])
+    >>> round(found.rate, 6), found.omega.round(6)
+    (2.0, array([1., 1.]))
+    """
+    if objective != "margin":
+        raise MatrixError(f'objective "{objective}" is unknown; use "margin"')
+    A = square(A)
+    n = len(A)
+    if n == 0:
+        raise MatrixError("A has no rows")
+    if n == 1:
+        return _certificate(A, np.ones(1))
+    scale = _scale(A)
+
+    def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
+        omega, t = cp.Variable(n), cp.Variable()
+        S = _symmetric_product(cp, omega, A / scale)
+        return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= 0, omega <= 1]), omega
+
+    omega = _solve(problem, tolerance)
+    return _certificate(A, omega)
+
+
+def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate:
+    """Lemma 4: a nonsingular H-matrix with positive diagonal has ``Omega > 0`` with ``Omega A + A' Omega > 0``.
+
+    The hypothesis is tested first; then the search of :func:`diagonal_lyapunov` runs.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    DiagonalCertificate
+
+    Raises
+    ------
+    NotAnHMatrix
+        A diagonal entry is not positive, or ``M(A)`` has no positive ``u`` with ``M(A) u > 0``.
+
+    Examples
+    --------
+    >>> h_matrix_lyapunov([[2.0, 1.0], [-1.0, 2.0]]).omega.round(6)
+    array([1., 1.])
+    """
+    A = square(A)
+    if (low := np.flatnonzero(np.diag(A) <= 0)).size:
+        i = int(low[0])
+        raise NotAnHMatrix(f"diagonal entry {i} is {A[i, i]:.6g}, not positive")
+    # Rows scaled to unit diagonal: the class does not change, the witness is confirmed at any magnitude.
+    if not is_h_matrix(A / np.diag(A)[:, None]):
+        raise NotAnHMatrix("the comparison matrix M(A) has no positive u with M(A) u > 0")
+    return diagonal_lyapunov(A, tolerance=tolerance)
+
+
+@dataclass(frozen=True)
+class FixedLeader:
+    """A leader block whose Lyapunov matrix is known up to the scale shared by all such blocks.
+
+    ``omega`` (k,) is the diagonal; ``decrease`` (k,) the diagonal of a matrix that bounds the decrease of
+    ``x' diag(omega) x`` from below on the states that occur.
+    """
+
+    omega: np.ndarray
+    decrease: np.ndarray
+
+
+@dataclass(frozen=True)
+class FreeLeader:
+    """A leader block ``x' = -A x`` whose diagonal ``H`` is searched; its decrease counts as ``lmin(HA + A'H) I``."""
+
+    A: np.ndarray
+
+
+@dataclass(frozen=True)
+class CoupledCertificate:
+    """Diagonal Lyapunov matrices of leaders and followers, found together.
+
+    Attributes
+    ----------
+    leaders : tuple of (k,) arrays
+        For a fixed block its ``omega`` unchanged; for a free block relative to those.
+    followers : (n_F,) array
+        ``rho Omega_F``: the coupling factor is contained.
+    rate : float
+        What the solver reached; recompute it from the matrices.
+    """
+
+    leaders: tuple[np.ndarray, ...]
+    followers: np.ndarray
+    rate: float
+
+
+def coupled_lyapunov(
+    leaders: Sequence[FixedLeader | FreeLeader], A_FL: Any, A_F: Any, *, tolerance: float = 1e-9
+) -> CoupledCertificate:
+    """Find free leader blocks, follower matrix and coupling factor in one semidefinite program.
+
+    With ``Gamma`` the block diagonal of ``s diag(decrease)`` (fixed blocks) and ``t_k I`` (free blocks,
+    ``H_k A_k + A_k' H_k >= t_k I``), solves
+
+        maximise t   subject to   [[Gamma, A_FL' Y], [Y A_FL, Y A_F + A_F' Y]] >= t I,   all diagonals <= 1,
+
+    whose optimum is the largest ``lmin(Pi) / lmax(H)`` of the paper over free blocks, ``Y = rho H_F`` and ``rho``.
+
+    Parameters
+    ----------
+    leaders : sequence of FixedLeader or FreeLeader
+    A_FL : (n_F, n_L) array
+        Columns in the order of the leader blocks.
+    A_F : (n_F, n_F) array
+
+    Returns
+    -------
+    CoupledCertificate
+
+    Raises
+    ------
+    MatrixError
+        Shapes do not match.
+    NoCertificate
+        The solver found no positive rate.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
+    >>> found.rate > 0
+    True
+    """
+    A_F = square(A_F, "A_F")
+    A_FL = np.asarray(A_FL.toarray() if hasattr(A_FL, "toarray") else A_FL, dtype=np.float64)
+    sizes = [len(block.omega) if isinstance(block, FixedLeader) else len(square(block.A)) for block in leaders]
+    n_L, n_F = sum(sizes), len(A_F)
+    if A_FL.shape != (n_F, n_L):
+        raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
+    # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
+    scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
+    fixed_top = max((float(b.omega.max()) for b in leaders if isinstance(b, FixedLeader)), default=1.0)
+
+    def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
+        s, t, Y = cp.Variable(), cp.Variable(), cp.Variable(n_F)
+        diagonal, constraints, free = [], [Y >= 0, Y <= 1], []
+        if any(isinstance(b, FixedLeader) for b in leaders):
+            constraints += [s >= 0, s <= 1]
+        for block, k in zip(leaders, sizes, strict=True):
+            if isinstance(block, FixedLeader):
+                diagonal.append(s * (block.decrease / (fixed_top * scale)))
+            else:
+                H, t_k = cp.Variable(k), cp.Variable()
+                constraints += [H >= 0, H <= 1]
+                if k > 1:
+                    constraints.append(_symmetric_product(cp, H, square(block.A) / scale) - t_k * np.eye(k) >> 0)
+                else:
+                    constraints.append(2 * H[0] * float(np.squeeze(block.A)) / scale >= t_k)
+                diagonal.append(t_k * np.ones(k))
+                free.append(H)
+        followers = _symmetric_product(cp, Y, A_F / scale)
+        if n_L and n_F:
+            coupling = cp.diag(Y) @ (A_FL / scale)
+            Pi = cp.bmat([[cp.diag(cp.hstack(diagonal)), coupling.T], [coupling, followers]])
+        else:
+            Pi = followers if n_F else cp.diag(cp.hstack(diagonal))
+        constraints.append(Pi - t * np.eye(n_L + n_F) >> 0)
+        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free])
+
+    values = _solve(problem, tolerance)
+    s, t, Y, rest = values[0], values[1], values[2 : 2 + n_F], values[2 + n_F :]
+    if not t > 0 or (any(isinstance(b, FixedLeader) for b in leaders) and not s > 0):
+        raise NoCertificate(f"the solver reached the rate {t * scale:.3g}, which is not positive")
+    found, used = [], 0
+    unit = fixed_top / s if any(isinstance(b, FixedLeader) for b in leaders) else 1.0
+    for block, k in zip(leaders, sizes, strict=True):
+        if isinstance(block, FixedLeader):
+            found.append(block.omega)
+        else:
+            found.append(_positive(rest[used : used + k]) * unit)
+            used += k
+    return CoupledCertificate(tuple(found), _positive(Y) * unit, float(t * scale))
+
+
+def _certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
+    omega = _positive(omega)
+    omega = omega / omega.max()
+    margin = diagonal_margin(A, omega)
+    if not margin > 0:
+        raise NoCertificate(f"the best margin found is {margin:.3g}, which is not positive")
+    return DiagonalCertificate(omega, margin, margin, float(1 / omega.min()))
+
+
+def _positive(omega: np.ndarray) -> np.ndarray:
+    """Lift entries that the solver left at or below zero."""
+    top = float(np.max(omega, initial=0.0))
+    if not (math.isfinite(top) and top > 0):
+        raise NoCertificate("the solver returned no positive diagonal")
+    return np.maximum(omega, 1e-14 * top)
+
+
+def _scale(A: np.ndarray) -> float:
+    """Return a unit in which the entries of ``A`` are at most 1."""
+    return float(np.abs(A).max(initial=0.0)) or 1.0
+
+
+def _symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
+    """Return ``Omega A + A' Omega`` as a cvxpy expression that keeps the zeros of ``A``."""
+    from scipy import sparse
+
+    product = cp.diag(omega) @ sparse.csr_array(A)
+    return product + product.T
+
+
+def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance: float) -> np.ndarray:
+    """Solve with Clarabel and return the value of the expression; its status is not trusted, only its absence."""
+    import warnings
+
+    import cvxpy as cp
+
+    built, expression = problem(cp)
+    options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
+        try:
+            built.solve(solver=cp.CLARABEL, **options)
+        except cp.SolverError as error:
+            raise NoCertificate(f"the solver failed: {str(error).splitlines()[0]}") from None
+    if expression.value is None or not np.isfinite(expression.value).all():
+        raise NoCertificate(f"the solver answered {built.status}")
+    return np.atleast_1d(np.asarray(expression.value, dtype=np.float64))

@@ -1,0 +1,131 @@
+"""Comparison matrices and the classes Z, M and H.
+
+A *Z-matrix* has no positive entry off the diagonal. A Z-matrix ``A`` is a nonsingular *M-matrix* iff some ``u > 0``
+has ``A u > 0``: that vector is the witness. ``A`` is a nonsingular *H-matrix* iff its comparison matrix is a
+nonsingular M-matrix.
+
+References
+----------
+Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6, theorem 2.3.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lmi.errors import MatrixError
+
+
+def square(A: Any, name: str = "A") -> np.ndarray:
+    """Return ``A`` as a dense float64 matrix.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not square or not finite.
+    """
+    dense = np.asarray(A.toarray() if hasattr(A, "toarray") else A, dtype=np.float64)
+    if dense.ndim != 2 or dense.shape[0] != dense.shape[1]:
+        raise MatrixError(f"{name} has shape {dense.shape}, not (n, n)")
+    if not np.isfinite(dense).all():
+        raise MatrixError(f"{name} has an entry that is not finite")
+    return dense
+
+
+def comparison_matrix(A: Any) -> np.ndarray:
+    """Comparison matrix ``M(A)``: ``|a_ii|`` on the diagonal, ``-|a_ij|`` off it.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    (n, n) array
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not square or not finite.
+
+    Examples
+    --------
+    >>> comparison_matrix([[-2.0, 1.0], [0.0, 3.0]])
+    array([[ 2., -1.],
+           [-0.,  3.]])
+    """
+    A = square(A)
+    M = -np.abs(A)
+    np.fill_diagonal(M, np.abs(np.diag(A)))
+    return M
+
+
+def is_z_matrix(A: Any) -> bool:
+    """Tell whether no off-diagonal entry is positive.
+
+    Examples
+    --------
+    >>> is_z_matrix([[1, -1], [0, -5]])
+    True
+    """
+    A = square(A)
+    return bool((A - np.diag(np.diag(A)) <= 0).all())
+
+
+def m_matrix_witness(A: Any) -> np.ndarray | None:
+    """Find ``u > 0`` with ``A u > 0``, which proves that the Z-matrix ``A`` is a nonsingular M-matrix.
+
+    The candidate is ``A^-1 1``, positive for every nonsingular M-matrix because ``A^-1 >= 0``; it is accepted only
+    if ``A u > 0`` holds componentwise by more than the rounding of that product.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    (n,) array or None
+        None when ``A`` is not a Z-matrix or no witness could be confirmed.
+
+    Examples
+    --------
+    >>> m_matrix_witness([[2.0, -1.0], [-1.0, 2.0]])
+    array([1., 1.])
+    >>> m_matrix_witness([[1.0, -2.0], [-2.0, 1.0]]) is None
+    True
+    """
+    A = square(A)
+    if not is_z_matrix(A):
+        return None
+    try:
+        u = np.linalg.solve(A, np.ones(len(A)))
+    except np.linalg.LinAlgError:
+        return None
+    if not (np.isfinite(u).all() and (u > 0).all()):
+        return None
+    rounding = (len(A) + 2) * np.finfo(float).eps * (np.abs(A) @ u)
+    return u if (A @ u > rounding).all() else None
+
+
+def is_m_matrix(A: Any) -> bool:
+    """Tell whether ``A`` is a nonsingular M-matrix, as far as a witness can be confirmed in float64.
+
+    Examples
+    --------
+    >>> is_m_matrix([[2.0, -1.0], [-1.0, 2.0]]), is_m_matrix([[1.0, -1.0], [-1.0, 1.0]])
+    (True, False)
+    """
+    return m_matrix_witness(A) is not None
+
+
+def is_h_matrix(A: Any) -> bool:
+    """Tell whether ``A`` is a nonsingular H-matrix: whether ``M(A)`` is a nonsingular M-matrix.
+
+    Examples
+    --------
+    >>> is_h_matrix([[2.0, 1.0], [-1.0, -2.0]])
+    True
+    """
+    return is_m_matrix(comparison_matrix(A))

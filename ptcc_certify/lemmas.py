@@ -1,0 +1,329 @@
+"""The lemmas of the paper as functions, one each; the theorems and the outcome are built from them.
+
+Lemma 4 is :func:`lmi.h_matrix_lyapunov`, Lemma 5 :func:`lmi.schur_positive_definite` and Lemma 6
+:func:`ptcc_certify.gain.prescribed_time_bound`; the others are here. Lemma 7.1 is Lemma 9.1 for one closed
+component, Lemma 8 the same for Lemma 9.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+import lmi
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.structure import Structure, analyse
+
+#: Up to this many nodes null vectors, outcomes and proofs are computed in exact rationals.
+EXACT_NODES = 120
+
+
+def gauge(graph: SignedDigraph) -> np.ndarray | None:
+    """Lemma 1: a graph is structurally balanced iff some diagonal ``G`` of signs has ``G L G = M(L)``.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+
+    Returns
+    -------
+    (N,) int8 array or None
+        The diagonal of ``G``, +1 at the first node of each weak component; None if no such ``G`` exists.
+
+    Examples
+    --------
+    >>> gauge(SignedDigraph.from_edges([(1, 2, -3), (2, 3, 1)]))
+    array([ 1, -1, -1], dtype=int8)
+    """
+    return analyse(graph).gauge
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Lemma 2 for one graph: the nonzero eigenvalues of ``L`` and the dimension of its kernel.
+
+    Attributes
+    ----------
+    nonzero : (r,) complex array
+        Eigenvalues with the zeros of balanced closed components taken out, computed per strong component.
+    kernel_dimension : int
+        Number of balanced closed components.
+    """
+
+    nonzero: np.ndarray
+    kernel_dimension: int
+
+    @property
+    def spectral_rate(self) -> float | None:
+        """``2 min Re lambda`` over the nonzero eigenvalues: no certified rate can exceed it; None if there are none."""
+        return float(2 * self.nonzero.real.min()) if self.nonzero.size else None
+
+
+def laplacian_spectrum(structure: Structure) -> Spectrum:
+    """Lemma 2: a strong graph is unbalanced iff every eigenvalue of ``L`` has positive real part.
+
+    If it is balanced, 0 is simple (eigenvector ``G 1``) and the others have positive real part. For any graph the
+    spectrum is the union over its strong components; only balanced closed ones contribute a zero.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of a graph whose strong components are small enough for dense eigenvalues.
+
+    Returns
+    -------
+    Spectrum
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])
+    >>> laplacian_spectrum(analyse(g)).nonzero.real.round(6).tolist()
+    [2.0, 4.0]
+    """
+    L = structure.graph.laplacian()
+    balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
+    order = np.argsort(structure.strong_component, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(structure.strong_component))[:-1])
+    diagonal = L.diagonal()
+    values: list[np.ndarray] = []
+    for nodes in parts:
+        block = L[nodes][:, nodes].toarray() if nodes.size > 1 else diagonal[nodes][:, None]
+        found = np.linalg.eigvals(block).astype(complex)
+        if int(nodes[0]) in balanced:
+            found = np.delete(found, np.argmin(np.abs(found)))
+        values.append(found)
+    return Spectrum(np.concatenate(values), len(balanced))
+
+
+def left_vector(graph: SignedDigraph) -> np.ndarray:
+    """Lemma 2.3: the positive ``p`` with ``p' M(L) = 0`` and ``p' 1 = 1`` of a strongly connected graph.
+
+    Computed without subtractions (Grassmann, Taksar, Heyman 1985), hence to full relative accuracy in each entry
+    however far apart the weights lie.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Strongly connected.
+
+    Returns
+    -------
+    (N,) array
+
+    Raises
+    ------
+    HypothesisError
+        The graph is not strongly connected.
+
+    Examples
+    --------
+    >>> left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)]))
+    array([0.75, 0.25])
+    """
+    rate = np.abs(graph.adjacency().toarray())
+    rate /= rate.max(initial=0.0) or 1.0
+    n = graph.n_nodes
+    for k in range(n - 1, 0, -1):
+        out = rate[k, :k].sum()
+        if not out > 0:
+            raise HypothesisError("the graph is not strongly connected, so no positive left vector is unique")
+        rate[:k, k] /= out
+        rate[:k, :k] += np.outer(rate[:k, k], rate[k, :k])
+    p = np.zeros(n)
+    p[0] = 1.0
+    for k in range(1, n):
+        p[k] = p[:k] @ rate[:k, k]
+    return p / p.sum()
+
+
+def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
+    """Lemma 2.3 in exact rationals (see :func:`left_vector`); for graphs of at most ``EXACT_NODES`` nodes.
+
+    Raises
+    ------
+    HypothesisError
+        The graph is not strongly connected.
+
+    Examples
+    --------
+    >>> exact_left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)]))
+    [Fraction(3, 4), Fraction(1, 4)]
+    """
+    n = graph.n_nodes
+    M = _comparison(graph.exact_laplacian())
+    # p' M = 0 has rank n - 1; its last equation gives way to p' 1 = 1.
+    system = [[M[j][i] for j in range(n)] for i in range(n - 1)] + [[Fraction(1)] * n]
+    p = solve_exact(system, [[Fraction(0)]] * (n - 1) + [[Fraction(1)]])
+    if p is None or any(row[0] <= 0 for row in p):
+        raise HypothesisError("the graph is not strongly connected, so no positive left vector is unique")
+    return [row[0] for row in p]
+
+
+def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) -> float:
+    """Lemma 3.1: ``a(L) = min xi' Lbar xi / xi' P xi`` over ``xi' G p = 0``, ``Lbar = (P L + L' P) / 2``.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Strongly connected, structurally balanced, N >= 2.
+    p : (N,) array, optional
+        :func:`left_vector` by default.
+
+    Returns
+    -------
+    float
+        Positive: the second-smallest generalized eigenvalue of ``(Lbar, P)``.
+
+    Raises
+    ------
+    HypothesisError
+        The graph is a single node or structurally unbalanced.
+
+    Examples
+    --------
+    >>> round(algebraic_connectivity(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])), 12)
+    2.0
+    """
+    if graph.n_nodes < 2:
+        raise HypothesisError("a(L) needs at least two nodes")
+    if gauge(graph) is None:
+        raise HypothesisError("a(L) is defined for structurally balanced graphs; this one has a negative cycle")
+    p = left_vector(graph) if p is None else p
+    half = np.sqrt(p)
+    S = half[:, None] * graph.laplacian().toarray() / half
+    return float(np.linalg.eigvalsh((S + S.T) / 2)[1])
+
+
+def unbalanced_lyapunov(graph: SignedDigraph) -> lmi.DiagonalCertificate:
+    """Lemma 3.2: a diagonal ``Omega > 0`` with ``Omega L + L' Omega > 0`` of an unbalanced strong graph.
+
+    Raises
+    ------
+    HypothesisError
+        The graph is not strongly connected or is structurally balanced.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
+    >>> round(unbalanced_lyapunov(g).rate, 6)
+    2.0
+    """
+    structure = analyse(graph)
+    if structure.connectivity != "strong":
+        raise HypothesisError(f"Lemma 3.2 asks for a strongly connected graph; this one is {structure.connectivity}")
+    if structure.balanced:
+        raise HypothesisError("Lemma 3.2 asks for a structurally unbalanced graph; this one is balanced")
+    return lmi.diagonal_lyapunov(graph.laplacian())
+
+
+def follower_lyapunov(structure: Structure) -> lmi.DiagonalCertificate:
+    """Lemmas 7, 9.1: ``L_F`` is a nonsingular H-matrix; some diagonal ``Xi_F > 0`` has ``Xi_F L_F + L_F' Xi_F > 0``.
+
+    Raises
+    ------
+    HypothesisError
+        There are no followers.
+
+    Examples
+    --------
+    >>> follower_lyapunov(analyse(SignedDigraph.from_edges([(1, 2, -4)]))).rate
+    8.0
+    """
+    F = structure.followers
+    if F.size == 0:
+        raise HypothesisError("the graph has no followers")
+    return lmi.h_matrix_lyapunov(structure.graph.laplacian()[F][:, F])
+
+
+def containment_weights(structure: Structure) -> np.ndarray:
+    """Lemmas 8 and 9.2: ``varpi_k = -L_F^-1 L_FLk G_k 1``, the pull of balanced closed component k on each follower.
+
+    Absolute row sums are at most 1. With one closed component (Lemma 8) the column is ``zeta``, and ``|zeta| = 1``
+    if the whole graph is balanced.
+
+    Parameters
+    ----------
+    structure : Structure
+
+    Returns
+    -------
+    (N_F, m_b) array
+        One column for each balanced closed component, in order; unbalanced ones pull to zero and have none.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])
+    >>> containment_weights(analyse(g))
+    array([[ 0.25, -0.75]])
+    """
+    from scipy.sparse.linalg import splu
+
+    pulls, F = _gauged_pulls(structure), structure.followers
+    if F.size == 0 or pulls.shape[1] == 0:
+        return np.zeros((F.size, pulls.shape[1]))
+    L_F = structure.graph.laplacian()[F][:, F]
+    scale = 1 / L_F.diagonal()
+    factor = splu((scale[:, None] * L_F).tocsc())
+    return np.asarray(factor.solve(-scale[:, None] * (structure.graph.laplacian()[F] @ pulls)))
+
+
+def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
+    """Lemmas 8 and 9.2 in exact rationals (see :func:`containment_weights`), as rows.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)])
+    >>> exact_containment_weights(analyse(g))
+    [[Fraction(1, 3), Fraction(-2, 3)]]
+    """
+    F = structure.followers.tolist()
+    balanced = [c for c in structure.closed_components if c.balanced]
+    if not F or not balanced:
+        return [[] for _ in F]
+    L = structure.graph.exact_laplacian()
+    pull = [
+        [-sum((L[i][v] * g for v, g in zip(c.nodes, c.gauge or (), strict=True)), Fraction(0)) for c in balanced]
+        for i in F
+    ]
+    solution = solve_exact([[L[i][j] for j in F] for i in F], pull)
+    if solution is None:
+        raise HypothesisError("the follower block is singular, which Lemma 9 excludes")
+    return solution
+
+
+def _gauged_pulls(structure: Structure) -> np.ndarray:
+    """Return the (N, m_b) matrix whose columns are ``G_k 1`` on each balanced closed component."""
+    balanced = [c for c in structure.closed_components if c.balanced]
+    pulls = np.zeros((structure.graph.n_nodes, len(balanced)))
+    for column, component in enumerate(balanced):
+        pulls[list(component.nodes), column] = component.gauge
+    return pulls
+
+
+def _comparison(L: list[list[Fraction]]) -> list[list[Fraction]]:
+    return [[abs(x) if i == j else -abs(x) for j, x in enumerate(row)] for i, row in enumerate(L)]
+
+
+def solve_exact(A: Sequence[Sequence[Fraction]], B: Sequence[Sequence[Fraction]]) -> list[list[Fraction]] | None:
+    """Solve ``A X = B`` in exact rationals; None if ``A`` is singular.
+
+    Examples
+    --------
+    >>> solve_exact([[Fraction(2)]], [[Fraction(1)]])
+    [[Fraction(1, 2)]]
+    """
+    import flint
+
+    def matrix(rows: Sequence[Sequence[Fraction]]) -> flint.fmpq_mat:
+        entries = [flint.fmpq(x.numerator, x.denominator) for row in rows for x in row]
+        return flint.fmpq_mat(len(rows), len(rows[0]), entries)
+
+    try:
+        X = matrix(A).solve(matrix(B))
+    except ZeroDivisionError:
+        return None
+    return [[Fraction(int(x.p), int(x.q)) for x in row] for row in X.tolist()]

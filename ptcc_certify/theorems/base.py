@@ -1,0 +1,392 @@
+"""What every theorem of the paper has: hypotheses, a Lyapunov function, a rate with its proof.
+
+All rates are per unit of the stretched clock ``s``: ``V <= e^(-rate s) V(0)`` and, in the coordinates of the theorem,
+``||.||^2 <= prefactor e^(-rate s) ||.(0)||^2``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+import lmi
+from lmi.exact import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
+from ptcc_certify.structure import ClosedComponent, Structure
+
+Matrix = list[list[Fraction]]
+#: Significant bits to which the search's floats are rounded before anything is proved about them.
+BITS = 40
+#: A left null vector is kept exact when its entries are shorter than this, otherwise rounded to it.
+EXACT_VECTOR_BITS = 64
+#: The objective where there is nothing to decrease.
+KEPT = "none: every agent keeps its state"
+
+
+@dataclass(frozen=True)
+class LyapunovBlock:
+    """One diagonal block of a Lyapunov matrix, exact.
+
+    Attributes
+    ----------
+    name : str
+        The paper's letter: ``P``, ``Omega``, ``Xi_L``, ``Xi_F``, ``H_2``, ``H_F``, ``Theta_L1``, ``Theta_F``.
+    nodes : tuple of int
+    diagonal : tuple of Fraction
+        Positive, without the factor ``rho``.
+    times_rho : bool
+        Whether the block enters the Lyapunov matrix multiplied by ``rho``.
+    """
+
+    name: str
+    nodes: tuple[int, ...]
+    diagonal: tuple[Fraction, ...]
+    times_rho: bool = False
+
+
+@dataclass(frozen=True)
+class ExactInterval:
+    """Proved ends of ``0 < rho <= ...``: the paper's printed one and the exact supremum; None where unbounded."""
+
+    printed: Fraction | None
+    exact: Fraction | None
+
+
+@dataclass(frozen=True)
+class LyapunovFunction:
+    """``V = z' diag(blocks) z`` of a theorem row, in the coordinates ``z`` of its proof.
+
+    Attributes
+    ----------
+    theorem : str
+    objective : str
+        The quotient that the paper's rate is, in its letters.
+    coordinates : {"E", "eps"}
+        ``E``: the rows ``nodes`` of ``E = -L X``. ``eps``: the deviation of ``X`` from its weighted signed mean,
+        ``eps = X - (p'GX / p'1) G1``.
+    blocks : tuple of LyapunovBlock
+    rho : Fraction or None
+    interval : RhoInterval or None
+        Numerical ends of the admissible ``rho``.
+    """
+
+    theorem: str
+    objective: str
+    coordinates: str
+    blocks: tuple[LyapunovBlock, ...]
+    rho: Fraction | None = None
+    interval: lmi.RhoInterval | None = None
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """The nodes whose coordinates enter ``V``, block after block."""
+        return tuple(v for block in self.blocks for v in block.nodes)
+
+    @property
+    def weights(self) -> tuple[Fraction, ...]:
+        """The diagonal of the Lyapunov matrix, ``rho`` included, in the order of ``nodes``."""
+        return tuple(
+            w * (self.rho if block.times_rho and self.rho is not None else 1)
+            for block in self.blocks
+            for w in block.diagonal
+        )
+
+    @property
+    def prefactor(self) -> Fraction:
+        """``lmax / lmin`` of the Lyapunov matrix, which multiplies the squared norm."""
+        weights = self.weights
+        return max(weights) / min(weights)
+
+
+@dataclass(frozen=True)
+class Obligation:
+    """One statement that was proved in exact arithmetic.
+
+    Attributes
+    ----------
+    kind : str
+    statement : str
+        The inequality in the paper's letters.
+    lemma : str
+        What turns the statement into the claim.
+    numbers : mapping of str to Fraction
+        The constants of the statement.
+    """
+
+    kind: str
+    statement: str
+    lemma: str
+    numbers: Mapping[str, Fraction] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RateProof:
+    """A proved rate, with what was proved; ``rate`` None when a step could not be proved (``failed`` says which)."""
+
+    rate: Fraction | None
+    obligations: tuple[Obligation, ...]
+    interval: ExactInterval | None = None
+    failed: str | None = None
+
+
+class Theorem(ABC):
+    """A theorem row: when it applies, its Lyapunov function, its rate.
+
+    Subclasses set ``number`` and ``statement`` and read like the theorem.
+    """
+
+    number: str
+    statement: str
+
+    @abstractmethod
+    def hypotheses(self, structure: Structure) -> dict[str, bool]:
+        """Return the named hypotheses, each with its truth value."""
+
+    def applies(self, structure: Structure) -> bool:
+        """Tell whether all hypotheses hold."""
+        return all(self.hypotheses(structure).values())
+
+    @abstractmethod
+    def lyapunov(self, structure: Structure) -> LyapunovFunction:
+        """Search the Lyapunov function and round it to rationals.
+
+        Raises
+        ------
+        lmi.NoCertificate
+            The search found none.
+        """
+
+    @abstractmethod
+    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
+        """Return the paper's rate of ``V`` from floating-point eigenvalues."""
+
+    @abstractmethod
+    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
+        """Prove a rate of ``V`` in exact arithmetic, as near to the paper's as proves."""
+
+
+# ---------------------------------------------------------------------- floats
+
+
+def dense_laplacian(graph: SignedDigraph) -> np.ndarray:
+    """Return ``L`` as a dense float matrix."""
+    return graph.laplacian().toarray()
+
+
+def float_block(L: np.ndarray, rows: Iterable[int], columns: Iterable[int]) -> np.ndarray:
+    """Return ``L[rows][:, columns]``, either possibly empty."""
+    return L[np.ix_(np.array([*rows], dtype=int), np.array([*columns], dtype=int))]
+
+
+def floats(values: Iterable[Fraction]) -> np.ndarray:
+    """Return rationals as a float64 array."""
+    return np.array([float(v) for v in values])
+
+
+def smallest_eigenvalue(S: np.ndarray) -> float:
+    """Return the smallest eigenvalue of a symmetric matrix."""
+    return float(np.linalg.eigvalsh(S)[0])
+
+
+def block_of(structure: Structure, component: ClosedComponent) -> SignedDigraph:
+    """Return the closed component as a graph of its own."""
+    return structure.graph.subgraph(component.nodes)
+
+
+def rounded(values: np.ndarray, bits: int = BITS) -> tuple[Fraction, ...]:
+    """Round positive floats to short dyadic rationals."""
+    return tuple(round_to_bits(float(v), bits) for v in values)
+
+
+def left_vector_diagonal(graph: SignedDigraph) -> tuple[Fraction, ...]:
+    """Return ``p`` of Lemma 2.3: exact where that is short, otherwise rounded (the proofs hold for any ``p > 0``)."""
+    if graph.n_nodes <= EXACT_NODES // 4:
+        exact = exact_left_vector(graph)
+        if all(p.denominator.bit_length() <= EXACT_VECTOR_BITS for p in exact):
+            return tuple(exact)
+    return rounded(left_vector(graph), 53)
+
+
+def connectivity_rate(graph: SignedDigraph, p: tuple[Fraction, ...]) -> float:
+    """Return ``2 a(L)`` of Lemma 3.1 in floating point."""
+    return 2 * algebraic_connectivity(graph, floats(p))
+
+
+# ---------------------------------------------------------------------- exact matrices
+
+
+def exact_block(L: Matrix, rows: Iterable[int], columns: Iterable[int]) -> Matrix:
+    """Return ``L[rows][:, columns]``."""
+    columns = list(columns)
+    return [[L[i][j] for j in columns] for i in rows]
+
+
+def symmetric_product(weights: Iterable[Fraction], A: Matrix) -> Matrix:
+    """Return ``Omega A + A' Omega`` with ``Omega = diag(weights)``."""
+    w, n = list(weights), len(A)
+    return [[w[i] * A[i][j] + w[j] * A[j][i] for j in range(n)] for i in range(n)]
+
+
+def congruence(A: Matrix, S: Matrix) -> Matrix:
+    """Return ``A' S A``."""
+    return multiply(transpose(A), multiply(S, A))
+
+
+def transpose(A: Matrix) -> Matrix:
+    """Return the transpose."""
+    return [list(column) for column in zip(*A, strict=True)]
+
+
+def multiply(A: Matrix, B: Matrix) -> Matrix:
+    """Return ``A B``, skipping zeros."""
+    width = len(B[0]) if B else 0
+    result = []
+    for row in A:
+        total = [Fraction(0)] * width
+        for a, other in zip(row, B, strict=True):
+            if a:
+                for j, b in enumerate(other):
+                    if b:
+                        total[j] += a * b
+        result.append(total)
+    return result
+
+
+def diagonal_matrix(weights: Iterable[Fraction]) -> Matrix:
+    """Return ``diag(weights)``."""
+    w = list(weights)
+    return [[w[i] if i == j else Fraction(0) for j in range(len(w))] for i in range(len(w))]
+
+
+def without_last(S: Matrix) -> Matrix:
+    """Delete the last row and column: the quadratic form modulo a kernel vector whose last entry is not zero."""
+    return [row[:-1] for row in S[:-1]]
+
+
+def to_floats(S: Matrix) -> np.ndarray:
+    """Return a rational matrix in float64."""
+    return np.array([[float(x) for x in row] for row in S]).reshape(len(S), -1)
+
+
+# ---------------------------------------------------------------------- proofs
+
+
+def prove_direct(structure: Structure, V: LyapunovFunction, letter: str) -> RateProof:
+    """Prove ``Omega A + A' Omega > m I`` on the rows of ``V``, hence the rate ``m / lmax(Omega)``."""
+    weights = V.weights
+    A = exact_block(structure.graph.exact_laplacian(), V.nodes, V.nodes)
+    S = symmetric_product(weights, A)
+    m = prove_margin(S, smallest_eigenvalue(to_floats(S)))
+    if m is None:
+        return RateProof(None, (), failed=f"{letter} is not proved positive definite")
+    statement = Obligation("positive-definite", f"{letter} - m I > 0", "Lyapunov decrease", {"m": m})
+    return RateProof(m / max(weights), (statement,))
+
+
+def prove_connectivity(graph: SignedDigraph, p: tuple[Fraction, ...], guess: float) -> Fraction | None:
+    """Prove ``xi'(PL + L'P)xi >= b xi'P xi`` for all ``xi`` in the range of ``L``, with ``P = diag(p)``; return ``b``.
+
+    ``L G1 = 0``, so ``L'(PL + L'P - bP)L`` is tested after one row and column are deleted. That is a proof for any
+    ``p > 0``, exact left null vector or rounded.
+    """
+    L = graph.exact_laplacian()
+    S = without_last(congruence(L, symmetric_product(p, L)))
+    Z = without_last(congruence(L, diagonal_matrix(p)))
+    return prove_generalized_margin(S, Z, guess)
+
+
+def prove_weighted_deviation(
+    graph: SignedDigraph, gauge: tuple[int, ...], p: tuple[Fraction, ...], guess: float
+) -> Fraction | None:
+    """Prove ``Z L + L'Z >= b Z`` for ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``; return ``b``.
+
+    ``Z G1 = 0`` and ``(Z L + L'Z) G1 = 0`` exactly for any ``p > 0``; one row and column are deleted.
+    """
+    n, total = len(p), sum(p)
+    Z = [
+        [gauge[i] * gauge[j] * ((p[i] if i == j else Fraction(0)) - p[i] * p[j] / total) for j in range(n)]
+        for i in range(n)
+    ]
+    ZL = multiply(Z, graph.exact_laplacian())
+    S = [[ZL[i][j] + ZL[j][i] for j in range(n)] for i in range(n)]
+    return prove_generalized_margin(without_last(S), without_last(Z), guess)
+
+
+def prove_coupled(
+    structure: Structure, V: LyapunovFunction, gamma: Matrix, leaders: tuple[Obligation, ...], letter: str
+) -> RateProof:
+    """Prove ``[[Gamma, rho L_FL' H_F], [rho H_F L_FL, rho S_F]] > m I`` and the ends of the interval of ``rho``."""
+    phi = exact_phi(structure, V, gamma)
+    rho = V.rho if V.rho is not None else Fraction(1)
+    S = phi(rho)
+    m = prove_margin(S, smallest_eigenvalue(to_floats(S)))
+    if m is None:
+        return RateProof(None, leaders, failed=f"{letter} is not proved positive definite")
+    statement = Obligation("positive-definite", f"{letter}(rho) - m I > 0", "Lyapunov decrease", {"m": m, "rho": rho})
+    interval, found = prove_interval(V, phi, letter)
+    return RateProof(m / max(V.weights), (*leaders, statement, *found), interval)
+
+
+def exact_phi(structure: Structure, V: LyapunovFunction, gamma: Matrix) -> Callable[[Fraction], Matrix]:
+    """Return ``rho -> Phi(rho)`` in rationals; ``gamma`` covers the blocks that ``rho`` does not multiply."""
+    L = structure.graph.exact_laplacian()
+    leaders = [v for block in V.blocks if not block.times_rho for v in block.nodes]
+    followers = [v for block in V.blocks if block.times_rho for v in block.nodes]
+    weights = [w for block in V.blocks if block.times_rho for w in block.diagonal]
+    S_F = symmetric_product(weights, exact_block(L, followers, followers))
+    C = [[w * x for x in row] for w, row in zip(weights, exact_block(L, followers, leaders), strict=True)]
+
+    def phi(rho: Fraction) -> Matrix:
+        top = [[*gamma[i], *(rho * row[i] for row in C)] for i in range(len(leaders))]
+        bottom = [[*(rho * x for x in row), *(rho * x for x in S_F[i])] for i, row in enumerate(C)]
+        return top + bottom
+
+    return phi
+
+
+def prove_interval(
+    V: LyapunovFunction, phi: Callable[[Fraction], Matrix], letter: str
+) -> tuple[ExactInterval | None, tuple[Obligation, ...]]:
+    """Prove the ends of the interval of ``rho``: ``Phi(end) > 0`` implies ``Phi(rho) > 0`` for ``0 < rho < end``."""
+    if V.interval is None:
+        return None, ()
+    ends: dict[str, Fraction | None] = {}
+    for name, value in (("printed", V.interval.printed), ("exact", V.interval.exact)):
+        if not np.isfinite(value):
+            ends[name] = None
+            continue
+        ends[name] = next(
+            (
+                end
+                for loss in (1e-9, 1e-7, 1e-4, 0.01, 0.5)
+                if prove_positive_definite(phi(end := Fraction(value * (1 - loss))))
+            ),
+            Fraction(0),
+        )
+    numbers = {name: end for name, end in ends.items() if end is not None}
+    interval = ExactInterval(ends["printed"], ends["exact"])
+    if not numbers:
+        return interval, ()
+    statement = f"{letter}(end) > 0 at both ends, so {letter}(rho) > 0 in between"
+    return interval, (Obligation("rho-interval", statement, "Lemma 5", numbers),)
+
+
+def closed_blocks(structure: Structure) -> list[tuple[int, ClosedComponent]]:
+    """Return the closed components with their 1-based number."""
+    return list(enumerate(structure.closed_components, start=1))
+
+
+def follower_nodes(structure: Structure) -> tuple[int, ...]:
+    """Return the followers as a tuple."""
+    return tuple(structure.followers.tolist())
+
+
+def split_rho(followers: np.ndarray) -> tuple[np.ndarray, float]:
+    """Split ``rho Omega_F`` into a matrix with largest entry 1 and the factor ``rho``."""
+    top = float(followers.max())
+    return followers / top, top

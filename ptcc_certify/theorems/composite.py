@@ -1,0 +1,81 @@
+"""What Theorems 2.2 and 3.2 share: no closed component is balanced, one diagonal matrix covers all agents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import lmi
+from ptcc_certify.structure import ClosedComponent, Structure
+from ptcc_certify.theorems.base import (
+    LyapunovBlock,
+    LyapunovFunction,
+    RateProof,
+    Theorem,
+    closed_blocks,
+    dense_laplacian,
+    exact_block,
+    exact_phi,
+    float_block,
+    floats,
+    follower_nodes,
+    prove_direct,
+    prove_interval,
+    rounded,
+    split_rho,
+    symmetric_product,
+)
+
+
+class DiagonalComposite(Theorem):
+    """``V = E' Th E`` with ``Th = diag(leader blocks, rho Th_F)`` and rate ``lmin(Th L + L' Th) / lmax(Th)``."""
+
+    leader_letter: str
+    follower_letter: str
+    matrix_letter: str
+    product_letter: str
+
+    def lyapunov(self, structure: Structure) -> LyapunovFunction:
+        """All blocks and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
+        L, F = dense_laplacian(structure.graph), structure.followers
+        omega = lmi.diagonal_lyapunov(L).omega
+        leaders = tuple(
+            LyapunovBlock(self.leader_letter + suffix, component.nodes, rounded(omega[list(component.nodes)]))
+            for suffix, component in self._suffixes(structure)
+        )
+        objective = f"lmin({self.product_letter}) / lmax({self.matrix_letter})"
+        if F.size == 0:
+            return LyapunovFunction(self.number, objective, "E", leaders)
+        followers = LyapunovBlock(
+            self.follower_letter, follower_nodes(structure), rounded(split_rho(omega[F])[0]), True
+        )
+        coupling = self._coupling(L, (*leaders, followers))
+        rho = rounded(np.array([coupling.best_rho()]))[0]
+        return LyapunovFunction(self.number, objective, "E", (*leaders, followers), rho, coupling.interval())
+
+    def _suffixes(self, structure: Structure) -> list[tuple[str, ClosedComponent]]:
+        if len(structure.closed_components) == 1:
+            return [("", structure.closed_components[0])]
+        return [(str(k), component) for k, component in closed_blocks(structure)]
+
+    def _coupling(self, L: np.ndarray, blocks: tuple[LyapunovBlock, ...]) -> lmi.Coupling:
+        F, K = blocks[-1].nodes, [v for block in blocks[:-1] for v in block.nodes]
+        omega_L = floats(w for block in blocks[:-1] for w in block.diagonal)
+        S = omega_L[:, None] * float_block(L, K, K)
+        omega_F = floats(blocks[-1].diagonal)
+        return lmi.Coupling(S + S.T, omega_L, omega_F, float_block(L, F, K), float_block(L, F, F))
+
+    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
+        """``lmin(Th L + L' Th) / lmax(Th)``."""
+        L, weights = dense_laplacian(structure.graph), floats(V.weights)
+        return lmi.diagonal_margin(float_block(L, V.nodes, V.nodes), weights) / float(weights.max())
+
+    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
+        """``Th L + L' Th > m I`` and the ends of the interval of ``rho``."""
+        direct = prove_direct(structure, V, self.product_letter)
+        if direct.rate is None or V.rho is None:
+            return direct
+        K = [v for block in V.blocks[:-1] for v in block.nodes]
+        weights = [w for block in V.blocks[:-1] for w in block.diagonal]
+        gamma = symmetric_product(weights, exact_block(structure.graph.exact_laplacian(), K, K))
+        interval, found = prove_interval(V, exact_phi(structure, V, gamma), self.product_letter)
+        return RateProof(direct.rate, (*direct.obligations, *found), interval)

@@ -1,0 +1,120 @@
+"""Theorem 2: quasi-strongly connected signed digraphs: one closed component, and followers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import lmi
+from ptcc_certify.lemmas import algebraic_connectivity
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems.base import (
+    LyapunovBlock,
+    LyapunovFunction,
+    Obligation,
+    RateProof,
+    Theorem,
+    block_of,
+    connectivity_rate,
+    dense_laplacian,
+    diagonal_matrix,
+    float_block,
+    floats,
+    follower_nodes,
+    left_vector_diagonal,
+    prove_connectivity,
+    prove_coupled,
+    prove_direct,
+    rounded,
+    split_rho,
+)
+from ptcc_certify.theorems.composite import DiagonalComposite
+
+
+class BalancedQuasiStrong(Theorem):
+    """Theorem 2.1: quasi-strongly connected, leaders structurally balanced: interval bipartite consensus at T.
+
+    K >= 2: ``V = E' Xi E``, ``Xi = diag(Xi_L, rho Xi_F)``, ``Xi_L = diag(nu)``, ``nu' M(L_L) = 0``; with
+    ``Phi = [[2 a(L_L) Xi_L, rho L_FL' Xi_F], [rho Xi_F L_FL, rho (Xi_F L_F + L_F' Xi_F)]]`` the rate is
+    ``lmin(Phi) / lmax(Xi)``. K = 1: ``V = E_F' Xi_F E_F``, rate ``lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)``.
+    """
+
+    number = "2.1"
+    statement = "Quasi-strongly connected, leaders structurally balanced: interval bipartite consensus at T."
+
+    def hypotheses(self, structure: Structure) -> dict[str, bool]:
+        """Quasi-strongly connected, the closed component balanced."""
+        return {
+            "quasi-strongly connected": structure.connectivity == "quasi-strong",
+            "leaders structurally balanced": structure.closed_components[0].balanced,
+        }
+
+    def lyapunov(self, structure: Structure) -> LyapunovFunction:
+        """``Xi_F`` and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
+        L, F = dense_laplacian(structure.graph), structure.followers
+        leaders = structure.closed_components[0]
+        if len(leaders.nodes) == 1:
+            found = lmi.h_matrix_lyapunov(float_block(L, F, F))
+            block = LyapunovBlock("Xi_F", follower_nodes(structure), rounded(found.omega))
+            return LyapunovFunction(self.number, "lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)", "E", (block,))
+        nu = left_vector_diagonal(block_of(structure, leaders))
+        decrease = connectivity_rate(block_of(structure, leaders), nu) * floats(nu)
+        A_FL, A_F = float_block(L, F, leaders.nodes), float_block(L, F, F)
+        joint = lmi.coupled_lyapunov([lmi.FixedLeader(floats(nu), decrease)], A_FL, A_F)
+        xi = rounded(split_rho(joint.followers)[0])
+        coupling = lmi.Coupling(np.diag(decrease), floats(nu), floats(xi), A_FL, A_F)
+        return LyapunovFunction(
+            self.number,
+            "lmin(Phi) / lmax(Xi)",
+            "E",
+            (LyapunovBlock("Xi_L", leaders.nodes, nu), LyapunovBlock("Xi_F", follower_nodes(structure), xi, True)),
+            rounded(np.array([coupling.best_rho()]))[0],
+            coupling.interval(),
+        )
+
+    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
+        """``lmin(Phi) / lmax(Xi)``, or ``lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)`` for a single leader."""
+        L, weights = dense_laplacian(structure.graph), floats(V.weights)
+        if V.rho is None:
+            return lmi.diagonal_margin(float_block(L, V.nodes, V.nodes), weights) / float(weights.max())
+        leaders, followers = V.blocks
+        nu = floats(leaders.diagonal)
+        a = algebraic_connectivity(structure.graph.subgraph(leaders.nodes), nu)
+        F, K = followers.nodes, leaders.nodes
+        coupling = lmi.Coupling(
+            np.diag(2 * a * nu), nu, floats(followers.diagonal), float_block(L, F, K), float_block(L, F, F)
+        )
+        return coupling.rate(float(V.rho))
+
+    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
+        """``2 a(L_L)`` on the range of ``L_L`` first, then ``Phi > m I``."""
+        if V.rho is None:
+            return prove_direct(structure, V, "Xi_F L_F + L_F' Xi_F")
+        graph, nu = structure.graph.subgraph(V.blocks[0].nodes), V.blocks[0].diagonal
+        b = prove_connectivity(graph, nu, connectivity_rate(graph, nu))
+        if b is None:
+            return RateProof(None, (), failed="2 a(L_L) is not proved positive")
+        lemma = Obligation(
+            "positive-definite-modulo-kernel",
+            "L_L'(Xi_L L_L + L_L' Xi_L - b Xi_L)L_L > 0 modulo G_L 1",
+            "Lemma 3.1",
+            {"b": b},
+        )
+        return prove_coupled(structure, V, diagonal_matrix(b * x for x in nu), (lemma,), "Phi")
+
+
+class UnbalancedQuasiStrong(DiagonalComposite):
+    """Theorem 2.2: quasi-strongly connected, leaders structurally unbalanced: stability at T.
+
+    ``V = E' Xit E``, ``Xit = diag(Xit_L, rho Xi_F)``; rate ``lmin(Psi) / lmax(Xit)``, ``Psi = Xit L + L' Xit``.
+    """
+
+    number = "2.2"
+    statement = "Quasi-strongly connected, leaders structurally unbalanced: stability at T."
+    leader_letter, follower_letter, matrix_letter, product_letter = "Xit_L", "Xi_F", "Xit", "Psi"
+
+    def hypotheses(self, structure: Structure) -> dict[str, bool]:
+        """Quasi-strongly connected, the closed component unbalanced."""
+        return {
+            "quasi-strongly connected": structure.connectivity == "quasi-strong",
+            "leaders structurally unbalanced": not structure.closed_components[0].balanced,
+        }

@@ -1,0 +1,93 @@
+"""Theorem 1: strongly connected signed digraphs."""
+
+from __future__ import annotations
+
+import lmi
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems.base import (
+    KEPT,
+    LyapunovBlock,
+    LyapunovFunction,
+    Obligation,
+    RateProof,
+    Theorem,
+    connectivity_rate,
+    dense_laplacian,
+    floats,
+    left_vector_diagonal,
+    prove_direct,
+    prove_weighted_deviation,
+    rounded,
+)
+
+
+class BalancedStrong(Theorem):
+    """Theorem 1.1: strongly connected, structurally balanced: bipartite consensus at T.
+
+    ``V = eps' P eps`` with ``eps = X - (p'GX) G1``, ``P = diag(p)``, ``p' M(L) = 0``; rate ``2 a(L)``.
+    """
+
+    number = "1.1"
+    statement = "Strongly connected, structurally balanced: bipartite consensus at T."
+
+    def hypotheses(self, structure: Structure) -> dict[str, bool]:
+        """Strongly connected and balanced."""
+        return {
+            "strongly connected": structure.connectivity == "strong",
+            "structurally balanced": structure.balanced,
+        }
+
+    def lyapunov(self, structure: Structure) -> LyapunovFunction:
+        """``P`` is forced by the graph: nothing is searched."""
+        if structure.graph.n_nodes == 1:
+            return LyapunovFunction(self.number, KEPT, "eps", ())
+        block = LyapunovBlock("P", structure.closed_components[0].nodes, left_vector_diagonal(structure.graph))
+        return LyapunovFunction(self.number, "2 a(L)", "eps", (block,))
+
+    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
+        """``2 a(L)``, the second-smallest generalized eigenvalue of ``(PL + L'P, P)``."""
+        return connectivity_rate(structure.graph, V.weights)
+
+    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
+        """``Z L + L'Z > b Z`` modulo ``G1``, ``Z = G (P - pp'/p'1) G``."""
+        if not V.blocks:
+            return RateProof(None, ())
+        gauge = structure.closed_components[0].gauge
+        assert gauge is not None
+        b = prove_weighted_deviation(structure.graph, gauge, V.weights, self.rate(structure, V))
+        if b is None:
+            return RateProof(None, (), failed="2 a(L) is not proved positive")
+        statement = "Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G"
+        return RateProof(b, (Obligation("positive-definite-modulo-kernel", statement, "Lemma 3.1", {"b": b}),))
+
+
+class UnbalancedStrong(Theorem):
+    """Theorem 1.2: strongly connected, structurally unbalanced: stability at T.
+
+    ``V = E' Omega E`` with ``Omega L + L' Omega > 0``; rate ``lmin(Omega L + L' Omega) / lmax(Omega)``.
+    """
+
+    number = "1.2"
+    statement = "Strongly connected, structurally unbalanced: stability at T."
+
+    def hypotheses(self, structure: Structure) -> dict[str, bool]:
+        """Strongly connected and unbalanced."""
+        return {
+            "strongly connected": structure.connectivity == "strong",
+            "structurally unbalanced": not structure.balanced,
+        }
+
+    def lyapunov(self, structure: Structure) -> LyapunovFunction:
+        """``Omega`` of Lemma 3.2, the one with the largest rate."""
+        found = lmi.diagonal_lyapunov(structure.graph.laplacian())
+        block = LyapunovBlock("Omega", tuple(range(structure.graph.n_nodes)), rounded(found.omega))
+        return LyapunovFunction(self.number, "lmin(Omega L + L' Omega) / lmax(Omega)", "E", (block,))
+
+    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
+        """``lmin(Omega L + L' Omega) / lmax(Omega)``."""
+        weights = floats(V.weights)
+        return lmi.diagonal_margin(dense_laplacian(structure.graph), weights) / float(weights.max())
+
+    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
+        """``Omega L + L' Omega > m I``."""
+        return prove_direct(structure, V, "Omega L + L' Omega")
