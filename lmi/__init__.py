@@ -17,6 +17,7 @@ _EXPORTS = {
     "is_m_matrix": "lmi.matrices",
     "is_z_matrix": "lmi.matrices",
     "m_matrix_witness": "lmi.matrices",
+    "h_matrix_diagonal": "lmi.closed_form",
     "CoupledCertificate": "lmi.diagonal",
     "DiagonalCertificate": "lmi.diagonal",
     "FixedLeader": "lmi.diagonal",

@@ -13,11 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix
-from lmi.matrices import is_h_matrix, square
+from lmi.closed_form import h_matrix_diagonal
+from lmi.errors import MatrixError, NoCertificate
+from lmi.matrices import square
 
 if TYPE_CHECKING:
     import cvxpy as cp
+
+
+#: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
+_RESOLVED = 100.0
 
 
 @dataclass(frozen=True)
@@ -139,13 +144,12 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
     array([1., 1.])
     """
     A = square(A)
-    if (low := np.flatnonzero(np.diag(A) <= 0)).size:
-        i = int(low[0])
-        raise NotAnHMatrix(f"diagonal entry {i} is {A[i, i]:.6g}, not positive")
-    # Rows scaled to unit diagonal: the class does not change, the witness is confirmed at any magnitude.
-    if not is_h_matrix(A / np.diag(A)[:, None]):
-        raise NotAnHMatrix("the comparison matrix M(A) has no positive u with M(A) u > 0")
-    return diagonal_lyapunov(A, tolerance=tolerance)
+    closed_form = h_matrix_diagonal(A)
+    try:
+        return diagonal_lyapunov(A, tolerance=tolerance)
+    except NoCertificate:
+        # The best margin can lie below what the solver resolves; the closed form exists all the same.
+        return _certificate(A, closed_form)
 
 
 @dataclass(frozen=True)
@@ -177,13 +181,10 @@ class CoupledCertificate:
         For a fixed block its ``omega`` unchanged; for a free block relative to those.
     followers : (n_F,) array
         ``rho Omega_F``: the coupling factor is contained.
-    rate : float
-        What the solver reached; recompute it from the matrices.
     """
 
     leaders: tuple[np.ndarray, ...]
     followers: np.ndarray
-    rate: float
 
 
 def coupled_lyapunov(
@@ -212,30 +213,36 @@ def coupled_lyapunov(
     Raises
     ------
     MatrixError
-        Shapes do not match.
+        Shapes do not match, or there is no leader block.
     NoCertificate
-        The solver found no positive rate.
+        A free block or the follower block has no diagonal Lyapunov matrix that the solver can resolve.
+    NotAnHMatrix
+        The solver found no positive rate, and the follower block is not an H-matrix with positive diagonal.
 
     Examples
     --------
     >>> found = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
-    >>> found.rate > 0
-    True
+    >>> (found.followers > 0).all()
+    np.True_
     """
     A_F = square(A_F, "A_F")
     A_FL = np.asarray(A_FL.toarray() if hasattr(A_FL, "toarray") else A_FL, dtype=np.float64)
     sizes = [len(block.omega) if isinstance(block, FixedLeader) else len(square(block.A)) for block in leaders]
     n_L, n_F = sum(sizes), len(A_F)
+    if n_L == 0:
+        raise MatrixError("there is no leader block; use h_matrix_lyapunov for followers alone")
     if A_FL.shape != (n_F, n_L):
         raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
     scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
-    fixed_top = max((float(b.omega.max()) for b in leaders if isinstance(b, FixedLeader)), default=1.0)
+    fixed = [b for b in leaders if isinstance(b, FixedLeader)]
+    fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
-        s, t, Y = cp.Variable(), cp.Variable(), cp.Variable(n_F)
-        diagonal, constraints, free = [], [Y >= 0, Y <= 1], []
-        if any(isinstance(b, FixedLeader) for b in leaders):
+        s = cp.Variable() if fixed else cp.Constant(1.0)
+        t, Y = cp.Variable(), cp.Variable(n_F) if n_F else cp.Constant(np.zeros(0))
+        diagonal, constraints, free = [], [Y >= 0, Y <= 1] if n_F else [], []
+        if fixed:
             constraints += [s >= 0, s <= 1]
         for block, k in zip(leaders, sizes, strict=True):
             if isinstance(block, FixedLeader):
@@ -249,28 +256,40 @@ def coupled_lyapunov(
                     constraints.append(2 * H[0] * float(np.squeeze(block.A)) / scale >= t_k)
                 diagonal.append(t_k * np.ones(k))
                 free.append(H)
-        followers = _symmetric_product(cp, Y, A_F / scale)
-        if n_L and n_F:
+        if n_F:
+            followers = _symmetric_product(cp, Y, A_F / scale)
             coupling = cp.diag(Y) @ (A_FL / scale)
             Pi = cp.bmat([[cp.diag(cp.hstack(diagonal)), coupling.T], [coupling, followers]])
         else:
-            Pi = followers if n_F else cp.diag(cp.hstack(diagonal))
+            Pi = cp.diag(cp.hstack(diagonal))
         constraints.append(Pi - t * np.eye(n_L + n_F) >> 0)
-        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free])
+        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free] if n_F else [s, t, *free])
 
     values = _solve(problem, tolerance)
     s, t, Y, rest = values[0], values[1], values[2 : 2 + n_F], values[2 + n_F :]
-    if not t > 0 or (any(isinstance(b, FixedLeader) for b in leaders) and not s > 0):
-        raise NoCertificate(f"the solver reached the rate {t * scale:.3g}, which is not positive")
+    if not (t > _RESOLVED * tolerance and s > 0):
+        return _block_by_block(leaders, A_F, fixed_top, tolerance)
     found, used = [], 0
-    unit = fixed_top / s if any(isinstance(b, FixedLeader) for b in leaders) else 1.0
+    unit = fixed_top / s if fixed else 1.0
     for block, k in zip(leaders, sizes, strict=True):
         if isinstance(block, FixedLeader):
             found.append(block.omega)
         else:
             found.append(_positive(rest[used : used + k]) * unit)
             used += k
-    return CoupledCertificate(tuple(found), _positive(Y) * unit, float(t * scale))
+    return CoupledCertificate(tuple(found), _positive(Y) * unit if n_F else Y)
+
+
+def _block_by_block(
+    leaders: Sequence[FixedLeader | FreeLeader], A_F: np.ndarray, top: float, tolerance: float
+) -> CoupledCertificate:
+    """Find each block by itself, for when the best joint rate lies below what the solver resolves."""
+    found = tuple(
+        block.omega if isinstance(block, FixedLeader) else top * diagonal_lyapunov(block.A, tolerance=tolerance).omega
+        for block in leaders
+    )
+    followers = top * h_matrix_lyapunov(A_F, tolerance=tolerance).omega if len(A_F) else np.zeros(0)
+    return CoupledCertificate(found, followers)
 
 
 def _certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:

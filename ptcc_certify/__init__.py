@@ -1,1 +1,76 @@
-"""Certify prescribed-time coordination control on signed digraphs."""
+"""Certify prescribed-time coordination control on signed digraphs.
+
+import ptcc_certify as ptcc
+
+g = ptcc.read_graph("graph.csv")
+p = ptcc.NominalProtocol(T=0.6, rho1=0.1, rho2=0.3, kappa=1)
+cert = ptcc.certify(g, p, x0=[5, 2, -4, 3, -2, 1])
+cert.save("certificate.json")
+"""
+
+from importlib import import_module
+from typing import Any
+
+_EXPORTS = {
+    "PTCCError": "errors",
+    "NumberError": "errors",
+    "GraphError": "errors",
+    "FormatError": "errors",
+    "ParameterError": "errors",
+    "HypothesisError": "errors",
+    "SimulationError": "errors",
+    "SignedDigraph": "graph",
+    "read_graph": "io",
+    "write_graph": "io",
+    "read_state": "io",
+    "Structure": "structure",
+    "Claim": "structure",
+    "ClosedComponent": "structure",
+    "WeakComponent": "structure",
+    "analyse": "structure",
+    "Gain": "gain",
+    "prescribed_time_bound": "gain",
+    "NominalProtocol": "protocols",
+    "Trajectory": "simulation",
+    "simulate": "simulation",
+    "Outcome": "outcome",
+    "Influence": "outcome",
+    "outcome": "outcome",
+    "influence": "outcome",
+    "is_prescribed_time_stable": "outcome",
+    "is_stability": "outcome",
+    "is_bipartite_consensus": "outcome",
+    "is_interval_bipartite_consensus": "outcome",
+    "is_bipartite_containment": "outcome",
+    "gauge": "lemmas",
+    "left_vector": "lemmas",
+    "exact_left_vector": "lemmas",
+    "laplacian_spectrum": "lemmas",
+    "algebraic_connectivity": "lemmas",
+    "unbalanced_lyapunov": "lemmas",
+    "follower_lyapunov": "lemmas",
+    "containment_weights": "lemmas",
+    "exact_containment_weights": "lemmas",
+    "Envelope": "bounds",
+    "Comparison": "bounds",
+    "Certificate": "certificate",
+    "certify": "certificate",
+    "read_certificate": "certificate",
+    "SymbolicLyapunov": "symbolic",
+    "symbolic_lyapunov": "symbolic",
+    "THEOREMS": "theorems",
+    "theorem_for": "theorems",
+    "plot_trajectory": "plots",
+    "plot_decay": "plots",
+}
+__all__ = sorted(_EXPORTS)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _EXPORTS:
+        return getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

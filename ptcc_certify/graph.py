@@ -25,10 +25,18 @@ if TYPE_CHECKING:
     from scipy import sparse
 
 _INT64_LIMIT = 2**62
-_SMALLEST, _LARGEST = 2.3e-308, 1.7e308
+SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
 _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 
 Exact = Fraction | int | float | str
+
+
+def _nearest(value: Fraction) -> float:
+    """Return the nearest float, infinite where ``float(value)`` overflows."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 class Weights:
@@ -49,7 +57,7 @@ class Weights:
             if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
                 table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
                 self.kind, self.scale = "int64", scale
-            elif all(Fraction(float(v)) == v for v in fractions):
+            elif all(math.isfinite(nearest := _nearest(v)) and Fraction(nearest) == v for v in fractions):
                 table = np.array([float(v) for v in fractions])
                 self.kind, self.scale = "float64", 1
             else:
@@ -71,7 +79,9 @@ class Weights:
             if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
                 return self.table / float(self.scale)
             return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
-        return np.array(self.table, dtype=np.float64)
+        if self.kind == "float64":
+            return self.table.copy()
+        return np.array([_nearest(v) for v in self.table], dtype=np.float64)
 
     def fraction(self, i: int) -> Fraction:
         """Return weight ``i`` exactly."""
@@ -153,7 +163,7 @@ class SignedDigraph:
                 "remove it or give a weight"
             )
         size = np.abs(self.weights)
-        if (odd := np.flatnonzero((size < _SMALLEST) | (size > _LARGEST))).size:
+        if (odd := np.flatnonzero((size < SMALLEST_WEIGHT) | (size > LARGEST_WEIGHT))).size:
             raise GraphError(
                 f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
             )
@@ -246,7 +256,6 @@ class SignedDigraph:
             coo = matrix.tocoo()
             if len(coo.shape) != 2:
                 raise GraphError(f"an adjacency matrix has two dimensions, not {len(coo.shape)}")
-            coo.sum_duplicates()
             shape, target, source, values = coo.shape, coo.row, coo.col, coo.data
             keep = values != 0
             target, source, values = target[keep], source[keep], values[keep]
@@ -355,7 +364,7 @@ class SignedDigraph:
 
     def in_weight(self) -> np.ndarray:
         """(N,) float64 array: ``D_k = sum_l |w_kl|``, how much node k listens in total."""
-        return np.bincount(self.target, np.abs(self.weights), minlength=self.n_nodes)
+        return np.bincount(self.target, np.abs(self.weights), minlength=self.n_nodes).astype(np.float64)
 
     def exact_laplacian(self) -> list[list[Fraction]]:
         """Return the signed Laplacian as N rows of N rationals (small graphs)."""

@@ -137,6 +137,8 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     p[0] = 1.0
     for k in range(1, n):
         p[k] = p[:k] @ rate[:k, k]
+    if not (p > 0).all():
+        raise HypothesisError("the graph is not strongly connected, so no left vector is positive")
     return p / p.sum()
 
 

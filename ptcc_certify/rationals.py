@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import re
+from decimal import Decimal
 from fractions import Fraction
 from numbers import Integral, Rational, Real
 
@@ -115,6 +116,8 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
         return Fraction(int(value))
     if isinstance(value, Rational):
         return Fraction(int(value.numerator), int(value.denominator))
+    if isinstance(value, Decimal):
+        return parse_exact(str(value))
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):

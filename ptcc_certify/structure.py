@@ -11,6 +11,7 @@ A graph is *structurally balanced* iff a *gauge* ``g`` in {-1, +1}^N exists with
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -181,8 +182,27 @@ class Structure:
         return self.components[0].claim if len(self.components) == 1 else None
 
     def holds(self, behaviour: str) -> bool:
-        """Tell whether every component shows ``behaviour``."""
-        return all(component.claim.holds(behaviour) for component in self.components)
+        """Tell whether every component shows ``behaviour`` from every start that is not degenerate.
+
+        Theorems and corollaries decide, but for the signed average: a strongly connected balanced component meets at
+        it iff every node listens as much as it is listened to, undirected or not.
+        """
+        wanted = behaviour_name(behaviour)
+        return all(
+            component.claim.holds(wanted)
+            or (wanted == SIGNED_AVERAGE_CONSENSUS and component.claim.theorem == "1.1" and self._even(component))
+            for component in self.components
+        )
+
+    def _even(self, component: WeakComponent) -> bool:
+        """Tell whether in-weights equal out-weights at every node of a component, exactly."""
+        inside = np.isin(self.graph.target, component.nodes)
+        surplus = dict.fromkeys(component.nodes, Fraction(0))
+        for edge in np.flatnonzero(inside).tolist():
+            weight = abs(self.graph.exact_weight(edge))
+            surplus[int(self.graph.target[edge])] += weight
+            surplus[int(self.graph.source[edge])] -= weight
+        return not any(surplus.values())
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
@@ -360,8 +380,8 @@ def _weak_components(
             connectivity,
             any(closed[i].balanced for i in held[number]),
             balanced=bool(flags.balanced[number]),
-            all_positive=bool(flags.all_positive[number]) and members.size > 1,
-            undirected=bool(flags.undirected[number]) and members.size > 1,
+            all_positive=bool(flags.all_positive[number]),
+            undirected=bool(flags.undirected[number]),
         )
         result.append(WeakComponent(tuple(members.tolist()), connectivity, tuple(held[number]), claim))
     return tuple(result)

@@ -161,9 +161,17 @@ class Theorem(ABC):
             The search found none.
         """
 
-    @abstractmethod
+    def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
+        """Return the symmetric ``S`` (floats) with which the paper bounds ``V' <= -gain z'Sz``.
+
+        ``Omega A + A' Omega`` on the rows of ``V`` unless the theorem says otherwise.
+        """
+        S = floats(V.weights)[:, None] * float_block(dense_laplacian(structure.graph), V.nodes, V.nodes)
+        return S + S.T
+
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """Return the paper's rate of ``V`` from floating-point eigenvalues."""
+        """Return the paper's rate ``lmin(S) / lmax`` of ``V`` from floating-point eigenvalues."""
+        return smallest_eigenvalue(self.decrease(structure, V)) / float(max(V.weights))
 
     @abstractmethod
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
@@ -368,6 +376,8 @@ def prove_interval(
             ),
             Fraction(0),
         )
+    if (printed := ends["printed"]) is not None and (exact := ends["exact"]) is not None:
+        ends["printed"] = min(printed, exact)  # they may coincide, and differ by rounding
     numbers = {name: end for name, end in ends.items() if end is not None}
     interval = ExactInterval(ends["printed"], ends["exact"])
     if not numbers:

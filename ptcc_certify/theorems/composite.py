@@ -64,11 +64,6 @@ class DiagonalComposite(Theorem):
         omega_F = floats(blocks[-1].diagonal)
         return lmi.Coupling(S + S.T, omega_L, omega_F, float_block(L, F, K), float_block(L, F, F))
 
-    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """``lmin(Th L + L' Th) / lmax(Th)``."""
-        L, weights = dense_laplacian(structure.graph), floats(V.weights)
-        return lmi.diagonal_margin(float_block(L, V.nodes, V.nodes), weights) / float(weights.max())
-
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """``Th L + L' Th > m I`` and the ends of the interval of ``rho``."""
         direct = prove_direct(structure, V, self.product_letter)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import lmi
-from ptcc_certify.lemmas import algebraic_connectivity
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import (
     LyapunovBlock,
@@ -71,19 +70,15 @@ class BalancedQuasiStrong(Theorem):
             coupling.interval(),
         )
 
-    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """``lmin(Phi) / lmax(Xi)``, or ``lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)`` for a single leader."""
-        L, weights = dense_laplacian(structure.graph), floats(V.weights)
+    def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
+        """``Phi``, or ``Xi_F L_F + L_F' Xi_F`` for a single leader."""
         if V.rho is None:
-            return lmi.diagonal_margin(float_block(L, V.nodes, V.nodes), weights) / float(weights.max())
+            return super().decrease(structure, V)
         leaders, followers = V.blocks
-        nu = floats(leaders.diagonal)
-        a = algebraic_connectivity(structure.graph.subgraph(leaders.nodes), nu)
-        F, K = followers.nodes, leaders.nodes
-        coupling = lmi.Coupling(
-            np.diag(2 * a * nu), nu, floats(followers.diagonal), float_block(L, F, K), float_block(L, F, F)
-        )
-        return coupling.rate(float(V.rho))
+        L, F, K = dense_laplacian(structure.graph), followers.nodes, leaders.nodes
+        gamma = connectivity_rate(structure.graph.subgraph(K), leaders.diagonal) * np.diag(floats(leaders.diagonal))
+        nu, xi = floats(leaders.diagonal), floats(followers.diagonal)
+        return lmi.Coupling(gamma, nu, xi, float_block(L, F, K), float_block(L, F, F)).phi(float(V.rho))
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """``2 a(L_L)`` on the range of ``L_L`` first, then ``Phi > m I``."""

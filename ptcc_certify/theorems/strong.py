@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import lmi
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import (
@@ -12,7 +14,6 @@ from ptcc_certify.theorems.base import (
     RateProof,
     Theorem,
     connectivity_rate,
-    dense_laplacian,
     floats,
     left_vector_diagonal,
     prove_direct,
@@ -43,6 +44,10 @@ class BalancedStrong(Theorem):
             return LyapunovFunction(self.number, KEPT, "eps", ())
         block = LyapunovBlock("P", structure.closed_components[0].nodes, left_vector_diagonal(structure.graph))
         return LyapunovFunction(self.number, "2 a(L)", "eps", (block,))
+
+    def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
+        """``2 a(L) P``."""
+        return self.rate(structure, V) * np.diag(floats(V.weights))
 
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:
         """``2 a(L)``, the second-smallest generalized eigenvalue of ``(PL + L'P, P)``."""
@@ -82,11 +87,6 @@ class UnbalancedStrong(Theorem):
         found = lmi.diagonal_lyapunov(structure.graph.laplacian())
         block = LyapunovBlock("Omega", tuple(range(structure.graph.n_nodes)), rounded(found.omega))
         return LyapunovFunction(self.number, "lmin(Omega L + L' Omega) / lmax(Omega)", "E", (block,))
-
-    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """``lmin(Omega L + L' Omega) / lmax(Omega)``."""
-        weights = floats(V.weights)
-        return lmi.diagonal_margin(dense_laplacian(structure.graph), weights) / float(weights.max())
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """``Omega L + L' Omega > m I``."""

@@ -111,13 +111,11 @@ class BalancedWeak(Theorem):
             float_block(L, F, F),
         )
 
-    def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """``lmin(Pi) / lmax(H)``, or ``lmin(H_F L_F + L_F' H_F) / lmax(H_F)`` when all closed components are single."""
+    def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
+        """``Pi``, or ``H_F L_F + L_F' H_F`` when all closed components are single."""
         if not _several_nodes(structure):
-            weights = floats(V.weights)
-            A = float_block(dense_laplacian(structure.graph), V.nodes, V.nodes)
-            return lmi.diagonal_margin(A, weights) / float(weights.max())
-        return self._coupling(structure, V.blocks).rate(float(V.rho or 1))
+            return super().decrease(structure, V)
+        return self._coupling(structure, V.blocks).phi(float(V.rho or 1))
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """Prove the decrease of each leader block, then ``Pi > m I``."""

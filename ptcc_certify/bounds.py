@@ -1,0 +1,210 @@
+"""What a proved rate says over time, and how a simulated trajectory compares with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.gain import Gain
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems import LyapunovFunction
+
+if TYPE_CHECKING:
+    from ptcc_certify.simulation import Trajectory
+
+#: Instants, as fractions of the deadline, at which ratios and residuals are reported.
+FRACTIONS = (0.5, 0.9, 0.99)
+#: 1 - t/T at which residuals are reported besides.
+LAST_INSTANTS = (1e-6, 1e-9)
+#: The integrator's error is taken to be below this multiple of its tolerance times the size of the state.
+FLOOR_FACTOR = 1000.0
+
+
+@dataclass(frozen=True)
+class Member:
+    """One bound of an envelope: ``V <= e^(-rate s) V(0)`` for ``V = z' diag(weights) z``.
+
+    Attributes
+    ----------
+    kind : str
+        Class of the certificate, e.g. ``paper``.
+    coordinates : {"E", "eps"}
+        See :class:`ptcc_certify.theorems.LyapunovFunction`.
+    nodes : (n,) int array
+    weights : (n,) array
+    gauge : (N,) array or None
+        Camps, for the coordinates ``eps``.
+    rate : float
+        Not above the proved rate.
+    prefactor : float
+        Not below the proved prefactor; it multiplies the squared norm.
+    """
+
+    kind: str
+    coordinates: str
+    nodes: np.ndarray
+    weights: np.ndarray
+    gauge: np.ndarray | None
+    rate: float
+    prefactor: float
+
+    @classmethod
+    def of(cls, kind: str, structure: Structure, V: LyapunovFunction, rate: float) -> Member:
+        """Build the member of a Lyapunov function with a given rate, rounded to the safe side."""
+        return cls(
+            kind,
+            V.coordinates,
+            np.array(V.nodes, dtype=np.int64),
+            np.array([float(w) for w in V.weights]),
+            structure.gauge,
+            math.nextafter(rate, 0.0),
+            math.nextafter(float(V.prefactor), math.inf),
+        )
+
+    def coordinates_of(self, states: np.ndarray, L: object) -> np.ndarray:
+        """Return ``z`` for states of shape (N, ...): rows of ``-L X``, or the weighted deviation of ``X``."""
+        if self.coordinates == "E":
+            flat = states.reshape(len(states), -1)
+            return -np.asarray(L @ flat).reshape(states.shape)[self.nodes]  # type: ignore[operator]
+        assert self.gauge is not None
+        X, g = states[self.nodes], self.gauge[self.nodes].astype(float)
+        share = self.weights / self.weights.sum()
+        mean = np.tensordot(share * g, X, axes=1)
+        return X - np.multiply.outer(g, mean)
+
+    def value(self, z: np.ndarray) -> np.ndarray:
+        """Return ``V`` for coordinates of shape (n, ...)."""
+        return np.tensordot(self.weights, z**2, axes=1)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A simulated trajectory against an envelope.
+
+    Attributes
+    ----------
+    worst_ratio : float
+        ``max over t > 0 of max(sqrt(V) - f, 0) / sqrt(bound)`` with ``f = floor * tolerance * sqrt(V(0))``, the floor
+        below which the integrator resolves nothing. At most 1 (up to rounding) when no bound is violated.
+    floor : float
+        The constant in ``f``.
+    tolerance : float
+        Relative tolerance of the integrator.
+    resolved_until : float
+        ``1 - t/T`` from which the bound lies below ``f^2``; 0 if it never does.
+    ratios : dict of float to float
+        ``sqrt(V / bound)`` at fractions of the deadline.
+    stop : float
+        Smallest ``1 - t/T`` that was sampled before the deadline.
+    deadline_resolved : bool
+        Whether the run settled, so that samples from the deadline on were judged too.
+    """
+
+    worst_ratio: float
+    floor: float
+    tolerance: float
+    resolved_until: float
+    ratios: dict[float, float]
+    stop: float
+    deadline_resolved: bool
+
+    @property
+    def violated(self) -> bool:
+        """Whether a bound was exceeded by more than rounding."""
+        return self.worst_ratio > 1 + 1e-6
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The pointwise best of several bounds ``V_i(t) <= e^(-rate_i s(t)) V_i(0)``.
+
+    Attributes
+    ----------
+    structure : Structure
+    gain : Gain
+    members : tuple of Member
+    """
+
+    structure: Structure
+    gain: Gain
+    members: tuple[Member, ...]
+
+    @cached_property
+    def _laplacian(self) -> object:
+        return self.structure.graph.laplacian()
+
+    def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
+        """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(prefactor_i) e^(-rate_i s / 2)``.
+
+        Parameters
+        ----------
+        clock : float or array
+            Values of the stretched clock, infinite from the deadline on.
+        """
+        clock = np.asarray(clock, dtype=float)
+        factors = [math.sqrt(m.prefactor) * np.exp(-m.rate * clock / 2) for m in self.members]
+        return np.minimum.reduce(factors) if factors else np.ones_like(clock)
+
+    def residual(self, remaining: float) -> float:
+        """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant."""
+        return float(self.norm_factor(self.gain.clock_at_remaining(remaining)))
+
+    def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / min weight)``."""
+        clock = np.asarray(clock, dtype=float)
+        x0 = np.asarray(x0, dtype=float)
+        bounds = [
+            np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)) / m.weights.min()) * np.exp(-m.rate * clock / 2)
+            for m in self.members
+        ]
+        return np.minimum.reduce(bounds) if bounds else np.zeros_like(clock)
+
+    def compare(self, trajectory: Trajectory) -> Comparison:
+        """Compare a simulated run with every member; see :class:`Comparison`.
+
+        Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
+        holds for every column holds for their sum).
+        """
+        T = float(self.gain.T)
+        judged = trajectory.t > 0
+        if not trajectory.deadline_resolved:
+            judged &= trajectory.t < T
+        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        worst, floor, resolved = 0.0, 0.0, 0.0
+        ratios = dict.fromkeys(FRACTIONS, 0.0)
+        for member in self.members:
+            z = member.coordinates_of(states, self._laplacian)
+            root = np.sqrt(member.value(z))
+            decay = np.exp(-member.rate * trajectory.clock / 2)
+            for column in range(states.shape[1]):
+                bound = root[column, 0] * decay
+                f = FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column])
+                excess = np.maximum(root[column] - f, 0.0)[judged]
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    ratio = np.where(excess > 0, excess / bound[judged], 0.0)
+                    plain = np.where(root[column] > 0, root[column] / bound, 0.0)
+                worst = max(worst, float(ratio.max(initial=0.0)))
+                if root[column, 0] > 0:
+                    floor = max(floor, f / (trajectory.rtol * root[column, 0]))
+                below = trajectory.remaining[(bound < f) & (trajectory.remaining > 0)]
+                resolved = max(resolved, float(below.max(initial=0.0)))
+                for fraction in FRACTIONS:
+                    at = int(np.argmin(np.abs(trajectory.t - fraction * T)))
+                    ratios[fraction] = max(ratios[fraction], float(plain[at]))
+        before = trajectory.remaining[trajectory.remaining > 0]
+        return Comparison(
+            worst, floor, trajectory.rtol, resolved, ratios, float(before.min()), trajectory.deadline_resolved
+        )
+
+    def _state_scale(self, member: Member, states: np.ndarray) -> float:
+        """Return ``||dz||_weights`` for a state error ``|dx_k| = max |x_k|`` in every entry, the worst case."""
+        size = np.abs(states).max(axis=1)
+        if member.coordinates == "E":
+            size = np.asarray(abs(self._laplacian) @ size)[member.nodes]  # type: ignore[arg-type, operator]
+        else:
+            size = 2 * size[member.nodes]
+        return float(np.sqrt(member.weights @ size**2))

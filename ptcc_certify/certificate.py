@@ -1,0 +1,538 @@
+"""Certificates: what is claimed about a graph under a protocol, what was proved, what was only observed.
+
+``certify`` is the main job: structure -> theorem -> Lyapunov function -> proved rate -> outcome -> comparison with
+CVODES. Everything a certificate says outside ``unverified`` was established in exact arithmetic; a simulation
+corroborates and never proves.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lmi.errors import NoCertificate, NotAnHMatrix
+from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS, Comparison, Envelope, Member
+from ptcc_certify.errors import FormatError, ParameterError, SimulationError
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import write_atomically
+from ptcc_certify.lemmas import EXACT_NODES, exact_left_vector, laplacian_spectrum
+from ptcc_certify.outcome import Influence, Outcome, exact_start, influence, outcome
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.rationals import MAX_CHARACTERS, format_exact
+from ptcc_certify.simulation import Trajectory, simulate
+from ptcc_certify.structure import Claim, Structure, analyse
+from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, theorem_for
+
+SCHEMA = "ptcc-certificate/1"
+CERTIFIED, REFUTED, UNDECIDED = "certified", "refuted", "undecided"
+#: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
+SEARCH_NODES = 250
+#: Largest strong component whose dense spectrum is computed.
+SPECTRUM_NODES = 1500
+#: Above this many components the list of components is grouped in arrays.
+MANY_COMPONENTS = 100
+
+
+@dataclass(frozen=True, repr=False)
+class Certificate:
+    """A claim about a signed digraph under a protocol, with its proof; made by :func:`certify`.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : NominalProtocol
+    theorem : Theorem
+        Whose Lyapunov function is used.
+    lyapunov : LyapunovFunction or None
+        None when the search found none or was not started.
+    proof : RateProof
+        The proved rate (None if not proved) and the statements proved for it.
+    numerical_rate : float or None
+        The paper's rate in floating point; nothing is claimed about it.
+    spectral_rate : float or None
+        ``2 min Re lambda`` in floating point: no certificate can reach further.
+    start : tuple of Fraction or None
+    influence : Influence
+        ``Q``, factored.
+    outcome : Outcome or None
+        ``Q X(0)``; None without a start.
+    trajectory : Trajectory or None
+    comparison : Comparison or None
+    notes : tuple of str
+        What kept the verdict from ``certified``, and other remarks.
+    """
+
+    structure: Structure
+    protocol: NominalProtocol
+    theorem: Theorem
+    lyapunov: LyapunovFunction | None
+    proof: RateProof
+    numerical_rate: float | None
+    spectral_rate: float | None
+    start: tuple[Fraction, ...] | None
+    influence: Influence
+    outcome: Outcome | None
+    outcome_proof: tuple[Obligation, ...]
+    trajectory: Trajectory | None
+    comparison: Comparison | None
+    notes: tuple[str, ...]
+
+    @property
+    def graph(self) -> SignedDigraph:
+        """The graph."""
+        return self.structure.graph
+
+    @property
+    def claim(self) -> Claim | None:
+        """What is claimed of a weakly connected graph; None if disconnected (see ``structure.components``)."""
+        return self.structure.claim
+
+    @property
+    def rate(self) -> Fraction | None:
+        """The largest proved rate; None if nothing decays or nothing was proved."""
+        return self.proof.rate
+
+    @property
+    def constant(self) -> bool:
+        """Whether every agent keeps its state, so that there is no decay to certify."""
+        return self.lyapunov is not None and not self.lyapunov.blocks
+
+    @property
+    def verdict(self) -> str:
+        """``certified`` if rate and outcome were proved in exact arithmetic, otherwise ``undecided``."""
+        proved = self.constant or self.proof.rate is not None
+        return CERTIFIED if proved and self.influence.exact else UNDECIDED
+
+    @property
+    def tightness(self) -> float | None:
+        """Proved rate over spectral rate, at most 1."""
+        if self.proof.rate is None or not self.spectral_rate:
+            return None
+        return float(self.proof.rate) / self.spectral_rate
+
+    @cached_property
+    def rate_limit(self) -> Fraction | None:
+        """An exact upper bound of every rate: ``2 trace(L) / r``, twice the mean of the ``r`` nonzero eigenvalues."""
+        r = self.graph.n_nodes - len(self.influence.balanced)
+        trace = sum((abs(self.graph.exact_weight(i)) for i in range(self.graph.n_edges)), Fraction(0))
+        return 2 * trace / r if r else None
+
+    @cached_property
+    def envelope(self) -> Envelope:
+        """The proved bounds over time; without members if nothing was proved."""
+        members: tuple[Member, ...] = ()
+        if self.lyapunov is not None and self.proof.rate is not None:
+            members = (Member.of("paper", self.structure, self.lyapunov, float(self.proof.rate)),)
+        return Envelope(self.structure, self.protocol.gain, members)
+
+    def best_possible_residual(self, remaining: float) -> float | None:
+        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""
+        if self.spectral_rate is None:
+            return None
+        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining) / 2)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``."""
+        labels = self.graph.labels
+        return {
+            "schema": SCHEMA,
+            "producer": _producer(),
+            "graph": _graph_section(self.graph),
+            "structure": _structure_section(self.structure),
+            "claim": None if self.claim is None else _claim_section(self.claim),
+            **({} if self.claim else {"components": _components_section(self.structure, self.outcome)}),
+            "protocol": self.protocol.to_dict(),
+            "paper": self._paper_section(),
+            "lyapunov": {"members": self._members_section()},
+            "rates": {"paper": _text(self.proof.rate), "diagonal": None, "certified": _text(self.proof.rate)},
+            "prefactor": self._prefactor_section(),
+            "initial_state": None if self.start is None else _labelled(labels, self.start),
+            "sigma0": None,
+            "outcome": self._outcome_section(),
+            "reaching_time": None,
+            "effort": None,
+            "proof": [_obligation_section(o) for o in (*self.proof.obligations, *self.outcome_proof)],
+            "verdict": self.verdict,
+            "unverified": self._unverified_section(),
+        }
+
+    def to_json(self) -> str:
+        """Return the certificate as one JSON object, without NaN or infinity."""
+        return json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the certificate to ``path``; the file appears whole or not at all."""
+        write_atomically(path, self.to_json().encode("utf-8", "surrogatepass"))
+
+    def _paper_section(self) -> dict[str, Any] | None:
+        V = self.lyapunov
+        if V is None:
+            return None
+        blocks = [
+            {
+                "name": block.name,
+                "nodes": [self.graph.labels[v] for v in block.nodes],
+                "diagonal": [format_exact(w) for w in block.diagonal],
+                "times_rho": block.times_rho,
+            }
+            for block in V.blocks
+        ]
+        interval = self.proof.interval
+        return {
+            "theorem": V.theorem,
+            "objective": V.objective,
+            "coordinates": V.coordinates,
+            "blocks": blocks,
+            "rho": _text(V.rho),
+            "rho_interval": interval and {"printed": _text(interval.printed), "exact": _text(interval.exact)},
+            "rate": _text(self.proof.rate),
+            "prefactor": format_exact(V.prefactor) if V.blocks else None,
+        }
+
+    def _members_section(self) -> list[dict[str, Any]]:
+        if self.lyapunov is None or self.proof.rate is None:
+            return []
+        paper = self._paper_section() or {}
+        keys = ("coordinates", "blocks", "rho", "rate", "prefactor")
+        return [{"class": "paper", **{key: paper[key] for key in keys}}]
+
+    def _prefactor_section(self) -> dict[str, Any] | None:
+        if self.lyapunov is None or self.proof.rate is None:
+            return None
+        return {"value": format_exact(self.lyapunov.prefactor), "of": f"||{self.lyapunov.coordinates}||^2"}
+
+    def _outcome_section(self) -> dict[str, Any] | None:
+        if not self.influence.exact:
+            return None
+        labels = self.graph.labels
+        followers = self.structure.followers.tolist()
+        section: dict[str, Any] = {"final_state": None, "degenerate": None}
+        if self.outcome is not None:
+            section["final_state"] = _labelled(labels, self.outcome.final_state)
+            section["degenerate"] = list(self.outcome.degenerate)
+        section["influence"] = {
+            "components": [
+                {"nodes": [labels[v] for v in c.nodes], "voices": [exact_or_ball(Fraction(w)) for w in voice]}
+                for c, voice in zip(self.influence.balanced, self.influence.voices, strict=True)
+            ],
+            "followers": {
+                labels[v]: [exact_or_ball(Fraction(w)) for w in pull]
+                for v, pull in zip(followers, self.influence.pulls, strict=True)
+            },
+        }
+        return section
+
+    def _unverified_section(self) -> dict[str, Any]:
+        comparison = self.comparison
+        simulation = comparison and {
+            "worst_ratio": _finite(comparison.worst_ratio),
+            "floor": comparison.floor,
+            "resolved_until": comparison.resolved_until,
+            "ratios": {str(k): _finite(v) for k, v in comparison.ratios.items()},
+            "stop": comparison.stop,
+            "tolerances": {"relative": comparison.tolerance},
+            "deadline_resolved": comparison.deadline_resolved,
+        }
+        floats = None
+        if self.outcome is not None and not self.outcome.exact:
+            floats = dict(zip(self.graph.labels, self.outcome.values.tolist(), strict=True))
+        return {
+            "spectral": self.spectral_rate,
+            "tightness": self.tightness,
+            "paper_rate": self.numerical_rate,
+            "residual": {
+                str(1 - q if q > 1e-3 else f"1-{q:g}"): self.envelope.residual(q)
+                for q in (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
+            },
+            "final_state": floats,
+            "simulation": simulation,
+            "notes": list(self.notes),
+        }
+
+    def __repr__(self) -> str:
+        rate = "none" if self.proof.rate is None else f"{float(self.proof.rate):.6g}"
+        said = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
+        return f"Certificate({said}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
+
+
+def certify(
+    graph: SignedDigraph,
+    protocol: NominalProtocol,
+    x0: Sequence[Any] | None = None,
+    *,
+    simulation: bool = True,
+) -> Certificate:
+    """Certify what a protocol does on a signed digraph.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Any signed digraph, disconnected ones included.
+    protocol : NominalProtocol
+        With ``rho2 > 0``.
+    x0 : sequence of N numbers, optional
+        The start, in node order. Without it there is no final state and no simulation.
+    simulation : bool
+        Whether to compare the proved bound with a CVODES run.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ParameterError
+        ``rho2 = 0`` (no deadline), or a start of the wrong length.
+
+    References
+    ----------
+    Theorems 1 to 3 and Corollaries 1 to 5 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
+    >>> cert
+    Certificate(bipartite consensus, Theorem 1.1, rate 4, certified)
+    >>> cert.outcome
+    Outcome(1=-1, 2=1)
+    """
+    if not protocol.prescribed:
+        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    structure = analyse(graph)
+    theorem = theorem_for(structure)
+    notes: list[str] = []
+    V, proof, numerical = _search_and_prove(structure, theorem, notes)
+    start = None if x0 is None else tuple(exact_start(structure, x0))
+    matrix = influence(structure)
+    result = None if start is None else outcome(structure, start)
+    obligations: tuple[Obligation, ...] = ()
+    if matrix.exact:
+        obligations = _prove_outcome(structure, matrix)
+    else:
+        notes.append(f"the outcome of a graph of more than {EXACT_NODES} nodes is computed in floating point only")
+    trajectory = comparison = None
+    if simulation and start is not None:
+        try:
+            trajectory = simulate(graph, protocol, [float(x) for x in start])
+        except SimulationError as error:
+            notes.append(f"simulation: {error}")
+    certificate = Certificate(
+        structure=structure,
+        protocol=protocol,
+        theorem=theorem,
+        lyapunov=V,
+        proof=proof,
+        numerical_rate=numerical,
+        spectral_rate=_spectral_rate(structure, notes),
+        start=start,
+        influence=matrix,
+        outcome=result,
+        outcome_proof=obligations,
+        trajectory=trajectory,
+        comparison=comparison,
+        notes=tuple(notes),
+    )
+    if trajectory is None or not certificate.envelope.members:
+        return certificate
+    from dataclasses import replace
+
+    return replace(certificate, comparison=certificate.envelope.compare(trajectory))
+
+
+def _search_and_prove(
+    structure: Structure, theorem: Theorem, notes: list[str]
+) -> tuple[LyapunovFunction | None, RateProof, float | None]:
+    n = structure.graph.n_nodes
+    nothing = RateProof(None, ())
+    if n > SEARCH_NODES:
+        notes.append(f"the search of the paper's certificate stops at {SEARCH_NODES} nodes; the graph has {n}")
+        return None, nothing, None
+    try:
+        with np.errstate(all="ignore"):
+            V = theorem.lyapunov(structure)
+            numerical = theorem.rate(structure, V) if V.blocks else None
+    except (NoCertificate, NotAnHMatrix, np.linalg.LinAlgError) as error:
+        notes.append(f"no Lyapunov matrix was found: {error}")
+        return None, nothing, None
+    if n > EXACT_NODES:
+        notes.append(f"exact proofs stop at {EXACT_NODES} nodes; the graph has {n}")
+        return V, nothing, numerical
+    with np.errstate(all="ignore"):
+        proof = theorem.prove(structure, V)
+    if proof.failed:
+        notes.append(proof.failed)
+    return V, proof, numerical
+
+
+def _prove_outcome(structure: Structure, matrix: Influence) -> tuple[Obligation, ...]:
+    """Check in rationals that ``Q`` maps into the kernel of ``L`` and keeps what the motion keeps.
+
+    ``L Q = 0`` column by column of the factored form, ``eta_k' M(L_Lk) = 0`` and ``eta_k' 1 = 1``; since the kernel
+    of ``L`` has dimension ``m_b`` and ``d/dt eta_k' G_k X_Lk = 0``, these determine ``Q``.
+    """
+    graph = structure.graph
+    L = graph.exact_laplacian()
+    for column, (component, voice) in enumerate(zip(matrix.balanced, matrix.voices, strict=True)):
+        state = [Fraction(0)] * graph.n_nodes
+        for v, sign in zip(component.nodes, component.gauge or (), strict=True):
+            state[v] = Fraction(sign)
+        for v, pull in zip(structure.followers.tolist(), matrix.pulls, strict=True):
+            state[v] = Fraction(pull[column])
+        if any(sum((a * x for a, x in zip(row, state, strict=True) if a and x), Fraction(0)) for row in L):
+            raise ArithmeticError("internal check failed: the outcome is not in the kernel of L")
+        if len(component.nodes) > 1:
+            expected = exact_left_vector(graph.subgraph(component.nodes))
+            kept = tuple(g * w for g, w in zip(component.gauge or (), expected, strict=True))
+            if kept != voice:
+                raise ArithmeticError("internal check failed: the outcome does not keep eta' G X")
+    statement = "L Q = 0 and eta_k' G_k X_Lk is kept by the motion, so X(T) = Q X(0)"
+    return (Obligation("outcome", statement, "Lemmas 2, 8 and 9"),)
+
+
+def _spectral_rate(structure: Structure, notes: list[str]) -> float | None:
+    if int(np.bincount(structure.strong_component).max()) > SPECTRUM_NODES:
+        notes.append(f"the spectral rate is not computed for strong components above {SPECTRUM_NODES} nodes")
+        return None
+    return laplacian_spectrum(structure).spectral_rate
+
+
+def exact_or_ball(value: Fraction) -> str | dict[str, str]:
+    """Write a rational exactly, or as a ball ``{mid, radius}`` that contains it where the text would be too long.
+
+    Examples
+    --------
+    >>> exact_or_ball(Fraction(1, 3))
+    '1/3'
+    >>> sorted(exact_or_ball(Fraction(1, 3**9000)))
+    ['mid', 'radius']
+    """
+    bits = value.numerator.bit_length() + value.denominator.bit_length()
+    if bits * 0.30103 < MAX_CHARACTERS - 6:
+        return format_exact(value)
+    scale = 10**60
+    mid = round(value * scale)
+    return {"mid": f"{mid}e-60", "radius": "1e-60"}
+
+
+def structure_json(structure: Structure) -> dict[str, Any]:
+    """Return graph, structure and claim as JSON-ready data, in the keys of a certificate."""
+    data = {"graph": _graph_section(structure.graph), "structure": _structure_section(structure)}
+    if structure.claim is not None:
+        return {**data, "claim": _claim_section(structure.claim)}
+    return {**data, "claim": None, "components": _components_section(structure, None)}
+
+
+def read_certificate(path: str | Path) -> dict[str, Any]:
+    """Read the JSON of a certificate strictly: no duplicate keys, no NaN or infinity, the known schema.
+
+    Raises
+    ------
+    FormatError
+        Names the file and what is wrong.
+    """
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        result = dict(pairs)
+        if len(result) != len(pairs):
+            raise ValueError("a key occurs twice")
+        return result
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is not a number")
+
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    except (OSError, ValueError, RecursionError) as error:
+        raise FormatError(f"{path}: not a readable certificate ({error})") from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise FormatError(f'{path}: not a certificate of schema "{SCHEMA}"')
+    return data
+
+
+def _producer() -> str:
+    from importlib.metadata import version
+
+    return f"ptcc-certify {version('ptcc-certify')}"
+
+
+def _graph_section(graph: SignedDigraph) -> dict[str, Any]:
+    read = graph.read
+    return {
+        "nodes": list(graph.labels),
+        "edges": [[s, t, format_exact(w)] for s, t, w in graph.edges],
+        "read": {key: read[key] for key in ("orientation", "duplicates", "self_loops", "undirected")},
+        "sha256": graph.sha256,
+    }
+
+
+def _structure_section(structure: Structure) -> dict[str, Any]:
+    labels = structure.graph.labels
+    closed = []
+    for component in structure.closed_components:
+        entry: dict[str, Any] = {"nodes": [labels[v] for v in component.nodes], "balanced": component.balanced}
+        if component.gauge is not None:
+            entry["gauge"] = list(component.gauge)
+        if component.negative_cycle is not None:
+            entry["negative_cycle"] = [[labels[s], labels[t]] for s, t in component.negative_cycle]
+        closed.append(entry)
+    return {
+        "connectivity": structure.connectivity,
+        "closed_components": closed,
+        "leaders": [labels[v] for v in structure.leaders.tolist()],
+        "followers": [labels[v] for v in structure.followers.tolist()],
+        "balanced": structure.balanced,
+        "sign_symmetric": structure.sign_symmetric,
+    }
+
+
+def _claim_section(claim: Claim) -> dict[str, Any]:
+    return {"theorem": claim.theorem, "behaviour": claim.behaviour, "corollaries": list(claim.corollaries)}
+
+
+def _components_section(structure: Structure, result: Outcome | None) -> Any:
+    components, labels = structure.components, structure.graph.labels
+    if len(components) > MANY_COMPONENTS:
+        return {
+            "nodes": [[labels[v] for v in c.nodes] for c in components],
+            "connectivity": [c.connectivity for c in components],
+            "theorem": [c.claim.theorem for c in components],
+            "behaviour": [c.claim.behaviour for c in components],
+        }
+    state = result.final_state if result is not None and result.exact else None
+    return [
+        {
+            "nodes": [labels[v] for v in c.nodes],
+            "connectivity": c.connectivity,
+            "claim": _claim_section(c.claim),
+            "outcome": None if state is None else {labels[v]: exact_or_ball(Fraction(state[v])) for v in c.nodes},
+        }
+        for c in components
+    ]
+
+
+def _obligation_section(obligation: Obligation) -> dict[str, Any]:
+    numbers = {name: format_exact(value) for name, value in obligation.numbers.items()}
+    return {"kind": obligation.kind, "statement": obligation.statement, "lemma": obligation.lemma, "numbers": numbers}
+
+
+def _labelled(labels: Sequence[str], values: Sequence[Any]) -> dict[str, Any]:
+    return {label: exact_or_ball(Fraction(value)) for label, value in zip(labels, values, strict=True)}
+
+
+def _text(value: Fraction | None) -> str | None:
+    return None if value is None else format_exact(value)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,375 @@
+"""The command line ``ptcc``: parses, calls, prints.
+
+Exit codes: 0 proved and everything asked holds; 1 a bound is violated; 2 bad input or usage; 3 an expectation is
+refuted; 4 undecided. Data go to standard output, everything else to standard error.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptcc_certify.errors import ParameterError, PTCCError
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate import Certificate
+    from ptcc_certify.graph import SignedDigraph
+    from ptcc_certify.protocols import NominalProtocol
+    from ptcc_certify.structure import Structure
+
+OK, VIOLATED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4
+
+
+def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def apply(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+_graph_options = _options(
+    click.argument("graph"),
+    click.option("--edges", type=click.Choice(["information", "listens"]), help="Row a,b: flows a -> b, or a listens."),
+    click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
+    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
+    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
+)
+_protocol_options = _options(
+    click.option("--protocol", "kind", type=click.Choice(["nominal"]), default="nominal", show_default=True),
+    click.option("--T", "T", default="1", show_default=True, help="Deadline."),
+    click.option("--rho1", default="1", show_default=True, help="Constant part of the gain."),
+    click.option("--rho2", default="1", show_default=True, help="Factor of the growing part of the gain."),
+    click.option("--kappa", default="2", show_default=True, help="Exponent of the time scaling."),
+    click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of a random start."),
+)
+_json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="ptcc-certify", prog_name="ptcc")
+def cli() -> None:
+    """Certify prescribed-time coordination control on signed digraphs.
+
+    GRAPH is a file, - for standard input, or the name of a packaged graph (fig1a, fig1b, fig3a, fig3b, fig5a, fig5b).
+    """
+
+
+@cli.command()
+@_graph_options
+@click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@_json_option
+def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
+    """Tell the structure of GRAPH and the theorem that applies; no computation in floating point."""
+    from ptcc_certify.structure import analyse
+    from ptcc_certify.summary import structure_lines
+
+    expected = _behaviour(expect)
+    structure = analyse(_read(graph, **read))
+    if as_json:
+        from ptcc_certify.certificate import structure_json
+
+        _print_json(structure_json(structure))
+    else:
+        _print(structure_lines(structure, graph))
+    return _refuted(structure, expected)
+
+
+@cli.command()
+@_graph_options
+@_protocol_options
+@click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
+@_json_option
+def certify(
+    graph: str,
+    kind: str,
+    x0: str,
+    seed: int,
+    expect: str | None,
+    min_rate: str | None,
+    output: str | None,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
+    from ptcc_certify.certificate import certify as run
+    from ptcc_certify.summary import certificate_lines
+
+    expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
+    protocol = _protocol(options)
+    signed = _read(graph, **options)
+    certificate = run(signed, protocol, _start(x0, seed, signed))
+    if output:
+        certificate.save(output)
+    if as_json:
+        _print_json(certificate.to_dict())
+    else:
+        _print(certificate_lines(certificate, graph))
+        if output:
+            click.echo(f"written    {output}")
+    return _exit_code(certificate, expected, wanted)
+
+
+@cli.command()
+@_graph_options
+@_protocol_options
+@click.option(
+    "--dimension", type=click.IntRange(min=1), default=1, show_default=True, help="State components per agent."
+)
+@click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
+def simulate(
+    graph: str, kind: str, x0: str, seed: int, dimension: int, samples: int, output: str | None, **options: Any
+) -> int:
+    """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
+
+    rho2 = 0 runs the protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d numbers,
+    agent after agent.
+    """
+    from ptcc_certify.io import write_atomically
+    from ptcc_certify.simulation import simulate as run
+
+    protocol = _protocol(options)
+    signed = _read(graph, **options)
+    trajectory = run(signed, protocol, _start_columns(x0, seed, signed, dimension), samples=samples)
+    if output and Path(output).suffix.lower() in {".png", ".pdf", ".svg"}:
+        if dimension > 1:
+            raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
+        from ptcc_certify.plots import plot_trajectory
+        from ptcc_certify.structure import analyse
+
+        _save_figure(plot_trajectory(trajectory, analyse(signed)).figure, output)
+    elif output:
+        write_atomically(output, trajectory.to_csv())
+    else:
+        click.echo(trajectory.to_csv(), nl=False)
+    if not trajectory.deadline_resolved:
+        click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
+    return OK
+
+
+@cli.command()
+@click.argument("name", default="all")
+@click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
+def examples(name: str, output: str | None) -> int:
+    """Run the paper's examples (all, a number 1 to 3, or a graph such as fig1a) and print one row each."""
+    from ptcc_certify.certificate import certify as run
+    from ptcc_certify.examples import load_graph, select
+    from ptcc_certify.plots import plot_decay, plot_trajectory
+    from ptcc_certify.protocols import NominalProtocol
+
+    chosen, code = select(name), OK
+    if output:
+        _make_folder(output)
+    click.echo(f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}  verdict")
+    for example, graph_name, reported in chosen:
+        protocol = NominalProtocol(T=example.T, rho1=example.rho1, rho2=example.rho2, kappa=example.kappa)
+        certificate = run(load_graph(graph_name), protocol, example.x0.split(","))
+        claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
+        assert claim is not None
+        click.echo(
+            f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
+            f"{float(rate or 0):>9.4f}{certificate.tightness or 0:>11.3f}"
+            f"{seen.worst_ratio if seen else 0:>8.3f}  {certificate.verdict}"
+        )
+        code = max(code, _exit_code(certificate, reported, None))
+        if output:
+            folder = Path(output)
+            certificate.save(folder / f"{graph_name}.json")
+            if certificate.trajectory is not None:
+                axes = plot_trajectory(certificate.trajectory, certificate.structure)
+                _save_figure(axes.figure, folder / f"{graph_name}_states.png")
+            if seen is not None:
+                _save_figure(plot_decay(certificate).figure, folder / f"{graph_name}_decay.png")
+    return code
+
+
+@cli.command()
+@click.argument("theorem", required=False)
+def cite(theorem: str | None) -> int:
+    """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
+    from ptcc_certify.theorems import THEOREMS
+
+    note = "Manuscript"
+    if theorem is not None:
+        statements = {t.number: t.statement for t in THEOREMS}
+        if theorem not in statements:
+            raise ParameterError(f'no theorem "{theorem}"; one of ' + ", ".join(statements))
+        note += f"; Theorem {theorem}: {statements[theorem]}"
+    click.echo(
+        "@unpublished{zhu_prescribed_time_coordination,\n"
+        "  author = {Zhu, Zhen-Hua and Wu, Huaiyu and Guan, Zhi-Hong and Liu, Zhi-Wei and Chen, Yang and "
+        "Zheng, Xiujuan},\n"
+        "  title  = {Robust prescribed-time coordination control of cooperative-antagonistic networks with "
+        "disturbances},\n"
+        f"  note   = {{{note}}}\n"
+        "}"
+    )
+    return OK
+
+
+# ---------------------------------------------------------------------- helpers
+
+
+def _read(
+    graph: str,
+    edges: str | None = None,
+    duplicates: Any = "refuse",
+    drop_self_loops: bool = False,
+    undirected: bool = False,
+    **_: Any,
+) -> SignedDigraph:
+    from ptcc_certify.examples import GRAPHS, graph_path
+    from ptcc_certify.io import read_graph
+
+    path: str | Path = graph_path(graph) if graph in GRAPHS and not Path(graph).exists() else graph
+    return read_graph(
+        path,
+        orientation=edges,
+        duplicates=duplicates,
+        drop_self_loops=drop_self_loops,
+        undirected=undirected,
+    )
+
+
+def _protocol(options: dict[str, Any]) -> NominalProtocol:
+    from ptcc_certify.protocols import NominalProtocol
+
+    return NominalProtocol(**{name: options[name] for name in ("T", "rho1", "rho2", "kappa")})
+
+
+def _start(x0: str, seed: int, graph: SignedDigraph) -> list[Fraction]:
+    if x0 != "random":
+        from ptcc_certify.io import read_state
+
+        return read_state(x0, graph)
+    return [row[0] for row in _random_start(seed, graph.n_nodes, 1)]
+
+
+def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> Any:
+    import numpy as np
+
+    from ptcc_certify.rationals import parse_exact
+
+    if dimension == 1:
+        return [float(x) for x in _start(x0, seed, graph)]
+    if x0 == "random":
+        return np.array([[float(x) for x in row] for row in _random_start(seed, graph.n_nodes, dimension)])
+    values = [float(parse_exact(text)) for text in x0.split(",")]
+    if len(values) != graph.n_nodes * dimension:
+        raise ParameterError(f"--x0 has {len(values)} values for {graph.n_nodes} agents of dimension {dimension}")
+    return np.array(values).reshape(graph.n_nodes, dimension)
+
+
+def _random_start(seed: int, n: int, dimension: int) -> list[list[Fraction]]:
+    """Return starts uniform on [-10, 10], to three decimals, so that they can be written down."""
+    import numpy as np
+
+    thousandths = np.random.default_rng(seed).integers(-10_000, 10_001, size=(n, dimension))
+    return [[Fraction(int(x), 1000) for x in row] for row in thousandths]
+
+
+def _behaviour(text: str | None) -> str | None:
+    if text is None:
+        return None
+    from ptcc_certify.structure import behaviour_name
+
+    try:
+        return behaviour_name(text)
+    except ValueError as error:
+        raise ParameterError(f"--expect: {error}") from None
+
+
+def _number(text: str | None, option: str) -> Fraction | None:
+    if text is None:
+        return None
+    from ptcc_certify.rationals import parse_exact
+
+    try:
+        return parse_exact(text)
+    except PTCCError as error:
+        raise ParameterError(f"{option}: {error}") from None
+
+
+def _refuted(structure: Structure, expected: str | None) -> int:
+    if expected is None or structure.holds(expected):
+        return OK
+    click.echo(f"refuted: {expected} does not follow for this graph", err=True)
+    return REFUTED_EXPECTATION
+
+
+def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fraction | None) -> int:
+    if certificate.comparison is not None and certificate.comparison.violated:
+        click.echo("violated: the simulated run exceeds the proved bound; please report this graph", err=True)
+        return VIOLATED
+    if code := _refuted(certificate.structure, expected):
+        return code
+    code = OK if certificate.verdict == "certified" else UNDECIDED
+    if min_rate is None or certificate.constant:
+        return code
+    if certificate.rate is not None and certificate.rate >= min_rate:
+        return code
+    limit = certificate.rate_limit
+    if limit is not None and min_rate > limit:
+        click.echo(f"refuted: no rate of this graph exceeds {float(limit):.6g} (mean eigenvalue)", err=True)
+        return REFUTED_EXPECTATION
+    click.echo("undecided: no such rate is proved, and none is excluded", err=True)
+    return UNDECIDED
+
+
+def _save_figure(figure: Any, path: str | Path) -> None:
+    import io
+
+    from ptcc_certify.io import write_atomically
+
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=Path(path).suffix.lower().lstrip("."), dpi=150)
+    write_atomically(path, buffer.getvalue())
+
+
+def _make_folder(path: str) -> None:
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot make this folder ({error.strerror})") from None
+
+
+def _print(lines: list[str]) -> None:
+    click.echo("\n".join(lines))
+
+
+def _print_json(data: Any) -> None:
+    click.echo(json.dumps(data, ensure_ascii=False, allow_nan=False))
+
+
+def main() -> None:
+    """Run ``ptcc`` and exit with its code; every refusal is one line on standard error."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.ClickException as error:
+        click.echo(f"ptcc: {' '.join(error.format_message().split())}", err=True)
+        code = BAD_INPUT
+    except PTCCError as error:
+        click.echo(f"ptcc: {error}", err=True)
+        code = BAD_INPUT
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("ptcc: interrupted", err=True)
+        code = 130
+    except BrokenPipeError:
+        code = OK
+        sys.stderr.close()
+    sys.exit(code if isinstance(code, int) else OK)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,204 @@
+"""The paper's control protocols: parameters, closed loops as CasADi expressions, and their LaTeX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.gain import Gain, parameters_text
+from ptcc_certify.graph import Exact
+from ptcc_certify.latex import to_latex
+from ptcc_certify.rationals import format_exact
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from ptcc_certify.graph import SignedDigraph
+
+_LATEX_NODES = 20
+_PARAMETERS = ("T", "rho1", "rho2", "kappa")
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class NominalProtocol:
+    """The nominal protocol (4) of the paper: every agent steers by what it hears from those it listens to.
+
+        u_k = gain(t) sum_l w_kl (x_l - sign(w_kl) x_k),
+        gain(t) = rho1 + rho2 kappa/(T - t)  before T,  rho1 from T on
+
+    The agents settle at ``T``, whatever the start. ``rho2 = 0`` is allowed: then the gain is constant and they settle
+    only as ``t`` goes to infinity (the asymptotic baseline).
+
+    Parameters
+    ----------
+    T, rho1, kappa : int, float, str or Fraction
+        Positive; kept as exact rationals, a text obeys the exact grammar.
+    rho2 : int, float, str or Fraction
+        Not negative.
+
+    Raises
+    ------
+    ParameterError
+        Names the parameter, its value and its domain.
+
+    Examples
+    --------
+    >>> protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
+    >>> protocol
+    NominalProtocol(T=3/5, rho1=1/10, rho2=3/10, kappa=1)
+    >>> protocol.to_dict()
+    {'kind': 'nominal', 'T': '3/5', 'rho1': '1/10', 'rho2': '3/10', 'kappa': '1'}
+    """
+
+    T: Fraction
+    rho1: Fraction
+    rho2: Fraction
+    kappa: Fraction
+
+    def __init__(self, T: Exact, rho1: Exact, rho2: Exact, kappa: Exact):
+        gain = Gain(T, rho1, rho2, kappa)
+        for name in _PARAMETERS:
+            object.__setattr__(self, name, getattr(gain, name))
+
+    @property
+    def kind(self) -> str:
+        """``"nominal"``."""
+        return "nominal"
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether there is a deadline: ``rho2 > 0``."""
+        return self.rho2 > 0
+
+    @cached_property
+    def gain(self) -> Gain:
+        """The gain and its clock."""
+        return Gain(self.T, self.rho1, self.rho2, self.kappa)
+
+    @property
+    def settling_time(self) -> Fraction | None:
+        """``T``, or None for the asymptotic baseline."""
+        return self.T if self.prescribed else None
+
+    def input(self, graph: SignedDigraph, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
+        """Return ``u = gain(t) E``, ``E = -L x``, as a CasADi expression.
+
+        Parameters
+        ----------
+        graph : SignedDigraph
+            N agents.
+        x : (N, 1) casadi.SX, optional
+            The states; symbols ``x1 .. xN`` by default.
+        t : casadi.SX, optional
+            The time; a symbol ``t`` by default.
+
+        Returns
+        -------
+        (N, 1) casadi.SX
+
+        Examples
+        --------
+        >>> from ptcc_certify.graph import SignedDigraph
+        >>> pair = SignedDigraph.from_edges([(1, 2, -3)])
+        >>> NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).input(pair)
+        SX([0, (-6*(x1+x2))])
+        """
+        import casadi as ca
+
+        x, t = _states(graph) if x is None else x, ca.SX.sym("t") if t is None else t
+        return self.gain.expression(t) * _coupling(graph, x)
+
+    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+        """Return ``x' = u`` as CasADi's ``{"t", "x", "ode"}``, fit for ``casadi.integrator`` (before ``T``).
+
+        Examples
+        --------
+        >>> from ptcc_certify.graph import SignedDigraph
+        >>> loop = NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).closed_loop(SignedDigraph.from_edges([(1, 2, 3)]))
+        >>> loop["x"], loop["ode"]
+        (SX([x1, x2]), SX([0, (6*(x1-x2))]))
+        """
+        import casadi as ca
+
+        x, t = _states(graph), ca.SX.sym("t")
+        return {"t": t, "x": x, "ode": self.input(graph, x, t)}
+
+    def latex(self, graph: SignedDigraph | None = None) -> str:
+        r"""Return the protocol in LaTeX, printed from its expressions: for an agent k, or for every agent of a graph.
+
+        Parameters
+        ----------
+        graph : SignedDigraph, optional
+            At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
+            numbers; without a graph they are letters.
+
+        Raises
+        ------
+        ParameterError
+            The graph has more than 20 nodes.
+
+        Examples
+        --------
+        >>> from ptcc_certify.graph import SignedDigraph
+        >>> protocol = NominalProtocol(T=1, rho1=2, rho2=3, kappa=1)
+        >>> print(protocol.latex())
+        \begin{aligned}
+        u_{k} &= \sum_{l=1}^{N} g w_{kl} \left(x_{l} - \operatorname{sign}\left(w_{kl}\right) x_{k}\right) \\
+        g &= \begin{cases} \rho_{1} + \frac{\rho_{2} \kappa}{T - t}, & t < T \\ \rho_{1}, & t \ge T \end{cases}
+        \end{aligned}
+        >>> print(protocol.latex(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)])))
+        \begin{aligned}
+        u_{1} &= g \left(x_{2} - x_{1}\right) \\
+        u_{2} &= g \left(-3 \left(x_{1} + x_{2}\right)\right) \\
+        g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
+        \end{aligned}
+        """
+        import casadi as ca
+
+        g = ca.SX.sym("g")
+        if graph is None:
+            summand = g * _pull(*(ca.SX.sym(name) for name in ("w_kl", "x_k", "x_l")))
+            rows = [rf"u_{{k}} &= \sum_{{l=1}}^{{N}} {to_latex(summand)}"]
+        elif graph.n_nodes > _LATEX_NODES:
+            raise ParameterError(f"LaTeX of {graph.n_nodes} agents is too long; the limit is {_LATEX_NODES} nodes")
+        else:
+            inputs = g * _coupling(graph, _states(graph))
+            rows = [rf"u_{{{k + 1}}} &= {to_latex(inputs[k])}" for k in range(graph.n_nodes)]
+        rows.append(f"g &= {self.gain.latex(numbers=graph is not None)}")
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def _repr_latex_(self) -> str:
+        return f"$${self.latex()}$$"
+
+    def to_dict(self) -> dict[str, str]:
+        """Return ``kind`` and the parameters as exact strings."""
+        return {"kind": self.kind} | {name: format_exact(getattr(self, name)) for name in _PARAMETERS}
+
+    def __repr__(self) -> str:
+        return f"NominalProtocol({parameters_text(self, _PARAMETERS)})"
+
+
+def _states(graph: SignedDigraph) -> ca.SX:
+    import casadi as ca
+
+    return ca.vertcat(*(ca.SX.sym(f"x{k}") for k in range(1, graph.n_nodes + 1)))
+
+
+def _pull(weight: Any, listener: ca.SX, source: ca.SX) -> ca.SX:
+    """``w_kl (x_l - sign(w_kl) x_k)``: how source l moves listener k."""
+    import casadi as ca
+
+    return weight * (source - ca.sign(weight) * listener)
+
+
+def _coupling(graph: SignedDigraph, x: ca.SX) -> ca.SX:
+    """``E``, the sum of the pulls on every agent."""
+    import casadi as ca
+
+    entries = [ca.SX(0)] * graph.n_nodes
+    for k, source, weight in zip(graph.target.tolist(), graph.source.tolist(), graph.weights.tolist(), strict=True):
+        entries[k] = entries[k] + _pull(weight, x[k], x[source])
+    return ca.vertcat(*entries)

@@ -1,0 +1,209 @@
+"""One screen of text about a structure or a certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from ptcc_certify.structure import Structure
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate import Certificate
+
+WIDTH = 118
+_ORIENTATION = {
+    "information": "a row a,b: information flows a -> b, b listens",
+    "listens": "a row a,b: a listens to b",
+    "matrix": "row = listener",
+}
+
+
+def structure_lines(structure: Structure, name: str) -> list[str]:
+    """Return the lines of ``ptcc classify``."""
+    graph = structure.graph
+    negative = int((graph.sign < 0).sum())
+    lines = [
+        _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
+        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
+        _line("nodes", _listed(graph.labels)),
+        _line("structure", _structure_text(structure)),
+    ]
+    for number, component in list(enumerate(structure.closed_components, start=1))[:4]:
+        nodes = [graph.labels[v] for v in component.nodes]
+        if component.negative_cycle is not None:
+            steps = " ".join(f"{graph.labels[s]}->{graph.labels[t]}" for s, t in component.negative_cycle[:12])
+            more = " ..." if len(component.negative_cycle) > 12 else ""
+            lines.append(_line(f"leaders {number}", f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"))
+        else:
+            camps = [
+                [label for label, g in zip(nodes, component.gauge or (), strict=True) if g == sign] for sign in (1, -1)
+            ]
+            text = " against ".join("{" + _listed(camp, 40) + "}" for camp in camps if camp)
+            lines.append(_line(f"leaders {number}", f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"))
+    if len(structure.closed_components) > 4:
+        lines.append(_line("", f"... {len(structure.closed_components)} closed components in all"))
+    if structure.followers.size:
+        lines.append(_line("followers", _listed([graph.labels[v] for v in structure.followers[:60].tolist()])))
+    lines += _claim_lines(structure)
+    return lines
+
+
+def certificate_lines(certificate: Certificate, name: str) -> list[str]:
+    """Return the lines of ``ptcc certify``: at most 24 for a connected graph."""
+    structure, p = certificate.structure, certificate.protocol
+    graph = structure.graph
+    negative = int((graph.sign < 0).sum())
+    parameters = ", ".join(f"{key} {float(getattr(p, key)):g}" for key in ("T", "rho1", "rho2", "kappa"))
+    lines = [
+        _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
+        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
+        _line("structure", _structure_text(structure)),
+        *_claim_lines(structure, f" at T = {float(p.T):g}"),
+        _line("protocol", f"{p.kind}: {parameters}"),
+    ]
+    if certificate.start is not None:
+        lines.append(_line("start", _pairs(graph.labels, certificate.start)))
+    if certificate.outcome is not None:
+        kind = "exact" if certificate.outcome.exact else "floating point"
+        lines.append(_line("ends at", f"{_pairs(graph.labels, certificate.outcome.final_state)} ({kind})"))
+        if certificate.outcome.degenerate:
+            groups = ", ".join(map(str, certificate.outcome.degenerate))
+            lines.append(_line("", f"degenerate start: leader group {groups} meets at 0, although it is balanced"))
+    lines += _rate_lines(certificate)
+    lines += _simulation_lines(certificate)
+    lines += [_line("note", note) for note in certificate.notes[:3]]
+    lines.append(_line("verdict", certificate.verdict))
+    return lines
+
+
+def _rate_lines(certificate: Certificate) -> list[str]:
+    lines = []
+    V, rate, spectral = certificate.lyapunov, certificate.proof.rate, certificate.spectral_rate
+    if certificate.constant:
+        return [_line("rate", "every agent keeps its state: there is nothing to decay")]
+    if rate is not None and V is not None:
+        best = (
+            "" if spectral is None else f"; best possible {spectral:.6g} (numerical), tightness {_ratio(certificate)}"
+        )
+        lines.append(_line("rate", f"{float(rate):.6g} per unit of s, proved: V <= e^(-rate s) V(0){best}"))
+        rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
+        lines.append(
+            _line("", f"{V.objective}{rho}; ||{V.coordinates}||^2 carries the prefactor {float(V.prefactor):.4g}")
+        )
+        lines += _residual_lines(certificate)
+        count = len(certificate.proof.obligations) + len(certificate.outcome_proof)
+        lines.append(_line("proof", f"{count} statement(s) proved in exact arithmetic"))
+    elif certificate.numerical_rate is not None:
+        lines.append(
+            _line("rate", f"not proved; numerically {certificate.numerical_rate:.6g}, best possible {spectral}")
+        )
+    elif spectral is not None:
+        lines.append(_line("rate", f"not proved; best possible {spectral:.6g} (numerical)"))
+    return lines
+
+
+def _residual_lines(certificate: Certificate) -> list[str]:
+    instants = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
+    coordinates = certificate.lyapunov.coordinates if certificate.lyapunov else "E"
+    proved = [f"{_percent(certificate.envelope.residual(q))} at {name}" for q, name in instants]
+    lines = [_line("left", f"of ||{coordinates}(0)|| at most {', '.join(proved)}")]
+    slowest = [certificate.best_possible_residual(q) for q, _ in instants]
+    if slowest[-1] is not None:
+        lines.append(_line("", "slowest mode (numerical) " + ", ".join(_percent(x or 0.0) for x in slowest)))
+        if slowest[-1] > 0.01:
+            lines.append(
+                _line("", "most of the error is left to the last instant: raise rho2 * kappa for a usable deadline")
+            )
+    return lines
+
+
+def _simulation_lines(certificate: Certificate) -> list[str]:
+    run, seen = certificate.trajectory, certificate.comparison
+    if run is None:
+        return []
+    lines = []
+    if seen is not None:
+        said = "VIOLATED" if seen.violated else "kept"
+        lines.append(
+            _line(
+                "simulated",
+                f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, worst ratio {seen.worst_ratio:.4g}, "
+                f"resolved down to 1 - t/T = {seen.resolved_until:.1e}",
+            )
+        )
+    if certificate.outcome is not None:
+        gap = float(abs(run.final_state - certificate.outcome.values).max())
+        settled = "" if run.deadline_resolved else " (the run had not settled)"
+        lines.append(_line("" if seen else "simulated", f"end state within {gap:.1e} of the outcome{settled}"))
+    return lines
+
+
+def _claim_lines(structure: Structure, when: str = "") -> list[str]:
+    if structure.claim is not None:
+        claim = structure.claim
+        also = f"; {', '.join(claim.special)} (Corollary {', '.join(claim.corollaries)})" if claim.special else ""
+        if claim.corollaries and not claim.special:
+            also = f"; Corollary {', '.join(claim.corollaries)}"
+        return [_line("claim", f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})")]
+    counts: dict[tuple[str, str], int] = {}
+    for component in structure.components:
+        key = (component.claim.behaviour, component.claim.theorem)
+        counts[key] = counts.get(key, 0) + 1
+    return [
+        _line("claim" if i == 0 else "", f"{count} component(s): {behaviour}{when} (Theorem {theorem})")
+        for i, ((behaviour, theorem), count) in enumerate(sorted(counts.items(), key=lambda item: item[0][1]))
+    ]
+
+
+def _structure_text(structure: Structure) -> str:
+    words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
+    connectivity = words.get(structure.connectivity, f"disconnected, {len(structure.components)} components")
+    closed = structure.closed_components
+    balanced = sum(c.balanced for c in closed)
+    groups = f"{len(closed)} closed component{'s' if len(closed) > 1 else ''} ({balanced} balanced)"
+    followers = f"{structure.leaders.size} leaders, {structure.followers.size} followers"
+    return f"{connectivity}; {groups}; {followers}; whole graph {'balanced' if structure.balanced else 'unbalanced'}"
+
+
+def _remarks(structure: Structure) -> list[str]:
+    read = structure.graph.read
+    remarks = [
+        text
+        for text, holds in (
+            ("undirected", structure.undirected and structure.graph.n_edges > 0),
+            ("all weights positive", structure.all_positive and structure.graph.n_edges > 0),
+            ("sign-asymmetric", not structure.sign_symmetric),
+        )
+        if holds
+    ]
+    if read["duplicates"] != "refused":
+        remarks.append(f"duplicates {read['duplicates']}")
+    if read["self_loops"] != "refused":
+        remarks.append(f"self-loops {read['self_loops']}")
+    return [*remarks, *read["notes"]]
+
+
+def _ratio(certificate: Certificate) -> str:
+    return "-" if certificate.tightness is None else f"{certificate.tightness:.3f}"
+
+
+def _percent(x: float) -> str:
+    return f"{100 * x:.3g}%"
+
+
+def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:
+    return _listed([f"{label}={float(value):.5g}" for label, value in zip(labels, values, strict=True)])  # type: ignore[arg-type]
+
+
+def _listed(words: Sequence[str], width: int = 90) -> str:
+    text = ""
+    for word in words:
+        if len(text) + len(word) > width:
+            return f"{text}, ... ({len(words)} in all)" if text else f"{word[:width]}..."
+        text += (", " if text else "") + word
+    return text
+
+
+def _line(head: str, text: str) -> str:
+    clean = "".join(c if c.isprintable() else "?" for c in text)
+    return f"{head:<10} {clean}"

@@ -1,0 +1,118 @@
+"""The Lyapunov functions of the theorem rows as CasADi expressions, and their derivatives along the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.latex import to_latex
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems import LyapunovFunction, theorem_for
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+@dataclass(frozen=True)
+class SymbolicLyapunov:
+    """A Lyapunov function along the closed loop, symbolically.
+
+    Attributes
+    ----------
+    t, x : casadi.SX
+        Time and states (N, 1).
+    gain : casadi.SX
+        ``rho1 + rho2 phi'/phi``.
+    E : (N, 1) casadi.SX
+        ``-L x``.
+    z : (n, 1) casadi.SX
+        The coordinates of ``V``: rows of ``E``, or the weighted deviation ``eps``.
+    V : casadi.SX
+        ``z' diag(weights) z``.
+    V_dot : casadi.SX
+        ``grad V . x'`` with ``x' = gain E``, by CasADi's differentiation of ``V``.
+    proof_form : casadi.SX
+        What the proof says ``V_dot`` is: ``-gain z'(Omega A + A' Omega)z``.
+    bounding_form : casadi.SX
+        What the proof bounds it by: ``-gain z'Sz`` with ``S`` the matrix whose smallest eigenvalue gives the rate.
+    """
+
+    t: ca.SX
+    x: ca.SX
+    gain: ca.SX
+    E: ca.SX
+    z: ca.SX
+    V: ca.SX
+    V_dot: ca.SX
+    proof_form: ca.SX
+    bounding_form: ca.SX
+
+    def latex(self) -> str:
+        r"""Return ``V`` and ``V'`` in LaTeX, printed from the expressions; the states are ``x_{1}`` .. ``x_{N}``."""
+        return (
+            "\\begin{aligned}\nV &= "
+            + to_latex(self.V)
+            + " \\\\\n\\dot V &= "
+            + to_latex(self.V_dot)
+            + ("\n\\end{aligned}")
+        )
+
+    def _repr_latex_(self) -> str:
+        return f"${self.latex()}$"
+
+
+def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: NominalProtocol) -> SymbolicLyapunov:
+    """Write ``E``, ``V`` and ``V'`` of a theorem row as CasADi expressions.
+
+    Parameters
+    ----------
+    structure : Structure
+    V : LyapunovFunction
+        From the theorem that applies to the graph (``certificate.lyapunov``).
+    protocol : NominalProtocol
+
+    Returns
+    -------
+    SymbolicLyapunov
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
+    >>> V = theorem_for(st).lyapunov(st)
+    >>> symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)).V
+    SX(sq((4*(x1-x2))))
+    """
+    import casadi as ca
+
+    graph = structure.graph
+    loop = protocol.closed_loop(graph)
+    t, x = loop["t"], loop["x"]
+    gain = protocol.gain.expression(t)
+    L = ca.DM(graph.laplacian().tocsc())
+    E = -ca.mtimes(L, x)
+    nodes, weights = list(V.nodes), np.array([float(w) for w in V.weights])
+    if V.coordinates == "E":
+        z, A = E[nodes], L[nodes, nodes]
+    else:
+        assert structure.gauge is not None
+        g = structure.gauge.astype(float)
+        z, A = x - ca.DM(g) * ca.dot(ca.DM(g * weights / weights.sum()), x), L
+    omega = ca.diag(ca.DM(weights))
+    value = ca.dot(ca.DM(weights) * z, z)
+    S = ca.DM(theorem_for(structure).decrease(structure, V))
+    return SymbolicLyapunov(
+        t=t,
+        x=x,
+        gain=gain,
+        E=E,
+        z=z,
+        V=value,
+        V_dot=ca.jtimes(value, x, loop["ode"]),
+        proof_form=-gain * ca.bilin(ca.mtimes(omega, A) + ca.mtimes(A.T, omega), z, z),
+        bounding_form=-gain * ca.bilin(S, z, z),
+    )

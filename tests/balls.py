@@ -1,0 +1,48 @@
+"""Trajectories in ball arithmetic: ``X = exp(-L s) X(0)`` with every rounding bounded, the judge over floats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import flint
+
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.theorems import LyapunovFunction
+
+BITS = 512
+
+
+def ball(x: Fraction | int) -> flint.arb:
+    x = Fraction(x)
+    return flint.arb(x.numerator) / flint.arb(x.denominator)
+
+
+def rational_matrix(rows: Sequence[Sequence[Fraction]]) -> flint.arb_mat:
+    return flint.arb_mat([[ball(x) for x in row] for row in rows])
+
+
+def clock(protocol: NominalProtocol, q: Fraction) -> flint.arb:
+    """``s`` where ``1 - t/T = q``: ``rho1 T (1 - q) + rho2 kappa ln(1/q)``."""
+    return ball(protocol.rho1 * protocol.T * (1 - q)) - ball(protocol.rho2 * protocol.kappa) * ball(q).log()
+
+
+def states(graph: SignedDigraph, s: flint.arb, x0: Sequence[Fraction]) -> list[flint.arb]:
+    L = rational_matrix(graph.exact_laplacian())
+    X = (L * (-s)).exp() * flint.arb_mat([[ball(x)] for x in x0])
+    return [row[0] for row in X.tolist()]
+
+
+def value(graph: SignedDigraph, V: LyapunovFunction, gauge: Sequence[int] | None, X: Sequence[flint.arb]) -> flint.arb:
+    """``V`` of a state, from the definition of its coordinates."""
+    weights = [ball(w) for w in V.weights]
+    if V.coordinates == "E":
+        L = graph.exact_laplacian()
+        z = [-sum((ball(L[i][j]) * X[j] for j in range(len(X)) if L[i][j]), flint.arb(0)) for i in V.nodes]
+    else:
+        assert gauge is not None
+        mean = sum((w * int(g) * x for w, g, x in zip(weights, gauge, X, strict=True)), flint.arb(0))
+        mean /= sum(weights, flint.arb(0))
+        z = [x - int(g) * mean for g, x in zip(gauge, X, strict=True)]
+    return sum((w * y * y for w, y in zip(weights, z, strict=True)), flint.arb(0))

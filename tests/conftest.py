@@ -1,0 +1,22 @@
+"""What all tests share: a hypothesis profile that repeats itself, and the large real graphs where they are present."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of the published graphs; the licence of the large ones is not stated, so none are kept here."""
+    beside = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "real"
+    folder = Path(os.environ.get("PTCC_REAL_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip(f"no real graphs: {folder} does not exist; set PTCC_REAL_DATA to their folder")
+    return folder
