@@ -144,10 +144,15 @@ class Envelope:
         ----------
         clock : float or array
             Values of the stretched clock, infinite from the deadline on.
+
+        Returns
+        -------
+        array
+            Infinite where nothing was proved: an envelope without members bounds nothing.
         """
         clock = np.asarray(clock, dtype=float)
         factors = [math.sqrt(m.prefactor) * np.exp(-m.rate * clock / 2) for m in self.members]
-        return np.minimum.reduce(factors) if factors else np.ones_like(clock)
+        return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
         """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant."""
@@ -161,30 +166,37 @@ class Envelope:
             np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)) / m.weights.min()) * np.exp(-m.rate * clock / 2)
             for m in self.members
         ]
-        return np.minimum.reduce(bounds) if bounds else np.zeros_like(clock)
+        return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every member; see :class:`Comparison`.
 
         Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
-        holds for every column holds for their sum).
+        holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
+        in units of the start, so that no square overflows or vanishes.
         """
         T = float(self.gain.T)
         judged = trajectory.t > 0
         if not trajectory.deadline_resolved:
             judged &= trajectory.t < T
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        states = states / _sizes(states)
         worst, floor, resolved = 0.0, 0.0, 0.0
         ratios = dict.fromkeys(FRACTIONS, 0.0)
         for member in self.members:
             z = member.coordinates_of(states, self._laplacian)
-            root = np.sqrt(member.value(z))
+            unit = _sizes(z)
+            root = np.sqrt(member.value(z / unit))
             decay = np.exp(-member.rate * trajectory.clock / 2)
             for column in range(states.shape[1]):
                 bound = root[column, 0] * decay
-                f = FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column])
+                f = (
+                    FLOOR_FACTOR
+                    * trajectory.rtol
+                    * self._state_scale(member, states[:, column], float(unit[column, 0]))
+                )
                 excess = np.maximum(root[column] - f, 0.0)[judged]
-                with np.errstate(divide="ignore", invalid="ignore"):
+                with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                     ratio = np.where(excess > 0, excess / bound[judged], 0.0)
                     plain = np.where(root[column] > 0, root[column] / bound, 0.0)
                 worst = max(worst, float(ratio.max(initial=0.0)))
@@ -200,11 +212,17 @@ class Envelope:
             worst, floor, trajectory.rtol, resolved, ratios, float(before.min()), trajectory.deadline_resolved
         )
 
-    def _state_scale(self, member: Member, states: np.ndarray) -> float:
-        """Return ``||dz||_weights`` for a state error ``|dx_k| = max |x_k|`` in every entry, the worst case."""
+    def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:
+        """Return ``||dz||_weights / unit`` for an error ``|dx_k| = max |x_k|`` in every entry, the worst case."""
         size = np.abs(states).max(axis=1)
         if member.coordinates == "E":
             size = np.asarray(abs(self._laplacian) @ size)[member.nodes]  # type: ignore[arg-type, operator]
         else:
             size = 2 * size[member.nodes]
-        return float(np.sqrt(member.weights @ size**2))
+        return float(np.sqrt(member.weights @ (size / unit) ** 2))
+
+
+def _sizes(values: np.ndarray) -> np.ndarray:
+    """Return the (S, 1) largest entries of (N, S, M) values at the first instant, 1 for a column of zeros."""
+    sizes = np.abs(values[:, :, :1]).max(axis=0, initial=0.0)
+    return np.where(sizes > 0, sizes, 1.0)

@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from lmi.errors import NoCertificate, NotAnHMatrix
+from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS, Comparison, Envelope, Member
-from ptcc_certify.errors import FormatError, ParameterError, SimulationError
+from ptcc_certify.errors import FormatError, HypothesisError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, exact_left_vector, laplacian_spectrum
 from ptcc_certify.outcome import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.rationals import MAX_CHARACTERS, format_exact
+from ptcc_certify.rationals import MAX_CHARACTERS, format_exact, shorten
 from ptcc_certify.simulation import Trajectory, simulate
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, theorem_for
@@ -39,6 +39,8 @@ SEARCH_NODES = 250
 SPECTRUM_NODES = 1500
 #: Above this many components the list of components is grouped in arrays.
 MANY_COMPONENTS = 100
+#: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
+LARGEST_STATE = Fraction(10**300)
 
 
 @dataclass(frozen=True, repr=False)
@@ -170,7 +172,8 @@ class Certificate:
 
     def save(self, path: str | Path) -> None:
         """Write the certificate to ``path``; the file appears whole or not at all."""
-        write_atomically(path, self.to_json().encode("utf-8", "surrogatepass"))
+        # What UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape.
+        write_atomically(path, self.to_json().encode("utf-8", "backslashreplace"))
 
     def _paper_section(self) -> dict[str, Any] | None:
         V = self.lyapunov
@@ -234,7 +237,7 @@ class Certificate:
         comparison = self.comparison
         simulation = comparison and {
             "worst_ratio": _finite(comparison.worst_ratio),
-            "floor": comparison.floor,
+            "floor": _finite(comparison.floor),
             "resolved_until": comparison.resolved_until,
             "ratios": {str(k): _finite(v) for k, v in comparison.ratios.items()},
             "stop": comparison.stop,
@@ -245,11 +248,11 @@ class Certificate:
         if self.outcome is not None and not self.outcome.exact:
             floats = dict(zip(self.graph.labels, self.outcome.values.tolist(), strict=True))
         return {
-            "spectral": self.spectral_rate,
-            "tightness": self.tightness,
-            "paper_rate": self.numerical_rate,
+            "spectral": _finite(self.spectral_rate),
+            "tightness": _finite(self.tightness),
+            "paper_rate": _finite(self.numerical_rate),
             "residual": {
-                str(1 - q if q > 1e-3 else f"1-{q:g}"): self.envelope.residual(q)
+                str(1 - q if q > 1e-3 else f"1-{q:g}"): _finite(self.envelope.residual(q))
                 for q in (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
             },
             "final_state": floats,
@@ -290,7 +293,7 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), or a start of the wrong length.
+        ``rho2 = 0`` (no deadline), or a start of the wrong length or with an entry beyond 1e300.
 
     References
     ----------
@@ -312,7 +315,7 @@ def certify(
     theorem = theorem_for(structure)
     notes: list[str] = []
     V, proof, numerical = _search_and_prove(structure, theorem, notes)
-    start = None if x0 is None else tuple(exact_start(structure, x0))
+    start = None if x0 is None else _start(structure, x0)
     matrix = influence(structure)
     result = None if start is None else outcome(structure, start)
     obligations: tuple[Obligation, ...] = ()
@@ -349,6 +352,14 @@ def certify(
     return replace(certificate, comparison=certificate.envelope.compare(trajectory))
 
 
+def _start(structure: Structure, x0: Sequence[Any]) -> tuple[Fraction, ...]:
+    start = tuple(exact_start(structure, x0))
+    for label, value in zip(structure.graph.labels, start, strict=True):
+        if abs(value) > LARGEST_STATE:
+            raise ParameterError(f"x0 of agent {shorten(label)} is beyond 1e300; choose another unit")
+    return start
+
+
 def _search_and_prove(
     structure: Structure, theorem: Theorem, notes: list[str]
 ) -> tuple[LyapunovFunction | None, RateProof, float | None]:
@@ -361,8 +372,11 @@ def _search_and_prove(
         with np.errstate(all="ignore"):
             V = theorem.lyapunov(structure)
             numerical = theorem.rate(structure, V) if V.blocks else None
-    except (NoCertificate, NotAnHMatrix, np.linalg.LinAlgError) as error:
+    except (LMIError, np.linalg.LinAlgError) as error:
         notes.append(f"no Lyapunov matrix was found: {error}")
+        return None, nothing, None
+    except HypothesisError:  # the structure meets the hypotheses exactly, so it is the floats that do not
+        notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
         return None, nothing, None
     if n > EXACT_NODES:
         notes.append(f"exact proofs stop at {EXACT_NODES} nodes; the graph has {n}")
@@ -403,7 +417,11 @@ def _spectral_rate(structure: Structure, notes: list[str]) -> float | None:
     if int(np.bincount(structure.strong_component).max()) > SPECTRUM_NODES:
         notes.append(f"the spectral rate is not computed for strong components above {SPECTRUM_NODES} nodes")
         return None
-    return laplacian_spectrum(structure).spectral_rate
+    try:
+        return laplacian_spectrum(structure).spectral_rate
+    except np.linalg.LinAlgError as error:
+        notes.append(f"the spectral rate is not computed: {error}")
+        return None
 
 
 def exact_or_ball(value: Fraction) -> str | dict[str, str]:
@@ -447,16 +465,19 @@ def read_certificate(path: str | Path) -> dict[str, Any]:
             raise ValueError("a key occurs twice")
         return result
 
-    def refuse(constant: str) -> None:
-        raise ValueError(f"{constant} is not a number")
+    def finite(text: str) -> float:
+        if not math.isfinite(number := float(text)):
+            raise ValueError(f"{shorten(text)} is not a finite number")
+        return number
 
+    name = shorten(str(path), 200)
     try:
         text = Path(path).read_text(encoding="utf-8")
-        data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=finite, parse_float=finite)
     except (OSError, ValueError, RecursionError) as error:
-        raise FormatError(f"{path}: not a readable certificate ({error})") from None
+        raise FormatError(f"{name}: not a readable certificate ({shorten(str(error), 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise FormatError(f'{path}: not a certificate of schema "{SCHEMA}"')
+        raise FormatError(f'{name}: not a certificate of schema "{SCHEMA}"')
     return data
 
 
@@ -534,5 +555,5 @@ def _text(value: Fraction | None) -> str | None:
     return None if value is None else format_exact(value)
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

@@ -1,13 +1,15 @@
 """The command line ``ptcc``: parses, calls, prints.
 
 Exit codes: 0 proved and everything asked holds; 1 a bound is violated; 2 bad input or usage; 3 an expectation is
-refuted; 4 undecided. Data go to standard output, everything else to standard error.
+refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything else to standard error.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import sys
+import traceback
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
     from ptcc_certify.structure import Structure
 
 OK, VIOLATED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4
+INTERNAL_ERROR, INTERRUPTED = 70, 130
+FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
+_NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
 def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -106,6 +111,7 @@ def certify(
     from ptcc_certify.summary import certificate_lines
 
     expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
+    _refuse_missing_folder(output)
     protocol = _protocol(options)
     signed = _read(graph, **options)
     certificate = run(signed, protocol, _start(x0, seed, signed))
@@ -124,7 +130,7 @@ def certify(
 @_graph_options
 @_protocol_options
 @click.option(
-    "--dimension", type=click.IntRange(min=1), default=1, show_default=True, help="State components per agent."
+    "--dimension", type=click.IntRange(1, 1000), default=1, show_default=True, help="State components per agent."
 )
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
@@ -139,12 +145,16 @@ def simulate(
     from ptcc_certify.io import write_atomically
     from ptcc_certify.simulation import simulate as run
 
+    suffix = Path(output or "").suffix.lower()
+    if suffix not in (*FIGURES, *TABLES):
+        raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
+    if suffix in FIGURES and dimension > 1:
+        raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
+    _refuse_missing_folder(output)
     protocol = _protocol(options)
     signed = _read(graph, **options)
     trajectory = run(signed, protocol, _start_columns(x0, seed, signed, dimension), samples=samples)
-    if output and Path(output).suffix.lower() in {".png", ".pdf", ".svg"}:
-        if dimension > 1:
-            raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
+    if output and suffix in FIGURES:
         from ptcc_certify.plots import plot_trajectory
         from ptcc_certify.structure import analyse
 
@@ -153,7 +163,7 @@ def simulate(
         write_atomically(output, trajectory.to_csv())
     else:
         click.echo(trajectory.to_csv(), nl=False)
-    if not trajectory.deadline_resolved:
+    if protocol.prescribed and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return OK
 
@@ -232,9 +242,9 @@ def _read(
     from ptcc_certify.examples import GRAPHS, graph_path
     from ptcc_certify.io import read_graph
 
-    path: str | Path = graph_path(graph) if graph in GRAPHS and not Path(graph).exists() else graph
+    packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
     return read_graph(
-        path,
+        graph_path(graph) if packaged else graph,
         orientation=edges,
         duplicates=duplicates,
         drop_self_loops=drop_self_loops,
@@ -259,16 +269,17 @@ def _start(x0: str, seed: int, graph: SignedDigraph) -> list[Fraction]:
 def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> Any:
     import numpy as np
 
-    from ptcc_certify.rationals import parse_exact
-
     if dimension == 1:
-        return [float(x) for x in _start(x0, seed, graph)]
+        return _start(x0, seed, graph)
     if x0 == "random":
-        return np.array([[float(x) for x in row] for row in _random_start(seed, graph.n_nodes, dimension)])
-    values = [float(parse_exact(text)) for text in x0.split(",")]
-    if len(values) != graph.n_nodes * dimension:
-        raise ParameterError(f"--x0 has {len(values)} values for {graph.n_nodes} agents of dimension {dimension}")
-    return np.array(values).reshape(graph.n_nodes, dimension)
+        return _random_start(seed, graph.n_nodes, dimension)
+    texts = x0.split(",")
+    if len(texts) != graph.n_nodes * dimension:
+        raise ParameterError(
+            f"--x0 has {len(texts)} value{'s' * (len(texts) > 1)} for {graph.n_nodes} agents of dimension {dimension}; "
+            f"give {graph.n_nodes * dimension} numbers, agent after agent"
+        )
+    return np.array([_number(text, "--x0") for text in texts]).reshape(graph.n_nodes, dimension)
 
 
 def _random_start(seed: int, n: int, dimension: int) -> list[list[Fraction]]:
@@ -327,9 +338,13 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
     return UNDECIDED
 
 
-def _save_figure(figure: Any, path: str | Path) -> None:
-    import io
+def _refuse_missing_folder(output: str | None) -> None:
+    """Refuse before the work what could not be written after it."""
+    if output and not Path(output).parent.is_dir():
+        raise ParameterError(f"{output}: the folder does not exist; make it first")
 
+
+def _save_figure(figure: Any, path: str | Path) -> None:
     from ptcc_certify.io import write_atomically
 
     buffer = io.BytesIO()
@@ -349,26 +364,45 @@ def _print(lines: list[str]) -> None:
 
 
 def _print_json(data: Any) -> None:
-    click.echo(json.dumps(data, ensure_ascii=False, allow_nan=False))
+    click.echo(json.dumps(data, allow_nan=False))  # ASCII: no label can spoil the object or steer a terminal
 
 
 def main() -> None:
     """Run ``ptcc`` and exit with its code; every refusal is one line on standard error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a label that the terminal cannot show stops nothing
     try:
         code = cli.main(standalone_mode=False)
     except click.ClickException as error:
-        click.echo(f"ptcc: {' '.join(error.format_message().split())}", err=True)
-        code = BAD_INPUT
+        if isinstance(error, _NO_ARGUMENTS):
+            click.echo(error.format_message(), err=True)
+            code = BAD_INPUT
+        else:
+            code = _refuse(error.format_message())
     except PTCCError as error:
-        click.echo(f"ptcc: {error}", err=True)
-        code = BAD_INPUT
+        code = _refuse(str(error))
+    except OverflowError:
+        code = _refuse("a number is beyond the range of float64; choose other units of time, weight or state")
+    except MemoryError:
+        code = _refuse("not enough memory for a graph or a table of this size")
     except (KeyboardInterrupt, click.Abort):
         click.echo("ptcc: interrupted", err=True)
-        code = 130
+        code = INTERRUPTED
     except BrokenPipeError:
         code = OK
         sys.stderr.close()
+    except Exception:
+        traceback.print_exc()
+        click.echo("ptcc: an error of this program, not of your input; please report it with the lines above", err=True)
+        code = INTERNAL_ERROR
     sys.exit(code if isinstance(code, int) else OK)
+
+
+def _refuse(message: str) -> int:
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
+    click.echo(f"ptcc: {line}", err=True)
+    return BAD_INPUT
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError
-from ptcc_certify.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.rationals import as_fraction, format_exact, nearest_float, shorten
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -31,14 +31,6 @@ _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 Exact = Fraction | int | float | str
 
 
-def _nearest(value: Fraction) -> float:
-    """Return the nearest float, infinite where ``float(value)`` overflows."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-
-
 class Weights:
     """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
 
@@ -48,7 +40,7 @@ class Weights:
             table: np.ndarray = values.astype(np.float64)
             self.kind, self.scale = "float64", 1
         else:
-            fractions = [Fraction(v) for v in values]
+            fractions = [v if isinstance(v, Fraction) else Fraction(v) for v in values]
             scale = 1
             for value in fractions:
                 scale = math.lcm(scale, value.denominator)
@@ -57,7 +49,7 @@ class Weights:
             if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
                 table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
                 self.kind, self.scale = "int64", scale
-            elif all(math.isfinite(nearest := _nearest(v)) and Fraction(nearest) == v for v in fractions):
+            elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in fractions):
                 table = np.array([float(v) for v in fractions])
                 self.kind, self.scale = "float64", 1
             else:
@@ -81,7 +73,7 @@ class Weights:
             return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
         if self.kind == "float64":
             return self.table.copy()
-        return np.array([_nearest(v) for v in self.table], dtype=np.float64)
+        return np.array([nearest_float(v) for v in self.table], dtype=np.float64)
 
     def fraction(self, i: int) -> Fraction:
         """Return weight ``i`` exactly."""

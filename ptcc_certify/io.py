@@ -29,7 +29,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError, PTCCError
 from ptcc_certify.graph import LARGEST_WEIGHT, SMALLEST_WEIGHT, SignedDigraph, Weights, ordered_labels
-from ptcc_certify.rationals import format_exact, parse_exact, shorten
+from ptcc_certify.rationals import format_exact, nearest_float, parse_exact, shorten
 
 MAX_BYTES = 2**30
 """A file, unpacked, may have this many bytes."""
@@ -242,7 +242,7 @@ class _Draft:
                 exact[-1] = parse_exact(value) if isinstance(value, str) else value
             except NumberError as error:
                 bad[code] = _about_weight(value, str(error))
-            if exact[-1] and not SMALLEST_WEIGHT <= abs(exact[-1]) <= LARGEST_WEIGHT:
+            if exact[-1] and not SMALLEST_WEIGHT <= abs(nearest_float(exact[-1])) <= LARGEST_WEIGHT:
                 bad[code] = "weight", " is outside the range of float64; rescale the weights"
         self.refuse_weights(bad)
         return exact
@@ -269,7 +269,7 @@ class _Draft:
         return int(loops.size)
 
     def refuse_zeros(self, values: Sequence[Fraction] | np.ndarray) -> None:
-        zeros = [code for code, value in enumerate(values) if value == 0]
+        zeros = [code for code, value in enumerate(values) if not value]
         if not zeros:
             return
         edges = np.flatnonzero(np.isin(self.codes, zeros))
@@ -446,7 +446,9 @@ def _lines(data: bytes | str, name: str) -> list[str]:
     lines = text.split("\n") if "\n" in text else text.split("\r")
     if len(text) > MAX_LINE and max(map(len, lines)) > MAX_LINE:
         number = next(i for i, line in enumerate(lines, 1) if len(line) > MAX_LINE)
-        raise FormatError(f"{name}, line {number}: longer than {MAX_LINE} characters; this is not an edge list")
+        raise FormatError(
+            f"{name}, line {number}: longer than {MAX_LINE} characters; break it, or name the format of the file"
+        )
     return lines
 
 
@@ -1061,14 +1063,9 @@ def _is_zero(text: str) -> bool:
 # ---------------------------------------------------------------------------------------------- binary matrices
 
 
-def _matrix_rows(matrix: Any, labels: Any, name: str) -> _Rows:
-    """Turn a dense or a SciPy sparse matrix into rows; entry (k, l) is the edge l -> k."""
+def _dense_rows(matrix: np.ndarray, labels: np.ndarray | None, name: str) -> _Rows:
+    """Turn a dense matrix into rows; entry (k, l) is the edge l -> k."""
     _refuse_no_adjacency(matrix.shape, matrix.dtype, name)
-    if hasattr(matrix, "tocoo"):
-        if hasattr(matrix, "check_format"):
-            matrix.check_format(full_check=True)  # a corrupt index would make tocoo() write beyond its arrays
-        coo = matrix.tocoo()
-        return _entry_rows(matrix.shape[0], np.asarray(coo.row), np.asarray(coo.col), coo.data, labels, name)
     target, source = np.nonzero(matrix)
     return _entry_rows(matrix.shape[0], target, source, matrix[target, source], labels, name)
 
@@ -1087,6 +1084,8 @@ def _entry_rows(
     n: int, target: np.ndarray, source: np.ndarray, data: np.ndarray, labels: np.ndarray | None, name: str
 ) -> _Rows:
     """Turn the entries of an n x n matrix into rows; stored zeros are no entries."""
+    if not target.shape == source.shape == data.shape == (data.size,):
+        raise ValueError("its indices and entries differ in number")
     if data.size and (min(target.min(), source.min()) < 0 or max(target.max(), source.max()) >= n):
         raise FormatError(f"{name}: an entry lies outside the {n} x {n} matrix; write the file again")
     keep = data != 0
@@ -1119,7 +1118,7 @@ def _read_npy(data: bytes | str, name: str) -> _Rows:
     data = _binary(data, name)
     if not data.startswith(b"\x93NUMPY"):
         raise FormatError(f"{name}: not a NumPy array file; write it with numpy.save")
-    return _matrix_rows(np.load(BytesIO(data), allow_pickle=False), None, name)
+    return _dense_rows(np.load(BytesIO(data), allow_pickle=False), None, name)
 
 
 @_reads("an .npz archive")
@@ -1134,11 +1133,58 @@ def _read_npz(data: bytes | str, name: str) -> _Rows:
         arrays = dict(archive)
     labels = arrays.pop("labels", None)
     if "format" in arrays:
-        from scipy import sparse
-
-        return _matrix_rows(sparse.load_npz(BytesIO(data)), labels, name)
+        return _sparse_rows(arrays, labels, name)
     numeric = {key: array.shape for key, array in arrays.items() if array.dtype.kind in "iufc"}
-    return _matrix_rows(arrays[_the_matrix(numeric, arrays, name)], labels, name)
+    return _dense_rows(arrays[_the_matrix(numeric, arrays, name)], labels, name)
+
+
+def _sparse_rows(arrays: dict[str, np.ndarray], labels: np.ndarray | None, name: str) -> _Rows:
+    """Turn the arrays that ``scipy.sparse.save_npz`` writes into rows.
+
+    SciPy's own conversions trust the index arrays and crash the process where these are damaged; here NumPy checks
+    every index.
+    """
+    layout, data = arrays["format"].item(), arrays["data"]
+    layout = layout.decode("ascii") if isinstance(layout, bytes) else str(layout)
+    shape = arrays["shape"].tolist()
+    _refuse_no_adjacency(shape, data.dtype, name)
+    n = int(shape[0])
+    if layout == "coo":
+        row, column = _integers(arrays["row"]), _integers(arrays["col"])
+    elif layout in ("csr", "csc"):
+        row = _expanded(_integers(arrays["indptr"]), n, data.size)
+        column, data = _integers(arrays["indices"])[: row.size], data[: row.size]
+        if layout == "csc":
+            row, column = column, row
+    elif layout == "bsr":
+        _, height, width = data.shape
+        block = _expanded(_integers(arrays["indptr"]), n // height, data.shape[0])
+        data, along = data[: block.size], _integers(arrays["indices"])[: block.size]
+        row = block[:, None, None] * height + np.arange(height)[:, None]
+        column = along[:, None, None] * width + np.arange(width)
+        row, column = (np.broadcast_to(index, data.shape).ravel() for index in (row, column))
+        data = data.ravel()
+    elif layout == "dia":
+        column = np.broadcast_to(np.arange(data.shape[1]), data.shape)
+        row = column - _integers(arrays["offsets"])[:, None]
+        inside = (row >= 0) & (row < n) & (column < n)
+        row, column, data = row[inside], column[inside], data[inside]
+    else:
+        raise ValueError(f"a sparse matrix in the unknown layout {layout}")
+    return _entry_rows(n, row, column, data, labels, name)
+
+
+def _integers(array: np.ndarray) -> np.ndarray:
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        raise ValueError("its indices are not a list of integers")
+    return array.astype(np.int64)
+
+
+def _expanded(start: np.ndarray, n: int, size: int) -> np.ndarray:
+    """Return the row (column) ``i`` of each entry of a compressed matrix: ``start[i] <= entry < start[i + 1]``."""
+    if start.size != n + 1 or start[0] != 0 or (np.diff(start) < 0).any() or start[-1] > size:
+        raise ValueError("its index of rows or columns is inconsistent")
+    return np.repeat(np.arange(n), np.diff(start))
 
 
 @_reads("a MATLAB file")
@@ -1162,13 +1208,11 @@ def _read_mat(data: bytes | str, name: str) -> _Rows:
         raise FormatError(f"{name}: the matrix {shorten(variable.name)} is complex, not real; store its real part")
     n = variable.shape[0]
     if not variable.is_sparse:
-        return _matrix_rows(variable.array().reshape((n, n), order="F"), None, name)
-    row, start, values = variable.array(), variable.array().astype(np.int64), variable.array()
+        return _dense_rows(variable.array().reshape((n, n), order="F"), None, name)
+    row, start, values = variable.array(), variable.array(), variable.array()
     _refuse_no_adjacency(variable.shape, values.dtype, name)
-    if start.size != n + 1 or start[0] != 0 or (np.diff(start) < 0).any() or start[-1] > min(row.size, values.size):
-        raise FormatError(f"{name}: the columns of the sparse matrix are inconsistent; write the file again")
-    column = np.repeat(np.arange(n), np.diff(start))
-    return _entry_rows(n, row[: start[-1]], column, values[: start[-1]], None, name)
+    column = _expanded(_integers(start), n, values.size)
+    return _entry_rows(n, _integers(row)[: column.size], column, values[: column.size], None, name)
 
 
 def _mat_tag(data: memoryview, at: int, order: str) -> tuple[int, memoryview, int]:

@@ -56,10 +56,10 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
         )
         seen.add(name)
     if trajectory.protocol.prescribed:
-        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline T")
-    ax.set_xlabel("time t")
-    ax.set_ylabel("state x_k")
-    ax.legend(fontsize="small", frameon=False)
+        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+    ax.set_xlabel("time $t$")
+    ax.set_ylabel("state $x_k$")
+    _legend_above(ax)
     return ax
 
 
@@ -101,10 +101,15 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
         lowest = float((root[before] / root[0]).min())
         ax.set_ylim(bottom=max(lowest, 1e-18) / 3)
     ax.invert_xaxis()
-    ax.set_xlabel("time left, 1 - t/T")
-    ax.set_ylabel("sqrt(V(t) / V(0))")
-    ax.legend(fontsize="small", frameon=False)
+    ax.set_xlabel("time left, $1 - t/T$")
+    ax.set_ylabel(r"$\sqrt{V(t)/V(0)}$")
+    _legend_above(ax)
     return ax
+
+
+def _legend_above(ax: Axes) -> None:
+    """Put the legend above the axes, where it covers no data."""
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small", frameon=False)
 
 
 def _axes(ax: Axes | None) -> Axes:
@@ -112,4 +117,4 @@ def _axes(ax: Axes | None) -> Axes:
         return ax
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(5, 3.2), layout="constrained").add_subplot()
+    return Figure(figsize=(6, 3.6), layout="constrained").add_subplot()

@@ -67,7 +67,8 @@ def parse_exact(text: str) -> Fraction:
     if match and (match[2] or match[3]):
         whole, part = match[2] or "", match[3] or ""
         exponent = _exponent(text, match[4], MAX_EXPONENT)
-        value = Fraction(int(whole + part)) * Fraction(10) ** (exponent - len(part))
+        digits, shift = int(whole + part), exponent - len(part)
+        value = Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
         return -value if match[1] == "-" else value
     if text.lower().lstrip("+-") in {"nan", "inf", "infinity"}:
         raise NumberError(f'"{text}" is not a finite number')
@@ -110,8 +111,10 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
     """
     if isinstance(value, str):
         return parse_exact(value)
-    if isinstance(value, bool):
-        raise NumberError(f"{name} is {value!r}, not a number")
+    if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
+        value = value.item()  # type: ignore[attr-defined]  # NumPy's True is no bool, but its item is
+    if isinstance(value, bool | bytes | bytearray):
+        raise NumberError(f"{name} is {shorten(repr(value))}, not a number")
     if isinstance(value, Integral):
         return Fraction(int(value))
     if isinstance(value, Rational):
@@ -125,6 +128,20 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
     if not math.isfinite(number):
         raise NumberError(f"{name} is {number}, not a finite number")
     return Fraction(number)
+
+
+def nearest_float(value: Fraction) -> float:
+    """Return the float nearest to a rational, infinite where ``float(value)`` overflows.
+
+    Examples
+    --------
+    >>> nearest_float(Fraction(1, 3)), nearest_float(Fraction(-(10**400)))
+    (0.3333333333333333, -inf)
+    """
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def format_exact(value: Fraction) -> str:

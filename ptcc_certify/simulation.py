@@ -101,7 +101,11 @@ class Trajectory:
 
     @property
     def deadline_resolved(self) -> bool:
-        """Whether the state at ``T`` has settled to within 100 tolerances; False if ``T`` was not reached."""
+        """Whether the state at ``T`` has settled to within 100 tolerances; False if ``T`` was not reached.
+
+        A float cannot see motion some 15 decades slower than the fastest: where links of very different weight almost
+        balance, ask the exact outcome.
+        """
         settled = _RESOLVED * max(self.rtol, self.atol)
         return self.deadline_residual is not None and self.deadline_residual <= settled
 
@@ -206,8 +210,8 @@ def simulate(
     times : increasing numbers >= 0, optional
         The instants wanted. One that a float cannot tell from ``T`` counts as ``T``.
     remaining, samples : float, int
-        Without ``times``: ``samples`` instants uniform in ``tau`` from ``1 - t/T = 1`` to ``remaining`` (uniform in t
-        over [0, T] if ``rho2 = 0``), and 0.5 T, 0.9 T, 0.99 T, T.
+        Without ``times``: ``samples`` instants uniform in ``tau`` from ``1 - t/T = 1`` to ``remaining`` and half as
+        many uniform in t (with ``rho2 = 0``: ``samples`` uniform in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
     past : float
         Without ``times``: go on to ``T (1 + past)``.
     rtol, atol : float
@@ -317,6 +321,7 @@ def _default_instants(
     marks = [0.5, 0.1, 0.01]
     if protocol.prescribed:
         uniform = np.exp(np.linspace(0, math.log(remaining), samples))
+        uniform = np.append(uniform, np.linspace(1, uniform[-1], samples // 2))  # for figures in t
     else:
         uniform = np.linspace(1, 0, samples)
     left = np.unique(np.concatenate([uniform, marks, [0.0]]))[::-1]

@@ -43,7 +43,7 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
     if len(structure.closed_components) > 4:
         lines.append(_line("", f"... {len(structure.closed_components)} closed components in all"))
     if structure.followers.size:
-        lines.append(_line("followers", _listed([graph.labels[v] for v in structure.followers[:60].tolist()])))
+        lines.append(_line("followers", _listed([graph.labels[v] for v in structure.followers.tolist()])))
     lines += _claim_lines(structure)
     return lines
 
@@ -106,7 +106,7 @@ def _residual_lines(certificate: Certificate) -> list[str]:
     instants = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
     coordinates = certificate.lyapunov.coordinates if certificate.lyapunov else "E"
     proved = [f"{_percent(certificate.envelope.residual(q))} at {name}" for q, name in instants]
-    lines = [_line("left", f"of ||{coordinates}(0)|| at most {', '.join(proved)}")]
+    lines = [_line("left", f"of ||{coordinates}(0)||: at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in instants]
     if slowest[-1] is not None:
         lines.append(_line("", "slowest mode (numerical) " + ", ".join(_percent(x or 0.0) for x in slowest)))
@@ -188,7 +188,7 @@ def _ratio(certificate: Certificate) -> str:
 
 
 def _percent(x: float) -> str:
-    return f"{100 * x:.3g}%"
+    return f"{100 * x:.2g}%"
 
 
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:

@@ -84,8 +84,10 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Nomin
     >>> from ptcc_certify.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
     >>> V = theorem_for(st).lyapunov(st)
-    >>> symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)).V
-    SX(sq((4*(x1-x2))))
+    >>> form = symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2))
+    >>> import casadi as ca
+    >>> float(ca.substitute(form.V, form.x, ca.DM([1, 3])))
+    64.0
     """
     import casadi as ca
 

@@ -371,6 +371,13 @@ def test_a_binary_matrix_keeps_its_floats(tmp_path, name, write):
     assert edges(read_graph(tmp_path / name)) == {(s, t, Fraction(round(10 * w))) for s, t, w in MATRIX_EDGES}
 
 
+def test_repeated_entries_of_a_sparse_matrix_are_repeated_rows(tmp_path):
+    sparse.save_npz(tmp_path / "g.npz", sparse.coo_array(([1.0, -3.0], ([0, 0], [1, 1])), shape=(2, 2)))
+    with pytest.raises(FormatError, match="row 1, column 2: second row for edge 2 -> 1"):
+        read_graph(tmp_path / "g.npz")
+    assert edges(read_graph(tmp_path / "g.npz", duplicates="sum")) == {("2", "1", Fraction(-2))}
+
+
 def test_labels_of_an_archive_are_kept(tmp_path):
     write_npz(tmp_path / "g.npz", MATRIX)
     assert read_graph(tmp_path / "g.npz").labels == ("x", "ü", "z")
