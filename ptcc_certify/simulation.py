@@ -448,5 +448,7 @@ def _to_casadi(matrix: sparse.csr_array) -> Any:
 
     columns = matrix.tocsc()
     columns.sort_indices()
-    pattern = ca.Sparsity(*columns.shape, columns.indptr.tolist(), columns.indices.tolist())
-    return ca.DM(pattern, columns.data)
+    n: int = matrix.shape[0]
+    starts: list[int] = columns.indptr.tolist()
+    rows: list[int] = columns.indices.tolist()
+    return ca.DM(ca.Sparsity(n, n, starts, rows), columns.data)
