@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.errors import NotAnHMatrix
+from lmi.errors import MatrixError, NotAnHMatrix
 from lmi.matrices import comparison_matrix, m_matrix_witness, square
 
 
@@ -44,6 +44,8 @@ def h_matrix_diagonal(A: Any) -> np.ndarray:
     array([1.        , 0.33333333])
     """
     A = square(A)
+    if len(A) == 0:
+        raise MatrixError("A has no rows")
     if (low := np.flatnonzero(np.diag(A) <= 0)).size:
         i = int(low[0])
         raise NotAnHMatrix(f"diagonal entry {i} is {A[i, i]:.6g}, not positive")
@@ -51,7 +53,7 @@ def h_matrix_diagonal(A: Any) -> np.ndarray:
     scale = np.diag(A)
     # Rows scaled to unit diagonal: the class does not change, and the witness is confirmed at any magnitude.
     if m_matrix_witness(M / scale[:, None]) is None:
-        raise NotAnHMatrix("the comparison matrix M(A) has no positive u with M(A) u > 0")
+        raise NotAnHMatrix("no positive u with M(A) u > 0 was confirmed in float64")
     u, v = np.linalg.solve(M, np.ones(len(A))), np.linalg.solve(M.T, np.ones(len(A)))
     if not ((u > 0).all() and (v > 0).all()):
         raise NotAnHMatrix("the comparison matrix M(A) is too near a singular one for float64")

@@ -12,12 +12,18 @@ By the Schur complement (Lemma 5) ``Phi(rho) > 0`` iff ``Gamma - rho R > 0``, ``
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from lmi.errors import MatrixError
+
+
+def smallest_eigenvalue(S: np.ndarray) -> float:
+    """Return the smallest eigenvalue of a symmetric matrix."""
+    return float(np.linalg.eigvalsh(S)[0])
 
 
 @dataclass(frozen=True)
@@ -86,23 +92,33 @@ class Coupling:
     def interval(self) -> RhoInterval:
         """Return the printed and the exact upper end of the admissible ``rho``.
 
+        Raises
+        ------
+        MatrixError
+            No ``rho`` is admissible, because ``Gamma`` or ``S_F`` is not positive definite.
+
         Examples
         --------
         >>> c = Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1.0]]), np.array([[1.0]]))
         >>> c.interval()
         RhoInterval(printed=2.0, exact=2.0)
         """
-        R = self.schur_term()
-        top = float(np.linalg.eigvalsh(R)[-1]) if R.size else 0.0
-        if not top > 0:
+        if not (self.omega_F.size and np.any(self.A_FL)):
             return RhoInterval(math.inf, math.inf)
+        # In a unit of its own, so that a weak coupling does not underflow.
+        unit = float(np.abs(self.A_FL).max())
+        R = replace(self, A_FL=self.A_FL / unit).schur_term()
+        top = float(np.linalg.eigvalsh(R)[-1])
+        if not (top > 0 and smallest_eigenvalue(self.gamma) > 0):
+            raise MatrixError("Gamma or the followers' decrease is not positive definite: no rho is admissible")
         numerator = self.printed_numerator
         if numerator is None:
-            numerator = float(np.linalg.eigvalsh(self.gamma)[0])
+            numerator = smallest_eigenvalue(self.gamma)
         factor = np.linalg.cholesky(self.gamma)
         half = np.linalg.solve(factor, R)
         whole = np.linalg.solve(factor, half.T)
-        return RhoInterval(numerator / top, 1 / float(np.linalg.eigvalsh((whole + whole.T) / 2)[-1]))
+        ends = (numerator / top, 1 / float(np.linalg.eigvalsh((whole + whole.T) / 2)[-1]))
+        return RhoInterval(*(min(end / unit / unit, sys.float_info.max) for end in ends))
 
     def best_rho(self) -> float:
         """Return the ``rho`` of the exact interval with the largest :meth:`rate`, by golden section.

@@ -229,13 +229,15 @@ def coupled_lyapunov(
     A_FL = np.asarray(A_FL.toarray() if hasattr(A_FL, "toarray") else A_FL, dtype=np.float64)
     sizes = [len(block.omega) if isinstance(block, FixedLeader) else len(square(block.A)) for block in leaders]
     n_L, n_F = sum(sizes), len(A_F)
+    fixed = [block for block in leaders if isinstance(block, FixedLeader)]
+    if any(not (b.omega.min() > 0 and b.decrease.min() > 0) for b in fixed if len(b.omega)):
+        raise MatrixError("a fixed leader block needs a positive omega and a positive decrease")
     if n_L == 0:
         raise MatrixError("there is no leader block; use h_matrix_lyapunov for followers alone")
     if A_FL.shape != (n_F, n_L):
         raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
     scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
-    fixed = [b for b in leaders if isinstance(b, FixedLeader)]
     fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:

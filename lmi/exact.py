@@ -1,6 +1,6 @@
 """Proofs in exact arithmetic that a symmetric rational matrix is positive definite.
 
-Nothing here trusts a float: floats only suggest what to prove. Standard library only.
+Nothing here trusts a float: floats only suggest what to prove.
 """
 
 from __future__ import annotations
@@ -9,10 +9,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from numbers import Rational
+from typing import Any
+
+import numpy as np
 
 from lmi.errors import MatrixError
 
 Rows = Sequence[Sequence[Fraction]]
+#: Above this many rows a rounded Cholesky factor is tried before the elimination.
+RESIDUAL_ROWS = 20
+#: Above this many rows a looser rate by the residual test is preferred to the elimination.
+ELIMINATION_ROWS = 60
 
 
 @dataclass(frozen=True)
@@ -40,8 +48,10 @@ class DefinitenessProof:
 def prove_positive_definite(S: Rows) -> DefinitenessProof:
     """Decide exactly whether a symmetric rational matrix is positive definite.
 
-    ``S`` is scaled to integers and reduced to ``L D L'`` by fraction-free symmetric elimination; ``S > 0`` iff every
-    pivot, a leading principal minor, is positive (Sylvester).
+    ``S`` is scaled to integers. Larger matrices are first compared with a rounded Cholesky factor: if ``S - R R'``,
+    formed in integers, has a positive, strictly dominant diagonal, then ``S > 0``. Otherwise ``S`` is reduced to
+    ``L D L'`` by fraction-free symmetric elimination; ``S > 0`` iff every pivot, a leading principal minor, is positive
+    (Sylvester).
 
     Parameters
     ----------
@@ -55,7 +65,7 @@ def prove_positive_definite(S: Rows) -> DefinitenessProof:
     Raises
     ------
     MatrixError
-        ``S`` is not square or not exactly symmetric.
+        ``S`` is not square, not exactly symmetric, or has an entry that is not a finite real number.
 
     References
     ----------
@@ -68,12 +78,10 @@ def prove_positive_definite(S: Rows) -> DefinitenessProof:
     >>> bool(prove_positive_definite([[2, 1], [1, 1]]))
     True
     """
-    n = len(S)
-    if any(len(row) != n for row in S):
-        raise MatrixError("the matrix is not square")
-    if any(S[i][j] != S[j][i] for i in range(n) for j in range(i)):
-        raise MatrixError("the matrix is not symmetric")
-    rows = _scaled_lower_triangle(S)
+    rows = _scaled_lower_triangle(_rationals(S))
+    n = len(rows)
+    if n > RESIDUAL_ROWS and _residual_test(rows):
+        return DefinitenessProof(True, n)
     previous = 1
     for k in range(n):
         pivot = rows[k][k]
@@ -93,6 +101,59 @@ def prove_positive_definite(S: Rows) -> DefinitenessProof:
     return DefinitenessProof(True, n)
 
 
+def _rationals(S: Rows) -> list[list[Fraction]]:
+    """Return ``S`` in Fractions (a float is the dyadic number that it is), or refuse it."""
+    n = len(S)
+    if any(len(row) != n for row in S):
+        raise MatrixError("the matrix is not square")
+    try:
+        rows = [[x if type(x) is Fraction else _rational(x) for x in row] for row in S]
+    except (TypeError, ValueError, OverflowError):
+        raise MatrixError("the matrix has an entry that is not a finite real number") from None
+    if any(rows[i][j] != rows[j][i] for i in range(n) for j in range(i)):
+        raise MatrixError("the matrix is not symmetric")
+    return rows
+
+
+def _rational(x: Any) -> Fraction:
+    if isinstance(x, Rational):
+        return Fraction(int(x.numerator), int(x.denominator))
+    return Fraction(float(x))
+
+
+def _residual_test(rows: list[list[int]]) -> bool:
+    """Tell whether ``S = R R' + E`` with ``E`` strictly diagonally dominant, ``R`` a rounded float factor.
+
+    ``rows`` is the lower triangle in integers. False says nothing about ``S``.
+    """
+    n = len(rows)
+    top = max(abs(x) for row in rows for x in row)
+    down = max(top.bit_length() - 900, 0)
+    lower = np.array([[float(x >> down) for x in row] + [0.0] * (n - len(row)) for row in rows])
+    floats = lower + np.tril(lower, -1).T
+    size = np.sqrt(np.abs(np.diag(floats)))
+    if not (size > 0).all():
+        return False
+    unit = floats / np.outer(size, size)
+    shift = 8 * n * np.finfo(float).eps * float(np.abs(unit).sum(axis=1).max())
+    try:
+        factor = np.linalg.cholesky(unit - shift * np.eye(n)) * size[:, None]
+    except np.linalg.LinAlgError:
+        return False
+    bits = 62  # R is kept to 2^-bits of its largest entry
+    exponent = math.frexp(float(np.abs(factor).max()))[1]
+    R = np.array([[int(math.ldexp(x, bits - exponent)) for x in row] for row in factor], dtype=object)
+    product = R @ R.T  # Python integers: exact
+    # S 2^(2 (bits - exponent)) / 2^down in the same unit, as S times a power of two
+    power = 2 * (bits - exponent) - down
+    up, back = max(power, 0), max(-power, 0)
+    for i in range(n):
+        residual = [(rows[max(i, j)][min(i, j)] << up) - (int(product[i, j]) << back) for j in range(n)]
+        if residual[i] <= sum(abs(x) for j, x in enumerate(residual) if j != i):
+            return False
+    return True
+
+
 def _scaled_lower_triangle(S: Rows) -> list[list[int]]:
     """Return the lower triangle of ``D S D`` in integers, ``D`` a diagonal of powers of two.
 
@@ -101,10 +162,10 @@ def _scaled_lower_triangle(S: Rows) -> list[list[int]]:
     n = len(S)
     shift = [0] * n
     for i in range(n):
-        size = abs(Fraction(S[i][i]))
+        size = abs(S[i][i])
         if size:
             shift[i] = (size.denominator.bit_length() - size.numerator.bit_length()) // 2
-    scaled = [[Fraction(S[i][j]) * Fraction(2) ** (shift[i] + shift[j]) for j in range(i + 1)] for i in range(n)]
+    scaled = [[S[i][j] * Fraction(2) ** (shift[i] + shift[j]) for j in range(i + 1)] for i in range(n)]
     scale = math.lcm(*(value.denominator for row in scaled for value in row))
     return [[value.numerator * (scale // value.denominator) for value in row] for row in scaled]
 
@@ -158,11 +219,18 @@ def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
     if not (math.isfinite(guess) and guess > 0):
         return None
     n = len(S)
-    for loss in LOSSES:
-        b = Fraction(guess * (1 - loss))
-        if b > 0 and prove_positive_definite([[S[i][j] - b * Z[i][j] for j in range(n)] for i in range(n)]):
-            return b
-    return None
+
+    def lowered(b: Fraction) -> list[list[Fraction]]:
+        return [[S[i][j] - b * Z[i][j] for j in range(n)] for i in range(n)]
+
+    candidates = [b for loss in LOSSES if (b := Fraction(guess * (1 - loss))) > 0]
+    if n > RESIDUAL_ROWS:
+        # Elimination takes seconds to minutes here: it comes last, after all that the residual test can give.
+        quick = candidates if n > ELIMINATION_ROWS else candidates[:4]
+        for b in quick:
+            if _residual_test(_scaled_lower_triangle(_rationals(lowered(b)))):
+                return b
+    return next((b for b in candidates if prove_positive_definite(lowered(b))), None)
 
 
 #: Relative amounts by which a float eigenvalue is lowered, one after the other, until the proof succeeds.

@@ -26,7 +26,13 @@ def square(A: Any, name: str = "A") -> np.ndarray:
     MatrixError
         ``A`` is not square or not finite.
     """
-    dense = np.asarray(A.toarray() if hasattr(A, "toarray") else A, dtype=np.float64)
+    try:
+        dense = np.asarray(A.toarray() if hasattr(A, "toarray") else A)
+        if dense.dtype.kind not in "biufO":
+            raise TypeError
+        dense = dense.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise MatrixError(f"{name} is not a matrix of real numbers") from None
     if dense.ndim != 2 or dense.shape[0] != dense.shape[1]:
         raise MatrixError(f"{name} has shape {dense.shape}, not (n, n)")
     if not np.isfinite(dense).all():

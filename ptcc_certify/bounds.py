@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain import Gain
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import LyapunovFunction
@@ -22,6 +24,20 @@ FRACTIONS = (0.5, 0.9, 0.99)
 LAST_INSTANTS = (1e-6, 1e-9)
 #: The integrator's error is taken to be below this multiple of its tolerance times the size of the state.
 FLOOR_FACTOR = 1000.0
+
+
+def float_above(value: Fraction) -> float:
+    """Return a float that is not below ``value``; infinity where it is beyond float64.
+
+    Examples
+    --------
+    >>> float_above(Fraction(1, 3)) >= Fraction(1, 3), float_above(Fraction(10) ** 400)
+    (True, inf)
+    """
+    try:
+        return math.nextafter(float(value), math.inf)
+    except OverflowError:
+        return math.inf
 
 
 @dataclass(frozen=True)
@@ -62,7 +78,7 @@ class Member:
             np.array([float(w) for w in V.weights]),
             structure.gauge,
             math.nextafter(rate, 0.0),
-            math.nextafter(float(V.prefactor), math.inf),
+            float_above(V.prefactor),
         )
 
     def coordinates_of(self, states: np.ndarray, L: object) -> np.ndarray:
@@ -96,8 +112,10 @@ class Comparison:
         Relative tolerance of the integrator.
     resolved_until : float
         ``1 - t/T`` from which the bound lies below ``f^2``; 0 if it never does.
+    judged : int
+        How many samples after the first rose above the floor. If none did, the run says nothing about the bound.
     ratios : dict of float to float
-        ``sqrt(V / bound)`` at fractions of the deadline.
+        ``sqrt(V / bound)`` at those of the fractions 0.5, 0.9, 0.99 of the deadline that were sampled.
     stop : float
         Smallest ``1 - t/T`` that was sampled before the deadline.
     deadline_resolved : bool
@@ -108,6 +126,7 @@ class Comparison:
     floor: float
     tolerance: float
     resolved_until: float
+    judged: int
     ratios: dict[float, float]
     stop: float
     deadline_resolved: bool
@@ -173,21 +192,32 @@ class Envelope:
 
         Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
         holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
-        in units of the start, so that no square overflows or vanishes.
+        in units of the start, so that no square overflows or vanishes. A run that begins later than 0 is judged from
+        its first sample on.
+
+        Raises
+        ------
+        ParameterError
+            The run is of another graph or protocol, or has no sample before the deadline.
         """
+        if trajectory.graph != self.structure.graph or trajectory.protocol.gain != self.gain:
+            raise ParameterError("the run is of another graph or protocol than the envelope")
+        if not np.isfinite(trajectory.clock[0]):
+            raise ParameterError("the run has no sample before the deadline, where a bound could be compared")
         T = float(self.gain.T)
-        judged = trajectory.t > 0
+        elapsed = trajectory.clock - trajectory.clock[0]
+        judged = elapsed > 0
         if not trajectory.deadline_resolved:
             judged &= trajectory.t < T
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         states = states / _sizes(states)
-        worst, floor, resolved = 0.0, 0.0, 0.0
-        ratios = dict.fromkeys(FRACTIONS, 0.0)
+        worst, floor, resolved, count = 0.0, 0.0, 0.0, 0
+        ratios: dict[float, float] = {}
         for member in self.members:
             z = member.coordinates_of(states, self._laplacian)
             unit = _sizes(z)
             root = np.sqrt(member.value(z / unit))
-            decay = np.exp(-member.rate * trajectory.clock / 2)
+            decay = np.exp(-member.rate * elapsed / 2)
             for column in range(states.shape[1]):
                 bound = root[column, 0] * decay
                 f = (
@@ -200,16 +230,18 @@ class Envelope:
                     ratio = np.where(excess > 0, excess / bound[judged], 0.0)
                     plain = np.where(root[column] > 0, root[column] / bound, 0.0)
                 worst = max(worst, float(ratio.max(initial=0.0)))
+                count += int((excess > 0).sum())
                 if root[column, 0] > 0:
-                    floor = max(floor, f / (trajectory.rtol * root[column, 0]))
+                    floor = max(floor, float(f / (trajectory.rtol * root[column, 0])))
                 below = trajectory.remaining[(bound < f) & (trajectory.remaining > 0)]
                 resolved = max(resolved, float(below.max(initial=0.0)))
                 for fraction in FRACTIONS:
                     at = int(np.argmin(np.abs(trajectory.t - fraction * T)))
-                    ratios[fraction] = max(ratios[fraction], float(plain[at]))
+                    if abs(trajectory.t[at] - fraction * T) <= 1e-9 * T:
+                        ratios[fraction] = max(ratios.get(fraction, 0.0), float(plain[at]))
         before = trajectory.remaining[trajectory.remaining > 0]
         return Comparison(
-            worst, floor, trajectory.rtol, resolved, ratios, float(before.min()), trajectory.deadline_resolved
+            worst, floor, trajectory.rtol, resolved, count, ratios, float(before.min()), trajectory.deadline_resolved
         )
 
     def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:

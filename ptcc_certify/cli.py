@@ -111,7 +111,7 @@ def certify(
     from ptcc_certify.summary import certificate_lines
 
     expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
-    _refuse_missing_folder(output)
+    _refuse_output(output, graph)
     protocol = _protocol(options)
     signed = _read(graph, **options)
     certificate = run(signed, protocol, _start(x0, seed, signed))
@@ -150,7 +150,7 @@ def simulate(
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
     if suffix in FIGURES and dimension > 1:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
-    _refuse_missing_folder(output)
+    _refuse_output(output, graph)
     protocol = _protocol(options)
     signed = _read(graph, **options)
     trajectory = run(signed, protocol, _start_columns(x0, seed, signed, dimension), samples=samples)
@@ -162,7 +162,7 @@ def simulate(
     elif output:
         write_atomically(output, trajectory.to_csv())
     else:
-        click.echo(trajectory.to_csv(), nl=False)
+        click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
     if protocol.prescribed and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return OK
@@ -242,6 +242,8 @@ def _read(
     from ptcc_certify.examples import GRAPHS, graph_path
     from ptcc_certify.io import read_graph
 
+    if graph == "-" and sys.stdin is None:
+        raise ParameterError("standard input is closed; name a file")
     packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
     return read_graph(
         graph_path(graph) if packaged else graph,
@@ -313,7 +315,11 @@ def _number(text: str | None, option: str) -> Fraction | None:
 
 
 def _refuted(structure: Structure, expected: str | None) -> int:
-    if expected is None or structure.holds(expected):
+    if expected is None:
+        return OK
+    if structure.holds(expected):
+        if len(structure.components) > 1:
+            click.echo(f"note: {expected} holds in each of the components by itself", err=True)
         return OK
     click.echo(f"refuted: {expected} does not follow for this graph", err=True)
     return REFUTED_EXPECTATION
@@ -338,10 +344,16 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
     return UNDECIDED
 
 
-def _refuse_missing_folder(output: str | None) -> None:
-    """Refuse before the work what could not be written after it."""
-    if output and not Path(output).parent.is_dir():
+def _refuse_output(output: str | None, graph: str) -> None:
+    """Refuse before the work what could not, or should not, be written after it."""
+    if not output:
+        return
+    if output == "-":
+        raise ParameterError("-o names a file; for standard output leave it out (certify: and say --json)")
+    if not Path(output).parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if Path(output).is_file() and Path(graph).is_file() and Path(output).samefile(graph):
+        raise ParameterError(f"{output}: is the graph itself; name another file")
 
 
 def _save_figure(figure: Any, path: str | Path) -> None:
@@ -373,7 +385,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a label that the terminal cannot show stops nothing
     try:
-        code = cli.main(standalone_mode=False)
+        code = cli.main(prog_name="ptcc", standalone_mode=False)
     except click.ClickException as error:
         if isinstance(error, _NO_ARGUMENTS):
             click.echo(error.format_message(), err=True)
@@ -392,9 +404,12 @@ def main() -> None:
     except BrokenPipeError:
         code = OK
         sys.stderr.close()
-    except Exception:
-        traceback.print_exc()
-        click.echo("ptcc: an error of this program, not of your input; please report it with the lines above", err=True)
+    except OSError as error:
+        code = _refuse(f"the result cannot be written ({error.strerror or error})")
+    except Exception as error:
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(at.filename).name}, line {at.lineno}"
+        click.echo(f"ptcc: a defect of this program ({type(error).__name__} in {where}), please report it", err=True)
         code = INTERNAL_ERROR
     sys.exit(code if isinstance(code, int) else OK)
 

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -23,15 +23,13 @@ from ptcc_certify.lemmas import (
     exact_left_vector,
     left_vector,
 )
-from ptcc_certify.rationals import as_fraction
+from ptcc_certify.rationals import as_fraction, shorten
 from ptcc_certify.structure import ClosedComponent, Structure
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation import Trajectory
 
 Number = Fraction | float
-#: Largest closed component whose left null vector is computed densely.
-DENSE_NODES = 3000
 
 
 @dataclass(frozen=True)
@@ -108,11 +106,6 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
     structure : Structure
     exact : bool, optional
         Rationals or floats; by default rationals for graphs of at most ``EXACT_NODES`` nodes.
-
-    Raises
-    ------
-    ParameterError
-        A closed component is too large for a dense null vector.
     """
     graph = structure.graph
     exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
@@ -124,8 +117,6 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
         if len(component.nodes) == 1:
             voices.append((Fraction(1) if exact else 1.0,))
             continue
-        if len(component.nodes) > DENSE_NODES:
-            raise ParameterError(f"a balanced closed component of {len(component.nodes)} nodes is too large")
         block = graph.subgraph(component.nodes)
         eta: Sequence[Number] = exact_left_vector(block) if exact else left_vector(block).tolist()
         voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
@@ -210,8 +201,8 @@ def outcome(structure: Structure, x0: Sequence[Any], *, exact: bool | None = Non
     return Outcome(structure.graph.labels, tuple(final), tuple(values), degenerate, matrix)
 
 
-def exact_start(structure: Structure, x0: Sequence[Any]) -> list[Fraction]:
-    """Return a start as N rationals.
+def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any]) -> list[Fraction]:
+    """Return a start as N rationals; ``x0`` in node order, or by label.
 
     Raises
     ------
@@ -219,6 +210,14 @@ def exact_start(structure: Structure, x0: Sequence[Any]) -> list[Fraction]:
         Wrong length, or an entry that is not a finite number.
     """
     labels = structure.graph.labels
+    if isinstance(x0, Mapping):
+        if set(map(str, x0)) != set(labels) or len(x0) != len(labels):
+            odd = shorten(str(sorted(set(map(str, x0)) ^ set(labels))[:1]))
+            raise ParameterError(f"the start needs one value for each agent; {odd} is missing or unknown")
+        by_label = {str(key): value for key, value in x0.items()}
+        x0 = [by_label[label] for label in labels]
+    elif isinstance(x0, str) or not hasattr(x0, "__getitem__"):
+        raise ParameterError("the start is a sequence of numbers in node order, or a mapping of label to number")
     if len(x0) != len(labels):
         raise ParameterError(f"the start has {len(x0)} values for {len(labels)} agents")
     start = []
@@ -226,7 +225,8 @@ def exact_start(structure: Structure, x0: Sequence[Any]) -> list[Fraction]:
         try:
             start.append(as_fraction(value, f"x0 of agent {label}"))
         except NumberError as error:
-            raise ParameterError(f"x0 of agent {label}: {error}") from None
+            where = f"x0 of agent {label}"
+            raise ParameterError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
     return start
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from ptcc_certify.structure import Structure
+from ptcc_certify.structure import Claim, Structure
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate import Certificate
@@ -79,37 +83,34 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
 def _rate_lines(certificate: Certificate) -> list[str]:
     lines = []
     V, rate, spectral = certificate.lyapunov, certificate.proof.rate, certificate.spectral_rate
+    best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
     if certificate.constant:
         return [_line("rate", "every agent keeps its state: there is nothing to decay")]
     if rate is not None and V is not None:
-        best = (
-            "" if spectral is None else f"; best possible {spectral:.6g} (numerical), tightness {_ratio(certificate)}"
-        )
-        lines.append(_line("rate", f"{float(rate):.6g} per unit of s, proved: V <= e^(-rate s) V(0){best}"))
+        near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
+        lines.append(_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}"))
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         lines.append(
-            _line("", f"{V.objective}{rho}; ||{V.coordinates}||^2 carries the prefactor {float(V.prefactor):.4g}")
+            _line("", f"{V.objective}{rho}; ||{V.coordinates}||^2 carries the prefactor {_up(V.prefactor, 4)}")
         )
         lines += _residual_lines(certificate)
         count = len(certificate.proof.obligations) + len(certificate.outcome_proof)
         lines.append(_line("proof", f"{count} statement(s) proved in exact arithmetic"))
     elif certificate.numerical_rate is not None:
-        lines.append(
-            _line("rate", f"not proved; numerically {certificate.numerical_rate:.6g}, best possible {spectral}")
-        )
-    elif spectral is not None:
-        lines.append(_line("rate", f"not proved; best possible {spectral:.6g} (numerical)"))
+        lines.append(_line("rate", f"not proved; numerically {certificate.numerical_rate:.6g}{best}"))
+    else:
+        lines.append(_line("rate", f"not proved{best}"))
     return lines
 
 
 def _residual_lines(certificate: Certificate) -> list[str]:
     instants = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
     coordinates = certificate.lyapunov.coordinates if certificate.lyapunov else "E"
-    proved = [f"{_percent(certificate.envelope.residual(q))} at {name}" for q, name in instants]
-    lines = [_line("left", f"of ||{coordinates}(0)||: at most {', '.join(proved)}")]
+    proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in instants]
+    lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in instants]
     if slowest[-1] is not None:
-        lines.append(_line("", "slowest mode (numerical) " + ", ".join(_percent(x or 0.0) for x in slowest)))
+        lines.append(_line("", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)))
         if slowest[-1] > 0.01:
             lines.append(
                 _line("", "most of the error is left to the last instant: raise rho2 * kappa for a usable deadline")
@@ -123,12 +124,13 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
         return []
     lines = []
     if seen is not None:
-        said = "VIOLATED" if seen.violated else "kept"
+        said = "VIOLATED" if seen.violated else "kept" if seen.judged else "not tested, all is below the floor"
+        resolved = f"down to 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
         lines.append(
             _line(
                 "simulated",
                 f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, worst ratio {seen.worst_ratio:.4g}, "
-                f"resolved down to 1 - t/T = {seen.resolved_until:.1e}",
+                f"resolved {resolved}",
             )
         )
     if certificate.outcome is not None:
@@ -140,19 +142,20 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
 
 def _claim_lines(structure: Structure, when: str = "") -> list[str]:
     if structure.claim is not None:
-        claim = structure.claim
-        also = f"; {', '.join(claim.special)} (Corollary {', '.join(claim.corollaries)})" if claim.special else ""
-        if claim.corollaries and not claim.special:
-            also = f"; Corollary {', '.join(claim.corollaries)}"
-        return [_line("claim", f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})")]
-    counts: dict[tuple[str, str], int] = {}
-    for component in structure.components:
-        key = (component.claim.behaviour, component.claim.theorem)
-        counts[key] = counts.get(key, 0) + 1
+        return [_line("claim", _claim_text(structure.claim, when))]
+    counts = Counter(component.claim for component in structure.components)
     return [
-        _line("claim" if i == 0 else "", f"{count} component(s): {behaviour}{when} (Theorem {theorem})")
-        for i, ((behaviour, theorem), count) in enumerate(sorted(counts.items(), key=lambda item: item[0][1]))
+        _line("claim" if i == 0 else "", f"{count} component(s): {_claim_text(claim, when)}")
+        for i, (claim, count) in enumerate(sorted(counts.items(), key=lambda item: item[0].theorem))
     ]
+
+
+def _claim_text(claim: Claim, when: str) -> str:
+    numbers = ", ".join(claim.corollaries)
+    also = f"; {', '.join(claim.special)} (Corollary {numbers})" if claim.special else ""
+    if claim.corollaries and not claim.special:
+        also = f"; Corollary {numbers}"
+    return f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})"
 
 
 def _structure_text(structure: Structure) -> str:
@@ -183,12 +186,23 @@ def _remarks(structure: Structure) -> list[str]:
     return [*remarks, *read["notes"]]
 
 
-def _ratio(certificate: Certificate) -> str:
-    return "-" if certificate.tightness is None else f"{certificate.tightness:.3f}"
+def _down(x: Fraction | float, digits: int = 6) -> str:
+    return _rounded(x, digits, ROUND_FLOOR)
 
 
-def _percent(x: float) -> str:
-    return f"{100 * x:.2g}%"
+def _up(x: Fraction | float, digits: int) -> str:
+    return _rounded(x, digits, ROUND_CEILING)
+
+
+def _rounded(x: Fraction | float, digits: int, rounding: str) -> str:
+    """Write a positive number that was proved with few digits, rounded to the safe side."""
+    if isinstance(x, float) and not math.isfinite(x):
+        return "infinity"
+    if x == 0:  # an exponential that left float64
+        return "1e-300"
+    exact = Fraction(x)
+    context = Context(prec=digits, rounding=rounding)
+    return f"{float(context.divide(Decimal(exact.numerator), Decimal(exact.denominator))):.{digits}g}"
 
 
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:

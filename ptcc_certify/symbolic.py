@@ -16,12 +16,13 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SymbolicLyapunov:
     """A Lyapunov function along the closed loop, symbolically.
 
     Attributes
     ----------
+    protocol : NominalProtocol
     t, x : casadi.SX
         Time and states (N, 1).
     gain : casadi.SX
@@ -30,8 +31,14 @@ class SymbolicLyapunov:
         ``-L x``.
     z : (n, 1) casadi.SX
         The coordinates of ``V``: rows of ``E``, or the weighted deviation ``eps``.
+    agents : tuple of int
+        The node index of every coordinate.
+    weights : (n,) array
+        The diagonal of ``Omega``.
+    decrease : (n, n) array
+        ``Omega A + A' Omega``, where ``z' = -gain A z``.
     V : casadi.SX
-        ``z' diag(weights) z``.
+        ``z' Omega z``.
     V_dot : casadi.SX
         ``grad V . x'`` with ``x' = gain E``, by CasADi's differentiation of ``V``.
     proof_form : casadi.SX
@@ -40,25 +47,41 @@ class SymbolicLyapunov:
         What the proof bounds it by: ``-gain z'Sz`` with ``S`` the matrix whose smallest eigenvalue gives the rate.
     """
 
+    protocol: NominalProtocol
     t: ca.SX
     x: ca.SX
     gain: ca.SX
     E: ca.SX
     z: ca.SX
+    agents: tuple[int, ...]
+    weights: np.ndarray
+    decrease: np.ndarray
     V: ca.SX
     V_dot: ca.SX
     proof_form: ca.SX
     bounding_form: ca.SX
 
     def latex(self) -> str:
-        r"""Return ``V`` and ``V'`` in LaTeX, printed from the expressions; the states are ``x_{1}`` .. ``x_{N}``."""
-        return (
-            "\\begin{aligned}\nV &= "
-            + to_latex(self.V)
-            + " \\\\\n\\dot V &= "
-            + to_latex(self.V_dot)
-            + ("\n\\end{aligned}")
-        )
+        r"""Return the coordinates ``e_{k}``, ``V``, ``V'`` and the gain ``g`` in LaTeX, printed from expressions.
+
+        Agents are numbered from 1; ``V'`` is the form of the proof, written in the coordinates.
+        """
+        import casadi as ca
+
+        n, S = len(self.agents), self.decrease
+        e = [ca.SX.sym(f"e{k + 1}") for k in self.agents]
+        pairs = [(i, j) for i in range(n) for j in range(i, n) if S[i, j]]
+        squares = [e[i] ** 2 for i in range(n)]
+        value = sum((self.weights[i] * squares[i] for i in range(n)), ca.SX(0))
+        form = sum((S[i, i] * squares[i] if i == j else 2 * S[i, j] * (e[i] * e[j]) for i, j in pairs), ca.SX(0))
+        rows = [f"{to_latex(e[i])} &= {to_latex(self.z[i])}" for i in range(n)]
+        rows.append(f"V &= {to_latex(value)}")
+        rows.append(rf"\dot V &= -g \left({to_latex(form)}\right)")
+        rows.append(rf"g &= {self.protocol.gain.latex()}")
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def __repr__(self) -> str:
+        return f"SymbolicLyapunov({len(self.agents)} coordinates of {self.x.numel()} agents)"
 
     def _repr_latex_(self) -> str:
         return f"${self.latex()}$"
@@ -104,17 +127,22 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Nomin
         assert structure.gauge is not None
         g = structure.gauge.astype(float)
         z, A = x - ca.DM(g) * ca.dot(ca.DM(g * weights / weights.sum()), x), L
-    omega = ca.diag(ca.DM(weights))
-    value = ca.dot(ca.DM(weights) * z, z)
+    product = ca.mtimes(ca.diag(ca.DM(weights)), A)
+    decrease = product + product.T
+    value = ca.sum1(ca.DM(weights) * z**2)
     S = ca.DM(theorem_for(structure).decrease(structure, V))
     return SymbolicLyapunov(
+        protocol=protocol,
         t=t,
         x=x,
         gain=gain,
         E=E,
         z=z,
+        agents=tuple(nodes),
+        weights=weights,
+        decrease=decrease.full(),
         V=value,
         V_dot=ca.jtimes(value, x, loop["ode"]),
-        proof_form=-gain * ca.bilin(ca.mtimes(omega, A) + ca.mtimes(A.T, omega), z, z),
+        proof_form=-gain * ca.bilin(decrease, z, z),
         bounding_form=-gain * ca.bilin(S, z, z),
     )

@@ -22,10 +22,9 @@ from hypothesis import strategies as st
 from scipy import sparse
 from scipy.io import mmwrite, savemat
 
-import ptcc_certify.io as reader
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError, PTCCError
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.io import read_graph, read_state, write_atomically, write_graph
+from ptcc_certify.io import files, read_graph, read_state, write_atomically, write_graph
 
 EDGES = [("a", "b", "2"), ("b", "c", "-0.1"), ("c", "a", "1/3"), ("c", "b", "-4")]
 GRAPH = SignedDigraph.from_edges(EDGES, nodes="abc")
@@ -80,7 +79,7 @@ def one_line(error: BaseException) -> str:
         "Weight;TO;From\n2;b;a\n-0.1;c;b\n1/3;a;c\n-4;b;c\n",
         "FromNodeId ToNodeId Sign\na b 2\nb c -0.1\nc a 1/3\nc b -4\n",
         "time,src,dst,note,rating\n1,a,b,x,2\n2,b,c,,-0.1\n3,c,a,y,1/3\n4,c,b,z,-4\n",
-        '"a","b","2"\n"b","c","-0.1"\nc,a,1/3\n"c" , "b" ,-4\n',
+        '"a","b","2"\n"b","c","-0.1"\nc,a,1/3\n"c", "b", -4\n',
         '"a" "b" 2\nb "c" -0.1\nc a 1/3\nc b -4\n',
         "a,b,2,2012,x\nb,c,-0.1\nc,a,1/3,\nc,b,-4,,,\n",
         'a,b,2,"two\nlines"\nb,c,-0.1,x\nc,a,1/3,x\nc,b,-4,x\n',
@@ -212,7 +211,7 @@ def test_merging_agrees_with_a_dictionary(rows, duplicates, undirected, listens)
         )
 
     if 0 in expected.values():
-        with pytest.raises(FormatError, match="add up to 0"):
+        with pytest.raises(FormatError, match="sum 0 of the weights"):
             read()
         return
     found = {(int(s), int(t)): w for s, t, w in read().edges}
@@ -245,10 +244,13 @@ def graphs(draw, labels=odd_text):
     return SignedDigraph.from_edges([(a, b, draw(weight)) for a, b in chosen], nodes=names)
 
 
-@given(graphs(), st.sampled_from(["g.csv", "g.csv.gz", "g", "g.txt"]))
+def plain(text: str) -> str:
+    return text.strip() or "x"
+
+
+@given(graphs(odd_text.map(plain)), st.sampled_from(["g.csv", "g.csv.gz", "g", "g.txt"]))
 @example(SignedDigraph.from_edges([("source", "target", 1)], nodes=["weight"]), "g.csv")
-@example(SignedDigraph.from_edges([], nodes=[""]), "g.csv")
-@example(SignedDigraph.from_edges([('"', "a\nb", 1), ("a\nb", "\r\n", -1)], nodes=["z"]), "g.csv")
+@example(SignedDigraph.from_edges([('"', "a\nb", 1), ("a\nb", "c\r\nd", -1), ("#", "%", 1)], nodes=["z"]), "g.csv")
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 def test_a_graph_is_read_back_as_it_was_written(tmp_path, graph, name):
     write_graph(graph, tmp_path / name)
@@ -259,7 +261,7 @@ def test_a_graph_is_read_back_as_it_was_written(tmp_path, graph, name):
     assert back.read["notes"] == ()
 
 
-@given(graphs())
+@given(graphs(odd_text.map(plain)))
 @settings(max_examples=150)
 def test_the_node_order_of_a_subgraph_survives_where_the_order_rule_allows(tmp_path_factory, graph):
     part = graph.subgraph(np.arange(graph.n_nodes)[::-1])
@@ -272,17 +274,17 @@ def test_the_node_order_of_a_subgraph_survives_where_the_order_rule_allows(tmp_p
 
 def test_nodes_are_declared_only_where_needed(tmp_path):
     write_graph(GRAPH, tmp_path / "g.csv")
-    assert (tmp_path / "g.csv").read_text() == "source,target,weight\nc,a,1/3\na,b,2\nc,b,-4\nb,c,-1/10\n".replace(
-        "weight\n", "weight\na\nb\nc\n"
-    )
+    assert (tmp_path / "g.csv").read_text() == "source,target,weight\na\nb\nc\nc,a,1/3\na,b,2\nc,b,-4\nb,c,-1/10\n"
     write_graph(text("1,2,1\n3\n"), tmp_path / "g.csv")
-    assert (tmp_path / "g.csv").read_text() == "source,target,weight\n1,2,1\n3\n"
+    assert (tmp_path / "g.csv").read_text() == "source,target,weight\n3\n1,2,1\n"
 
 
 @pytest.mark.parametrize(
     ("graph", "name", "reason"),
     [
-        (SignedDigraph.from_edges([("a\0", "b", 1)]), "g.csv", "NUL"),
+        (SignedDigraph.from_edges([("a\0", "b", 1)]), "g.csv", "not Unicode text"),
+        (SignedDigraph.from_edges([("", "b", 1)]), "g.csv", "is empty"),
+        (SignedDigraph.from_edges([(" a", "b", 1)]), "g.csv", "has blanks around it"),
         (SignedDigraph.from_edges([("a\ud800", "b", 1)]), "g.csv", "Unicode"),
         (SignedDigraph.from_edges([("a" * 70_000, "b", 1)]), "g.csv", "longer than"),
         (GRAPH, "g.graphml", "edge lists"),
@@ -345,7 +347,7 @@ def write_npz(path: Path, matrix: np.ndarray) -> None:
     np.savez(path, W=matrix, labels=np.array(["x", "ü", "z"]))
 
 
-@pytest.mark.parametrize("kind", ["csr", "csc", "coo", "bsr", "dia"])
+@pytest.mark.parametrize("kind", ["csr", "csc", "coo"])
 def test_every_sparse_npz_is_the_same_graph(tmp_path, kind):
     sparse.save_npz(tmp_path / "g.npz", sparse.csr_array(MATRIX).asformat(kind))
     graph = read_graph(tmp_path / "g.npz")
@@ -423,6 +425,7 @@ def test_a_dense_and_a_sparse_matrix_are_the_same_graph(tmp_path_factory, n, dat
         assert read_graph(folder / name) == expected
 
 
+NAMESPACE = ' xmlns="http://graphml.graphdrawing.org/xmlns"'
 GRAPHML = """<?xml version="1.0" encoding="UTF-8"?>
 <graphml xmlns="http://graphml.graphdrawing.org/xmlns">
   <key id="d0" for="edge" attr.name="{name}" attr.type="double">{default}</key>
@@ -482,7 +485,8 @@ def test_graphml(put):
     assert edges(read_graph(put("g.graphml", graphml(name="Sign")))) == expected
     assert edges(read_graph(put("g.graphml", graphml(default="<default>-0.1</default>", data="")))) == expected
     assert edges(read_graph(put("g.graphml.gz", gzip.compress(graphml().encode())))) == expected
-    assert edges(read_graph(put("g.graphml", graphml().replace("UTF-8", "UTF-16").encode("utf-16")))) == expected
+    assert edges(read_graph(put("g.graphml", graphml().replace("UTF-8", "klingon")))) == expected
+    assert edges(read_graph(put("g.graphml", graphml().replace(NAMESPACE, "")))) == expected
     assert edges(read_graph(io.StringIO(graphml()), format="graphml")) == expected
     one_way = graphml("undirected", data='<data key="d0">1</data>').replace(
         'source="b" target="1"', 'source="b" target="lonely"'
@@ -510,6 +514,79 @@ def test_pajek(put):
     assert graph.labels == ("New York", "2", "c")
     both = read_graph(put("g.pajek", pajek("*Edges")), undirected=True)
     assert both.n_edges == 4
+
+
+def test_pajek_nodes_without_rows_are_their_numbers(put):
+    graph = read_graph(put("g.net", "*Vertices 3\n*Arcs\n1 2 0.5\n3 1 -1\n"))
+    assert edges(graph) == {("1", "2", Fraction(1, 2)), ("3", "1", Fraction(-1))}
+
+
+def test_pajek_reads_three_fields_of_an_arc(put):
+    graph = read_graph(put("g.net", pajek() + '2 3 1 weight 7 l "it\'s"\n'))
+    assert ("2", "c", Fraction(1)) in edges(graph)
+
+
+def test_gml_labels_are_texts_or_integers(put):
+    content = gml().replace('"a &#228; b"', "7").replace('label "1"', 'label "[]"')
+    assert read_graph(put("g.gml", content)).labels == ("7", "[]")
+    assert (
+        read_graph(put("g.gml", gml().replace('label "1"', 'LABEL "&#34;x&#34; [ # &amp;"'))).labels[1] == '"x" [ # &'
+    )
+
+
+@pytest.mark.parametrize("number", ["2", "-0.1", "0.30000000000000004", "1e-300", "-2.5E+30", "12345678901234567890"])
+def test_decimals_of_graph_formats_are_decimals(put, number):
+    kind = "long" if number.isdigit() else "double"
+    content = graphml(data=f'<data key="d0">{number}</data>').replace("double", kind)
+    real = number if number.isdigit() or "." in number else number.replace("e", ".0e")
+    for name, text in [
+        ("g.graphml", content),
+        ("g.gml", gml(weight=f"weight {real}")),
+        ("g.net", pajek() + f"2 3 {number}"),
+    ]:
+        found = {weight for _, _, weight in read_graph(put(name, text)).edges}
+        assert Fraction(number) in found or (name == "g.net" and Fraction(repr(float(number))) in found)
+
+
+def test_weights_that_are_texts_keep_all_digits(put):
+    exact = "1234567890.12345678901234567890123"
+    for name, text in [
+        ("g.graphml", graphml(data=f'<data key="d0">{exact}</data>').replace("double", "string")),
+        ("g.gml", gml(weight=f'weight "{exact}"')),
+    ]:
+        assert Fraction(exact) in {weight for _, _, weight in read_graph(put(name, text)).edges}
+
+
+@pytest.mark.parametrize("kind", ["graphml", "gml", "net"])
+def test_repeated_edges_of_graph_formats_are_merged_on_request(put, kind):
+    graph = nx.MultiDiGraph()
+    graph.add_weighted_edges_from([("a", "b", 1.5), ("b", "a", 1.0), ("a", "b", -2.0), ("a", "b", 0.25)])
+    write = {"graphml": nx.generate_graphml, "gml": nx.generate_gml, "net": nx.generate_pajek}[kind]
+    path = put(f"g.{kind}", "\n".join(write(graph)))
+    with pytest.raises(FormatError, match="second row for edge a -> b"):
+        read_graph(path)
+    assert ("a", "b", Fraction(1, 4)) in edges(read_graph(path, duplicates="last"))
+    assert ("a", "b", Fraction(-1, 4)) in edges(read_graph(path, duplicates="sum"))
+    assert ("a", "b", Fraction(3, 4)) in edges(read_graph(path, duplicates="sum", undirected=True))
+    with pytest.raises(FormatError, match="which of two opposite edges is the last"):
+        read_graph(path, duplicates="last", undirected=True)
+
+
+def test_deep_nesting_is_refused_in_one_line(put):
+    graph = "<node id='a' yfiles.foldertype='group'><graph edgedefault='directed'>"
+    nested = graphml().replace('<node id="b"/>', graph * 5000 + "</graph></node>" * 5000 + '<node id="b"/>')
+    with pytest.raises(FormatError, match="GraphML") as caught:
+        read_graph(put("g.graphml", nested))
+    one_line(caught.value)
+
+
+def test_matrix_market_files_may_end_within_a_line(put):
+    assert edges(read_graph(put("g.mtx", mtx().rstrip("\n")))) == edges(read_graph(put("h.mtx", mtx())))
+
+
+def test_matrix_market_integers_are_exact(put):
+    graph = read_graph(put("g.mtx", mtx("integer", weight=str(2**53 + 1)).replace("0.1", "1")))
+    assert ("1", "2", Fraction(2**53 + 1)) in edges(graph)
 
 
 def test_matrix_market_rows_listen(put):
@@ -553,11 +630,14 @@ def test_the_format_may_be_said(put):
 
 
 def test_importing_the_reader_loads_nothing_heavy():
-    code = "import sys, ptcc_certify.io; print(*{name.partition('.')[0] for name in sys.modules})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
+    def modules(code: str) -> set[str]:
+        code = f"import sys; {code}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        return set(done.stdout.split())
+
+    loaded, preloaded = modules("import ptcc_certify.io"), modules("pass")
     assert "numpy" in loaded
-    assert not loaded & {"scipy", "networkx", "matplotlib", "cvxpy", "casadi", "gzip", "click"}
+    assert loaded <= {*sys.stdlib_module_names, "__mp_main__", "numpy", "ptcc_certify"} | preloaded
 
 
 # ---------------------------------------------------------------------------------------------- refusals
@@ -615,8 +695,8 @@ BAD_FILES = [
     ("g.csv", "a,b,٣\n", ["line 1:", "not a number"]),
     ("g.csv", "a,b,{}\n", ["line 1:", 'weight "{}" of edge a -> b']),
     ("g.csv", "a,b,1\nb,c,0\n", ["line 2:", "weight 0 of edge b -> c", "unknown sign"]),
-    ("g.csv", "a,b,0.0\nb,c,1\nc,d,-0e5\n", ["line 1:", "2 edges have weight 0: a -> b, c -> d"]),
-    ("g.csv", "".join(f"a,{i},0\n" for i in range(9)), ["line 1:", "9 edges have weight 0", "a -> 4, ...;"]),
+    ("g.csv", "a,b,0.0\nb,c,1\nc,d,-0e5\n", ["line 1:", "weight 0 of edge a -> b (2 in all)"]),
+    ("g.csv", "".join(f"a,{i},0\n" for i in range(9)), ["line 1:", "weight 0 of edge a -> 0 (9 in all)"]),
     ("g.csv", "a,b,1\nb,c\n", ["line 2:", "edge b -> c has no weight"]),
     ("g.csv", "a,b,1\nb,c,\n", ["line 2:", "edge b -> c has no weight"]),
     ("g.csv", "a b\nb c\n", ["line 1:", "edge a -> b has no weight"]),
@@ -624,107 +704,144 @@ BAD_FILES = [
     ("g.csv", "source,target,weight,Weight\na,b,1,2\n", ["line 1:", "two columns"]),
     ("g.csv", "a,b,1\n,c,1\n", ["line 2:", "the source is empty"]),
     ("g.csv", "a,b,1\nc,,1\n", ["line 2:", "the target is empty"]),
-    ("g.csv", "time,source,target,weight\n1,,,\n", ["line 2:", "without a node"]),
+    ("g.csv", "time,source,target,weight\n1,,,\n", ["line 2:", "the source is empty"]),
     ("g.csv", "a,b,1\nb,a,1\n\na,b,-1\n", ["line 4:", "second row for edge a -> b", "line 1", "--duplicates sum|last"]),
     ("g.csv", "a,b,1\na , b,1\n", ["line 2:", "second row for edge a -> b"]),
     ("g.csv", "a,b,1\nb,b,1\nc,c,1\n", ["line 2:", "self-loop at node b", "2 in all", "--drop-self-loops"]),
     ("g.csv", 'a,b,1\n"b,c,1\nd,e,1\n', ["line 2:", "quote"]),
-    ("g.csv", 'a,b,1\n"b"x,c,1\n', ["line 2:", "closing quote"]),
+    ("g.csv", 'a,b,1\n"b"x,c,1\n', ["line 2:", "quotes"]),
     ("g.csv", 'a,b,1\n"x\ny",c,1\nc,d,nan\n', ["line 4:", '"nan"']),
     ("g.csv", 'a,b,1\n"x\ny",c,nan\n', ["line 2:", '"nan"', "x?y -> c"]),
     ("g.csv", '"x\ny"\na,b,1\na,b,1\n', ["line 4:", "line 3"]),
-    ("g.csv", '"' + "x\n" * 70_000, ["line 1:", "not closed"]),
+    ("g.csv", '"' + "x\n" * 70_000, ["line 1:", "quotes"]),
     ("g.csv", "a,b,1\n" + "x" * 70_000 + ",b,1\n", ["line 2:", "65536 characters"]),
-    ("g.csv", b"a,b,1\nb,c\0,1\n", ["line 2:", "NUL"]),
+    ("g.csv", b"a,b,1\nb,c\0,1\n", ["line 2:", "0x00", "UTF-8"]),
     ("g.csv", b"a,b,1\n\xe9,c,1\n", ["line 2:", "0xe9", "UTF-8"]),
-    ("g.csv", "a,b,1\n".encode("utf-16"), ["UTF-16"]),
+    ("g.csv", "a,b,1\n".encode("utf-16"), ["line 1:", "UTF-8"]),
     ("g.csv", mtx(), ["Matrix Market", ".mtx"]),
-    ("g.csv", b"PK\3\4\0\0", ["NUL"]),
+    ("g.csv", b"PK\3\4\0\0", ["line 1:", "0x00"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99)[:-12], ["gzip"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99)[:40] + b"\xff" * 40, ["gzip"]),
     ("g.csv.gz", ROWS, ["not a gzip file"]),
     ("g.csv.gz", gzip.compress(b"a,b,1\nb,c,x\n"), ["line 2:", '"x"']),
-    ("g.graphml", "", ["GraphML", "line 1"]),
+    ("g.graphml", "", ["GraphML"]),
     ("g.graphml", "a,b,1\n", ["GraphML", "line 1"]),
     ("g.graphml", graphml()[:-40], ["GraphML", "line"]),
-    ("g.graphml", "<graphml/>", ["no graph"]),
+    ("g.graphml", "<graphml/>", ["GraphML"]),
+    ("g.graphml", graphml().replace("lonely", "\xe9").encode("latin-1"), ["line 7:", "0xe9", "UTF-8"]),
+    ("g.graphml", graphml().encode("utf-16"), ["UTF-8"]),
     ("g.graphml", graphml("undirected"), ["undirected", "--undirected"]),
-    ("g.graphml", graphml().replace("<edge id", '<edge directed="false" id'), ["mixed"]),
-    ("g.graphml", graphml(data=""), ["line 8:", "edge b -> 1 has no weight"]),
-    ("g.graphml", graphml(data='<data key="d0">NaN</data>'), ["line 8:", "edge b -> 1", "not a finite number"]),
-    ("g.graphml", graphml(data='<data key="d0">0</data>'), ["line 8:", "weight 0 of edge b -> 1"]),
-    ("g.graphml", graphml().replace('target="1"', 'target="b"'), ["line 8:", "self-loop"]),
-    ("g.graphml", graphml().replace('target="1"', 'target="x"'), ["line 8:", "node x", "not declared"]),
-    ("g.graphml", graphml().replace(' target="1"', ""), ["line 8:", '"target"']),
-    ("g.graphml", graphml().replace('id="lonely"', 'id="b"'), ["line 7:", "twice"]),
-    ("g.graphml", graphml().replace('source="b" target="1"', 'source="1" target="b"'), ["line 8:", "line 6"]),
-    ("g.graphml", graphml().replace("<graphml", "<!DOCTYPE g><graphml"), ["line 2:", "DOCTYPE"]),
+    ("g.graphml", graphml().replace("<edge id", '<edge directed="false" id'), ["directed=false"]),
+    ("g.graphml", graphml("undirected").replace("<edge id", '<edge directed="true" id'), ["directed=true"]),
+    ("g.graphml", graphml(data=""), ["edge b -> 1 has no weight"]),
+    ("g.graphml", graphml(data='<data key="d0"/>'), ["edge b -> 1 has no weight"]),
+    ("g.graphml", graphml(data='<data key="d0">strong</data>'), ["GraphML", "strong"]),
+    ("g.graphml", graphml(data='<data key="d0">NaN</data>'), ["edge b -> 1", "not a finite number"]),
+    ("g.graphml", graphml(data='<data key="d0">1e999</data>'), ["edge b -> 1", "not a finite number"]),
+    ("g.graphml", graphml(data='<data key="d0">0</data>'), ["weight 0 of edge b -> 1"]),
+    (
+        "g.graphml",
+        graphml(data='<data key="d0">true</data>')
+        .replace("double", "boolean")
+        .replace(">9<", ">1<")
+        .replace(">5<", ">1<")
+        .replace(">2<", ">1<"),
+        ['weight "True"', "not a number"],
+    ),
+    ("g.graphml", graphml().replace('target="1"', 'target="b"'), ["self-loop at node b"]),
+    ("g.graphml", graphml().replace('target="1"', 'target="x"'), ["node x is declared 0 times"]),
+    ("g.graphml", graphml().replace(' target="1"', ""), ["node None is declared 0 times"]),
+    ("g.graphml", graphml().replace('id="lonely"', 'id="b"'), ["node b is declared 2 times"]),
+    ("g.graphml", graphml().replace('source="b" target="1"', 'source="1" target="b"'), ["second row for edge 1 -> b"]),
+    ("g.graphml", graphml().replace('<edge source="b" target="1"', '<edge id="e1" source="1" target="b"'), ["same id"]),
+    ("g.graphml", graphml().replace("<graphml", "<!DOCTYPE g><graphml"), ["DOCTYPE"]),
     (
         "g.graphml",
         '<!DOCTYPE g [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>\n<graphml>&b;</graphml>',
-        ["line 1:", "DOCTYPE"],
+        ["DOCTYPE"],
     ),
     ("g.graphml", graphml().replace("</graph>", "</graph><graph/>"), ["second or nested"]),
     ("g.graphml", graphml().replace('<node id="b"/>', '<node id="b"><graph/></node>'), ["second or nested"]),
-    ("g.graphml", graphml().replace('<node id="lonely"/>', "<hyperedge/>"), ["line 7:", "hyperedge"]),
-    ("g.graphml", graphml().replace("UTF-8", "klingon"), ["GraphML"]),
+    ("g.graphml", graphml().replace('<node id="lonely"/>', "<hyperedge/>"), ["hyperedge"]),
     ("g.gml", "", ["no graph"]),
-    ("g.gml", gml()[:-3], ["line 2:", "not closed"]),
-    ("g.gml", gml() + "]", ["line 10:", '"]"']),
-    ("g.gml", gml() + '"', ["line 10:", "quote"]),
-    ("g.gml", gml() + gml(), ["line 11:", "second graph"]),
-    ("g.gml", "graph " + "[ a " * 200, ["nested"]),
-    ("g.gml", "5 6 7", ["line 1:", "key"]),
+    ("g.gml", gml()[:-3], ["expected ']'"]),
+    ("g.gml", gml() + "]", ["expected EOF", "10"]),
+    ("g.gml", gml() + '"', ["GML", "10"]),
+    ("g.gml", gml() + gml(), ["more than one graph"]),
+    ("g.gml", "graph [ " + "a [ " * 5000, ["GML", "recursion"]),
+    ("g.gml", "5 6 7", ["GML"]),
     ("g.gml", gml("0"), ["directed 0", "--undirected"]),
     ("g.gml", gml().replace("directed 1", ""), ["directed 0", "--undirected"]),
-    ("g.gml", gml(weight=""), ["line 7:", "edge a ä b -> 1 has no weight"]),
-    ("g.gml", gml(weight="weight 1 weight 2"), ["line 7:", "weight occurs twice"]),
-    ("g.gml", gml(weight="weight NAN"), ["line 7:", '"NAN"', "not a finite number"]),
-    ("g.gml", gml(weight="weight 0.0"), ["line 7:", "weight 0"]),
-    ("g.gml", gml().replace('label "1"', 'label "a &#228; b"'), ["line 5:", "label"]),
-    ("g.gml", gml().replace("id 1 ", "id 3 "), ["line 5:", "twice"]),
-    ("g.gml", gml().replace("id 1 ", ""), ["line 5:", "without id"]),
-    ("g.gml", gml().replace("target 3", "target 4"), ["line 8:", "not declared"]),
-    ("g.gml", gml().replace("target 3", ""), ["line 8:", "without source or target"]),
-    ("g.gml", gml().replace("source 1 target 3", "source 3 target 1"), ["line 8:", "second row", "line 7"]),
+    ("g.gml", gml('"0"'), ["neither 0 nor 1"]),
+    ("g.gml", gml("0 directed 1"), ["neither 0 nor 1"]),
+    ("g.gml", gml().replace("edge [ source 1", "Edge [ source 1"), ["Edge", "lower case"]),
+    ("g.gml", gml().replace("node [ id 1", "Node [ id 1").replace("target 1", "target 3"), ["GML"]),
+    ("g.gml", gml(weight=""), ["edge a ä b -> 1 has no weight"]),
+    ("g.gml", gml(weight="weight 1 weight 2"), ['"[1, 2]"', "not a number"]),
+    ("g.gml", gml(weight="weight 1e5"), ["GML"]),
+    ("g.gml", gml(weight="weight NAN"), ['"nan"', "not a finite number"]),
+    ("g.gml", gml(weight="weight 0.0"), ["weight 0 of edge a ä b -> 1"]),
+    ("g.gml", gml().replace('label "1"', 'label "a &#228; b"'), ['two nodes have the label "a ä b"']),
+    ("g.gml", gml().replace('label "a &#228; b"', "label 1"), ['two nodes have the label "1"']),
+    ("g.gml", gml().replace('label "1"', "label 1.50"), ["label 1.5", "quotes"]),
+    ("g.gml", gml().replace("id 1 ", "id 3 "), ["duplicated"]),
+    ("g.gml", gml().replace("id 1 ", ""), ["no 'id'"]),
+    ("g.gml", gml().replace("target 3", "target 4"), ["undefined target 4"]),
+    ("g.gml", gml().replace("target 3", ""), ["no 'target'"]),
+    ("g.gml", gml().replace("source 1 target 3", "source 3 target 1"), ["second row for edge a ä b -> 1"]),
     ("g.net", "", ["*Vertices"]),
-    ("g.net", "1 2 3\n", ["line 1:", "before *Vertices"]),
-    ("g.net", "*Vertices many\n", ["line 1:", "number of nodes"]),
-    ("g.net", "*Vertices 999999999\n", ["line 1:", "more than"]),
+    ("g.net", "1 2 3\n", ["*Vertices"]),
+    ("g.net", "*Vertices many\n", ["*Vertices n"]),
+    ("g.net", "*Vertices 999999999\n", ["more than"]),
     ("g.net", pajek("*Edges"), ["*Edges", "--undirected"]),
-    ("g.net", pajek() + "*Edges\n2 3 1\n", ["mixed"]),
-    ("g.net", pajek("*Matrix"), ["line 6:", "*Matrix"]),
-    ("g.net", pajek() + "1 3\n", ["line 9:", "edge New York -> c has no weight"]),
-    ("g.net", pajek() + "1\n", ["line 9:", "one field"]),
-    ("g.net", pajek() + "1 3 0\n", ["line 9:", "weight 0"]),
-    ("g.net", pajek() + "1 4 1\n", ["line 9:", "not declared"]),
-    ("g.net", pajek() + "1 2 1\n", ["line 9:", "second row", "line 7"]),
-    ("g.net", pajek().replace("3 c", "4 c"), ["line 5:", "1 .. 3"]),
-    ("g.net", pajek().replace("3 c", "1 c"), ["line 5:", "twice"]),
-    ("g.net", pajek().replace("York", 'York"'), ["line 4:", "quote"]),
-    ("g.mtx", "", ["line 1:", "banner"]),
+    ("g.net", pajek() + "*Edges\n2 3 1\n", ["one list, of *Arcs or of *Edges"]),
+    ("g.net", pajek() + "*Arcs :2\n2 3 1\n", ["one list, of *Arcs or of *Edges"]),
+    ("g.net", pajek("*Matrix"), ["one list, of *Arcs or of *Edges"]),
+    ("g.net", pajek("*Arcslist"), ["one list, of *Arcs or of *Edges"]),
+    ("g.net", pajek() + "1 3\n", ["edge New York -> c has no weight"]),
+    ("g.net", pajek() + "1 3 strong\n", ["edge New York -> c has no weight"]),
+    ("g.net", pajek() + "1\n", ['row "1"', "1 to 3"]),
+    ("g.net", pajek() + "1 3 0\n", ["weight 0 of edge New York -> c"]),
+    ("g.net", pajek() + "1 3 nan\n", ['"nan"', "not a finite number"]),
+    ("g.net", pajek() + "1 4 1\n", ['row "1 4 1"', "1 to 3"]),
+    ("g.net", pajek().replace("3 c", "3 4") + "1 4 1\n", ['row "1 4 1"', "1 to 3"]),
+    ("g.net", pajek() + "1 2 1\n", ["second row for edge New York -> 2"]),
+    ("g.net", pajek().replace("3 c", "4 c"), ["1 to 3"]),
+    ("g.net", pajek().replace("3 c", "1 c"), ["declared twice"]),
+    ("g.net", pajek().replace("3 c", "3 2"), ["same label"]),
+    ("g.net", pajek().replace("3 c", "3 O'Brien"), ["apostrophe"]),
+    ("g.net", pajek().replace("3 c", "3 a\\b"), ["backslash"]),
+    ("g.net", pajek().replace("York", 'York"'), ["Pajek", "quotation"]),
+    ("g.mtx", "", ["line 1:", "%%MatrixMarket"]),
     ("g.mtx", mtx("pattern"), ["line 1:", "pattern"]),
     ("g.mtx", mtx("complex"), ["line 1:", "complex"]),
     ("g.mtx", mtx(symmetry="symmetric"), ["symmetric", "--undirected"]),
     ("g.mtx", mtx(symmetry="hermitian"), ["line 1:", "hermitian"]),
     ("g.mtx", mtx(symmetry="skew-symmetric"), ["line 1:", "skew-symmetric"]),
-    ("g.mtx", mtx().replace("3 3 2", "3 4 2"), ["line 3:", "3 x 4", "square"]),
-    ("g.mtx", mtx().replace("3 3 2", "3 3"), ["line 3:", "sizes"]),
-    ("g.mtx", mtx().replace("3 3 2", "999999999 999999999 2"), ["line 3:", "more than"]),
+    ("g.mtx", mtx().replace("3 3 2", "3 4 2"), ["(3, 4)", "square"]),
+    ("g.mtx", mtx().replace("3 3 2", "3 3"), ["2 entries"]),
+    ("g.mtx", mtx().replace("3 3 2", "many"), ["Matrix Market"]),
+    ("g.mtx", mtx().replace("3 3 2", "999999999 999999999 2"), ["more than"]),
     ("g.mtx", mtx().replace("3 3 2", "3 3 9"), ["2 entries", "9"]),
-    ("g.mtx", mtx(weight="nan"), ["line 4:", '"nan"', "edge 1 -> 2"]),
-    ("g.mtx", mtx(weight="0"), ["line 4:", "weight 0 of edge 1 -> 2"]),
-    ("g.mtx", mtx(weight=""), ["line 4:", "2 fields"]),
-    ("g.mtx", mtx().replace("2 1 ", "2 4 "), ["line 4:", "(2, 4)", "outside"]),
-    ("g.mtx", mtx().replace("2 1 ", "2 0 "), ["line 4:", "(2, 0)", "outside"]),
-    ("g.mtx", mtx().replace("2 1 ", "2 2 "), ["line 4:", "self-loop"]),
-    ("g.mtx", mtx().replace("2 1 ", "3 2 "), ["line 5:", "second row", "line 4"]),
-    ("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0\n1\nx\n0\n", ["line 5:", '"x"', "edge 2 -> 1"]),
+    ("g.mtx", mtx(weight="nan"), ["row 2, column 1:", '"nan"', "edge 1 -> 2"]),
+    ("g.mtx", mtx(weight="0"), ["row 2, column 1:", "weight 0 of edge 1 -> 2"]),
+    ("g.mtx", mtx(weight=""), ["Matrix Market", "3 columns"]),
+    ("g.mtx", mtx(weight="1 7"), ["Matrix Market", "3 columns"]),
+    ("g.mtx", mtx(weight="1/3"), ["Matrix Market", "1/3"]),
+    ("g.mtx", mtx(weight="1,5"), ["Matrix Market", "1,5"]),
+    ("g.mtx", mtx(weight="strong"), ["Matrix Market", "strong"]),
+    ("g.mtx", mtx("integer"), ["Matrix Market", "0.1"]),
+    ("g.mtx", mtx().replace("2 1 ", "2 4 "), ["Matrix Market", "outside the 3 x 3 matrix"]),
+    ("g.mtx", mtx().replace("2 1 ", "2 0 "), ["Matrix Market", "outside the 3 x 3 matrix"]),
+    ("g.mtx", mtx().replace("2 1 ", "2 2 "), ["row 2, column 2:", "self-loop at node 2"]),
+    ("g.mtx", mtx().replace("2 1 ", "3 2 "), ["row 3, column 2:", "second row"]),
+    ("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0\n1\nx\n0\n", ["Matrix Market", "'x'"]),
     ("g.mtx", "%%MatrixMarket matrix array real general\n2 2\n0\n1\n1\n", ["3 entries"]),
+    ("g.mtx", "%%MatrixMarket matrix array real general\n2000000 2000000\n0\n1\n1\n", ["3 entries"]),
     ("g.npy", b"", ["NumPy"]),
     ("g.npy", npy(MATRIX)[:-1], ["NumPy"]),
     ("g.npy", npy(np.array([[0, Fraction(1)], [1, 0]], dtype=object)), ["NumPy"]),
-    ("g.npy", npy(MATRIX[:2]), ["2 x 3", "square"]),
+    ("g.npy", npy(MATRIX[:2]), ["(2, 3)", "square"]),
     ("g.npy", npy(MATRIX[0]), ["square"]),
     ("g.npy", npy(np.float64(3)), ["square"]),
     ("g.npy", npy(MATRIX != 0), ["bool"]),
@@ -740,19 +857,22 @@ BAD_FILES = [
     ("g.npz", npz(a=MATRIX, b=MATRIX), ["several square matrices", "a, b"]),
     ("g.npz", npz(a=MATRIX[0], b=np.array("x")), ["no square numeric matrix", "a, b"]),
     ("g.npz", npz(a=MATRIX, labels=np.array(["a", "b"])), ["labels", "3"]),
-    ("g.npz", npz(a=MATRIX, labels=np.array(["a", "b", "a"])), ["same label"]),
+    ("g.npz", npz(a=MATRIX, labels=np.array(["a", "b", "a"])), ["two nodes have the label"]),
     ("g.npz", npz(a=np.array([[0, Fraction(1)], [1, 0]], dtype=object)), ["npz"]),
     ("g.npz", sparse_npz(indices=np.array([2, 0, 7])), ["npz"]),
     ("g.npz", sparse_npz(indptr=np.array([0, 10**6, 2, 3])), ["npz"]),
     ("g.npz", sparse_npz(shape=np.array([10**12, 10**12])), ["npz"]),
-    ("g.npz", sparse_npz(format=np.array(b"nonsense")), ["npz"]),
+    ("g.npz", sparse_npz(shape=np.array([-3, -3])), ["npz"]),
+    ("g.npz", sparse_npz(format=np.array(b"bsr")), ["layout bsr", "tocsr"]),
+    ("g.npz", sparse_npz(indptr=np.array([0, 1, 3, -1])), ["npz", "inconsistent"]),
+    ("g.npz", sparse_npz(data=np.array([2.5, -1, 0])), ["row 3, column 2:", "weight 0 of edge 2 -> 3"]),
     ("g.mat", b"", ["MATLAB"]),
     ("g.mat", b"MATLAB 7.3 MAT-file" + bytes(600), ["7.3", "-v7"]),
     ("g.mat", mat(W=MATRIX)[:-20], ["MATLAB"]),
     ("g.mat", mat(W=MATRIX, A=MATRIX), ["several square matrices", "W, A"]),
     ("g.mat", mat(x=[1.0, 2.0], s="text"), ["no square numeric matrix", "x, s"]),
-    ("g.mat", mat(W=MATRIX * 1j), ["complex"]),
-    ("g.mat", mat(W=sparse.csc_array(MATRIX * 1j)), ["complex"]),
+    ("g.mat", mat(W=MATRIX * 1j), ["no square numeric matrix", "W"]),
+    ("g.mat", mat(W=sparse.csc_array(MATRIX * 1j)), ["no square numeric matrix"]),
     ("g.mat", mat(W=MATRIX != 0), ["no square numeric matrix", "W"]),
     ("g.mat", mat4(W=MATRIX), ["MATLAB 5", "-v7"]),
     ("g.mat", mat(W=MATRIX * math.nan), ["weight nan"]),
@@ -781,7 +901,7 @@ def test_a_refusal_is_a_graph_error_and_a_value_error():
 
 def test_what_merging_cannot_mend_is_refused(put):
     path = put("g.csv", "a,b,1\na,c,1\na,b,-1\n")
-    with pytest.raises(FormatError, match="line 1: the rows of edge a -> b add up to 0"):
+    with pytest.raises(FormatError, match="line 1: sum 0 of the weights of edge a -> b"):
         read_graph(path, duplicates="sum")
     with pytest.raises(FormatError, match="line 2: weight 0 of edge a -> b"):
         text("a,b,1\na,b,0\n", duplicates="last")
@@ -796,7 +916,7 @@ def test_a_missing_file_a_folder_and_a_closed_file_are_refused(tmp_path, put):
         read_graph(tmp_path)
     with pytest.raises(FormatError, match="cannot be read"):
         read_graph("a\0b")
-    with pytest.raises(FormatError, match="neither a path nor a file"):
+    with pytest.raises(FormatError, match="cannot be read"):
         read_graph(5)  # type: ignore[arg-type]
     file = put("g.csv", "a,b,1\n").open()
     file.close()
@@ -826,8 +946,8 @@ def test_permission_errors_are_one_line(put, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"orientation": "sideways"}, "information or listens"),
-        ({"duplicates": "first"}, "refuse, sum or last"),
+        ({"orientation": "sideways"}, "information, listens"),
+        ({"duplicates": "first"}, "refuse, sum, last"),
         ({"format": "xlsx"}, "csv"),
     ],
 )
@@ -855,13 +975,13 @@ def test_a_matrix_takes_no_orientation(put, name, orientation):
     ],
 )
 def test_a_file_that_unpacks_to_too_much_is_refused(put, monkeypatch, name, content):
-    monkeypatch.setattr(reader, "MAX_BYTES", 15_000)
+    monkeypatch.setattr(files, "MAX_BYTES", 15_000)
     with pytest.raises(FormatError, match="more than 15000 bytes"):
         read_graph(put(name, content))
 
 
 def test_binary_formats_are_not_read_from_text():
-    with pytest.raises(FormatError, match="binary"):
+    with pytest.raises(FormatError, match="not a NumPy array file"):
         text("a", format="npy")
 
 
@@ -945,11 +1065,11 @@ def test_a_start_from_a_file(put, content):
 
 
 def test_odd_labels_in_a_start(put):
-    graph = SignedDigraph.from_edges([("a,b", "x=y", 1), ("a,b", "two\nlines", 1), ("a,b", " c", 1)])
-    assert graph.labels == ("a,b", "x=y", "two\nlines", " c")
-    expected = [Fraction(i) for i in range(1, 5)]
-    assert read_state('"a,b=1",x=y=2,"two\nlines=3"," c=4"', graph) == expected
-    assert read_state(put("x0.csv", '"two\nlines",3\nx=y,2\n" c",4\n"a,b",1\n'), graph) == expected
+    graph = SignedDigraph.from_edges([("a,b", "x=y", 1), ("a,b", "two\nlines", 1)])
+    assert graph.labels == ("a,b", "x=y", "two\nlines")
+    expected = [Fraction(i) for i in range(1, 4)]
+    assert read_state('"a,b=1",x=y=2,"two\nlines=3"', graph) == expected
+    assert read_state(put("x0.csv", '"two\nlines",3\nx=y,2\n"a,b",1\n'), graph) == expected
 
 
 @pytest.mark.parametrize(
@@ -958,19 +1078,19 @@ def test_odd_labels_in_a_start(put):
         ("5,2", ["2 values for 3 nodes", "a, b, c"]),
         ("5", ["1 value for 3 nodes"]),
         ("5,2,1,0", ["4 values"]),
-        ("", ["neither a number nor a file"]),
-        ("x0.csv", ['"x0.csv"', "neither a number nor a file"]),
+        ("", ["no such file", "1 value for 3 nodes"]),
+        ("x0.csv", ['"x0.csv"', "no such file"]),
         ("5,,1", ["value of node b"]),
         ("5,nan,1", ["node b", '"nan" is not a finite number']),
         ("5,1,inf", ["node c", "not a finite number"]),
         ("5,1,1/0", ["node c", "divides by zero"]),
         ("5,1,1e999", ["node c", "exponent"]),
         ("5,1,x", ["node c", '"x" is not a number']),
-        ("a=1,b=2", ["node c has no value"]),
-        ("a=1", ["node b has no value", "2 nodes have none: b, c"]),
-        ("a=1,b=2,c=3,d=4", ["node d is not in the graph", "a, b, c"]),
+        ("a=1,b=2", ["1 of 3 nodes have no value: c"]),
+        ("a=1", ["2 of 3 nodes have no value: b, c"]),
+        ("a=1,b=2,c=3,d=4", ['node "d" is not in the graph', "a, b, c"]),
         ("a=1,b=2,c=3,a=1", ["node a has two values"]),
-        ("a=1,b=2,3", ['"3" has no node']),
+        ("a=1,b=2,3", ['node "" is not in the graph']),
         ("a=1,b=,c=3", ["node b"]),
         ('a=1,"b=2,c=3', ["quote"]),
     ],
@@ -987,9 +1107,9 @@ def test_a_wrong_start_is_refused(content, words):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", ["node a has no value", "3 nodes"]),
-        ("a,1\nb,2\n", ["node c has no value"]),
-        ("a,1\n\nb,2\nc,3\nd,4\n", ["line 5:", "node d is not in the graph"]),
+        ("", ["3 of 3 nodes have no value: a, b, c"]),
+        ("a,1\nb,2\n", ["1 of 3 nodes have no value: c"]),
+        ("a,1\n\nb,2\nc,3\nd,4\n", ["line 5:", 'node "d" is not in the graph']),
         ("node,value\na,1\na,2\n", ["line 3:", "two values"]),
         ("a,1\nb,nan\n", ["line 2:", "node b", "not a finite number"]),
         ("a,1\nb\n", ["line 2:", "node,value"]),
@@ -1014,7 +1134,7 @@ def test_a_missing_start_file_is_refused(tmp_path):
         read_state(tmp_path / "x0.csv", GRAPH)
 
 
-@given(graphs(), st.data())
+@given(graphs(odd_text.map(plain)), st.data())
 @settings(max_examples=80)
 def test_a_start_is_read_exactly_from_a_file_of_quoted_labels(tmp_path_factory, graph, data):
     values = [Fraction(data.draw(weight)) for _ in graph.labels]
@@ -1070,7 +1190,7 @@ def test_an_interrupt_leaves_nothing(tmp_path, monkeypatch):
         ("missing/a.txt", "x", "folder does not exist"),
         ("a\0b", "x", "cannot be written"),
         ("n" * 5000, "x", "cannot be written"),
-        ("a.txt", "\ud800", "UTF-8"),
+        ("a.txt", "\ud800", "cannot be written"),
     ],
 )
 def test_where_nothing_can_be_written(tmp_path, name, data, reason):

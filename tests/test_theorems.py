@@ -10,6 +10,7 @@ import pytest
 from generators import Made, all_classes, made_graphs, random_graph
 from hypothesis import given
 from hypothesis import strategies as st
+from test_latex import read, rows_of
 
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import laplacian_spectrum
@@ -148,6 +149,24 @@ def test_the_derivative_is_the_form_of_the_proof(name: str, kwargs: dict):
         if z is not None:
             assert value == pytest.approx(w @ z**2, rel=1e-12)
         assert np.array(ca.Function("E", [symbolic.x], [symbolic.E])(x)).ravel() == pytest.approx(E)
+
+
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
+def test_the_latex_of_a_row_has_the_values_of_its_expressions(name: str):
+    rng = np.random.default_rng(3)
+    structure = analyse(random_graph(rng, **dict(all_classes())[name]).graph)
+    V = theorem_for(structure).lyapunov(structure)
+    form = symbolic_lyapunov(structure, V, PROTOCOL)
+    state, instant = rng.normal(size=structure.graph.n_nodes), 0.25
+    values = {f"x{k + 1}": v for k, v in enumerate(state)}
+    rows = rows_of(form.latex())
+    e = {f"e{k + 1}": read(rows[f"e_{{{k + 1}}}"], **values) for k in V.nodes}
+    evaluate = ca.Function("f", [form.t, form.x], [form.z, form.V, form.V_dot])
+    z, value, derivative = (np.array(y).ravel() for y in evaluate(instant, state))
+    assert list(e.values()) == pytest.approx(z)
+    assert read(rows["V"], **e) == pytest.approx(float(value[0]))
+    gain = read(rows["g"], t=instant)
+    assert read(rows[r"\dot V"], g=gain, **e) == pytest.approx(float(derivative[0]))
 
 
 def certified_rate(graph: SignedDigraph) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import lmi
+from ptcc_certify.lemmas import unbalanced_diagonal
 from ptcc_certify.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     LyapunovBlock,
@@ -37,7 +38,10 @@ class DiagonalComposite(Theorem):
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """All blocks and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
         L, F = dense_laplacian(structure.graph), structure.followers
-        omega = lmi.diagonal_lyapunov(L).omega
+        try:
+            omega = lmi.diagonal_lyapunov(L).omega
+        except lmi.NoCertificate:
+            omega = self._block_by_block(structure, L)
         leaders = tuple(
             LyapunovBlock(self.leader_letter + suffix, component.nodes, rounded(omega[list(component.nodes)]))
             for suffix, component in self._suffixes(structure)
@@ -51,6 +55,15 @@ class DiagonalComposite(Theorem):
         coupling = self._coupling(L, (*leaders, followers))
         rho = rounded(np.array([coupling.best_rho()]))[0]
         return LyapunovFunction(self.number, objective, "E", (*leaders, followers), rho, coupling.interval())
+
+    def _block_by_block(self, structure: Structure, L: np.ndarray) -> np.ndarray:
+        """Find each block by itself, for when the best joint rate lies below what the solver resolves."""
+        omega, F = np.ones(len(L)), structure.followers
+        for component in structure.closed_components:
+            omega[list(component.nodes)] = unbalanced_diagonal(structure.graph.subgraph(component.nodes))
+        if F.size:
+            omega[F] = lmi.h_matrix_lyapunov(float_block(L, F, F)).omega
+        return omega
 
     def _suffixes(self, structure: Structure) -> list[tuple[str, ClosedComponent]]:
         if len(structure.closed_components) == 1:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-import lmi
+from ptcc_certify.lemmas import unbalanced_diagonal
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import (
     KEPT,
@@ -47,10 +49,14 @@ class BalancedStrong(Theorem):
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """``2 a(L) P``."""
+        if not V.blocks:
+            return np.zeros((0, 0))
         return self.rate(structure, V) * np.diag(floats(V.weights))
 
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:
-        """``2 a(L)``, the second-smallest generalized eigenvalue of ``(PL + L'P, P)``."""
+        """``2 a(L)``, the second-smallest generalized eigenvalue of ``(PL + L'P, P)``; infinite for one node."""
+        if not V.blocks:
+            return math.inf
         return connectivity_rate(structure.graph, V.weights)
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
@@ -83,9 +89,9 @@ class UnbalancedStrong(Theorem):
         }
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
-        """``Omega`` of Lemma 3.2, the one with the largest rate."""
-        found = lmi.diagonal_lyapunov(structure.graph.laplacian())
-        block = LyapunovBlock("Omega", tuple(range(structure.graph.n_nodes)), rounded(found.omega))
+        """``Omega`` of Lemma 3.2, the one with the largest rate that the solver resolves."""
+        nodes, omega = tuple(range(structure.graph.n_nodes)), unbalanced_diagonal(structure.graph)
+        block = LyapunovBlock("Omega", nodes, rounded(omega))
         return LyapunovFunction(self.number, "lmin(Omega L + L' Omega) / lmax(Omega)", "E", (block,))
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:

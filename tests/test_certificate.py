@@ -1,0 +1,895 @@
+"""Certificates: what they hold, and that the JSON alone is enough to prove their claim anew, by other means."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from functools import cache, cached_property
+from itertools import pairwise
+from math import lcm
+from pathlib import Path
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+from balls import BITS, ball, clock, states
+from generators import Made, all_classes, made_graphs, random_graph
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ptcc_certify.certificate import (
+    SEARCH_NODES,
+    Certificate,
+    certify,
+    exact_or_ball,
+    read_certificate,
+    structure_json,
+)
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.examples import GRAPHS, load_graph, select
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import read_graph
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.rationals import parse_exact
+from ptcc_certify.structure import analyse
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+CLASSES = all_classes()
+Rows = list[list[Fraction]]
+
+# ---------------------------------------------------------------------- proving a certificate anew
+
+
+def number(text: object) -> Fraction:
+    assert isinstance(text, str) and re.fullmatch(r"-?[0-9]+(/[1-9][0-9]*)?", text), text
+    return Fraction(text)
+
+
+def positive_definite(S: Rows) -> bool:
+    """A symmetric matrix is positive definite iff the signs of its characteristic polynomial strictly alternate."""
+    n = len(S)
+    assert all(S[i][j] == S[j][i] for i in range(n) for j in range(n))
+    scale = lcm(*(x.denominator for row in S for x in row))
+    integers = [[x.numerator * (scale // x.denominator) for x in row] for row in S]
+    coefficients = flint.fmpz_mat(n, n, [x for row in integers for x in row]).charpoly().coeffs() if n else [1]
+    return all(c * (-1) ** (n - k) > 0 for k, c in enumerate(coefficients))
+
+
+def product(A: Rows, B: Rows) -> Rows:
+    columns = list(zip(*B, strict=True))
+    return [[sum((a * b for a, b in zip(row, c, strict=True) if a and b), Fraction(0)) for c in columns] for row in A]
+
+
+def transposed(A: Rows) -> Rows:
+    return [list(column) for column in zip(*A, strict=True)]
+
+
+def part(A: Rows, rows: list[int], columns: list[int]) -> Rows:
+    return [[A[i][j] for j in columns] for i in rows]
+
+
+def diagonal(values: list[Fraction]) -> Rows:
+    return [[v if i == j else Fraction(0) for j in range(len(values))] for i, v in enumerate(values)]
+
+
+def combined(A: Rows, B: Rows, factor: Fraction) -> Rows:
+    return [[a + factor * b for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
+
+
+def lyapunov(weights: list[Fraction], A: Rows) -> Rows:
+    """``Omega A + A' Omega``."""
+    WA = [[w * a for a in row] for w, row in zip(weights, A, strict=True)]
+    return combined(WA, transposed(WA), Fraction(1))
+
+
+class Recheck:
+    """Everything that a certificate claims, from its JSON alone: structure by reachability, definiteness by
+    characteristic polynomials, nothing of the package."""
+
+    def __init__(self, data: dict[str, Any]):
+        self.data = data
+        self.nodes: list[str] = data["graph"]["nodes"]
+        self.index = {label: k for k, label in enumerate(self.nodes)}
+        n = self.n = len(self.nodes)
+        self.W = [[Fraction(0)] * n for _ in range(n)]
+        for source, target, weight in data["graph"]["edges"]:
+            assert self.W[self.index[target]][self.index[source]] == 0
+            self.W[self.index[target]][self.index[source]] = number(weight)
+        degree = [sum((abs(w) for w in row), Fraction(0)) for row in self.W]
+        self.L = [[degree[i] if i == j else -self.W[i][j] for j in range(n)] for i in range(n)]
+
+    def numbers(self, labels: list[str]) -> list[int]:
+        return [self.index[label] for label in labels]
+
+    # ------------------------------------------------------------------ structure
+
+    @cached_property
+    def reached(self) -> list[int]:
+        """Bit j of entry i: information flows from i to j along some path (Warshall)."""
+        masks = [1 << i for i in range(self.n)]
+        for i in range(self.n):
+            for j in range(self.n):
+                if self.W[j][i]:
+                    masks[i] |= 1 << j
+        for k in range(self.n):
+            for i in range(self.n):
+                if masks[i] >> k & 1:
+                    masks[i] |= masks[k]
+        return masks
+
+    @cached_property
+    def closed(self) -> list[list[int]]:
+        """The closed strong components: every node that reaches them is reached by them."""
+        groups = []
+        for i in range(self.n):
+            heard = [j for j in range(self.n) if self.reached[j] >> i & 1]
+            if all(self.reached[i] >> j & 1 for j in heard) and heard[0] == i:
+                groups.append(heard)
+        return groups
+
+    @cached_property
+    def followers(self) -> list[int]:
+        leaders = {v for group in self.closed for v in group}
+        return [v for v in range(self.n) if v not in leaders]
+
+    def components(self) -> list[list[int]]:
+        groups: list[set[int]] = []
+        for i in range(self.n):
+            own = {j for j in range(self.n) if self.W[i][j] or self.W[j][i]} | {i}
+            groups = [g for g in groups if not g & own] + [own.union(*(g for g in groups if g & own))]
+        return sorted(sorted(g) for g in groups)
+
+    def camps(self, nodes: list[int]) -> dict[int, int] | None:
+        """Camps of some nodes by spreading signs along edges; None if an edge contradicts them."""
+        camp: dict[int, int] = {}
+        for root in nodes:
+            todo = [] if root in camp else [root]
+            camp.setdefault(root, 1)
+            while todo:
+                i = todo.pop()
+                for j in nodes:
+                    w = self.W[i][j] or self.W[j][i]
+                    if w and j not in camp:
+                        camp[j] = camp[i] * (1 if w > 0 else -1)
+                        todo.append(j)
+        return camp if all(self.W[i][j] * camp[i] * camp[j] >= 0 for i in nodes for j in nodes) else None
+
+    def kind(self, nodes: list[int]) -> tuple[str, str, str]:
+        """Connectivity, theorem and behaviour of a weakly connected set of nodes, by the table of theorems."""
+        closed = [group for group in self.closed if set(group) <= set(nodes)]
+        row = 1 if closed == [nodes] else 2 if len(closed) == 1 else 3
+        balanced = any(self.camps(group) is not None for group in closed)
+        behaviour = ["bipartite consensus", "interval bipartite consensus", "bipartite containment"][row - 1]
+        return (
+            ["strong", "quasi-strong", "weak"][row - 1],
+            f"{row}.{1 if balanced else 2}",
+            behaviour if balanced else "stability",
+        )
+
+    def structure(self) -> None:
+        said = self.data["structure"]
+        groups = self.components()
+        assert said["connectivity"] == (self.kind(groups[0])[0] if len(groups) == 1 else "disconnected")
+        assert [self.numbers(c["nodes"]) for c in said["closed_components"]] == self.closed
+        assert self.numbers(said["leaders"]) == [v for group in self.closed for v in group]
+        assert self.numbers(said["followers"]) == self.followers
+        assert said["balanced"] == (self.camps(list(range(self.n))) is not None)
+        pairs = [(i, j) for i in range(self.n) for j in range(i)]
+        assert said["sign_symmetric"] == all(self.W[i][j] * self.W[j][i] >= 0 for i, j in pairs)
+        for entry, group in zip(said["closed_components"], self.closed, strict=True):
+            assert entry["balanced"] == (self.camps(group) is not None)
+            if entry["balanced"]:
+                assert set(entry) == {"nodes", "balanced", "gauge"}
+                g = dict(zip(group, entry["gauge"], strict=True))
+                assert set(g.values()) <= {1, -1}
+                assert all(self.W[i][j] * g[i] * g[j] >= 0 for i in group for j in group)
+            else:
+                assert set(entry) == {"nodes", "balanced", "negative_cycle"}
+                self.negative_cycle(entry["negative_cycle"], group)
+        if len(groups) == 1:
+            _, theorem, behaviour = self.kind(groups[0])
+            assert (self.data["claim"]["theorem"], self.data["claim"]["behaviour"]) == (theorem, behaviour)
+            assert "components" not in self.data
+        else:
+            assert self.data["claim"] is None
+            assert [self.numbers(c["nodes"]) for c in self.data["components"]] == groups
+            for entry, group in zip(self.data["components"], groups, strict=True):
+                claim = entry["claim"]
+                assert (entry["connectivity"], claim["theorem"], claim["behaviour"]) == self.kind(group)
+
+    def negative_cycle(self, steps: list[list[str]], group: list[int]) -> None:
+        """A closed walk along edges, either way, whose signs multiply to -1."""
+        edges = [tuple(self.numbers(step)) for step in steps]
+        assert all(self.W[t][s] and {s, t} <= set(group) for s, t in edges)
+        assert np.prod([1 if self.W[t][s] > 0 else -1 for s, t in edges]) == -1
+
+        def closes(at: int, k: int, home: int) -> bool:
+            if k == len(edges):
+                return at == home
+            s, t = edges[k]
+            return (at == s and closes(t, k + 1, home)) or (at == t and closes(s, k + 1, home))
+
+        assert any(closes(home, 0, home) for home in edges[0])
+
+    # ------------------------------------------------------------------ the rate
+
+    @cached_property
+    def blocks(self) -> list[tuple[list[int], list[Fraction], bool]]:
+        """Nodes and weights of each block without rho, and whether rho multiplies them."""
+        blocks = [
+            (self.numbers(b["nodes"]), [number(w) for w in b["diagonal"]], b["times_rho"])
+            for b in self.data["paper"]["blocks"]
+        ]
+        assert all(w > 0 for _, diagonal, _ in blocks for w in diagonal)
+        return blocks
+
+    @cached_property
+    def rho(self) -> Fraction:
+        rho = self.data["paper"]["rho"]
+        assert (rho is not None) == any(times_rho for _, _, times_rho in self.blocks)
+        return Fraction(1) if rho is None else number(rho)
+
+    @cached_property
+    def weights(self) -> dict[int, Fraction]:
+        return {
+            v: w * (self.rho if times_rho else 1)
+            for nodes, diagonal, times_rho in self.blocks
+            for v, w in zip(nodes, diagonal, strict=True)
+        }
+
+    def proves(self, rate: Fraction) -> bool:
+        """Tell whether the inequality of the theorem's row holds strictly for ``rate``."""
+        theorem, nodes = self.data["paper"]["theorem"], list(self.weights)
+        top = max(self.weights.values())
+        if theorem == "1.1":
+            return self.deviation_decays(rate)
+        for v in set(range(self.n)) - set(nodes):
+            assert not any(self.L[v]), "an agent that listens has a coordinate"
+        if theorem in ("1.2", "2.2", "3.2") or [block[0] for block in self.blocks] == [self.followers]:
+            S = lyapunov(list(self.weights.values()), part(self.L, nodes, nodes))
+        else:
+            S = self.coupled(theorem)
+        return positive_definite(combined(S, diagonal([top] * len(nodes)), -rate))
+
+    def deviation_decays(self, rate: Fraction) -> bool:
+        """``Z L + L'Z - rate Z > 0`` modulo G1, where ``Z = G (P - pp'/p'1) G`` is the form of ``eps'P eps``."""
+        p, camp = [self.weights[v] for v in range(self.n)], self.camps(list(range(self.n)))
+        assert camp is not None
+        Z = [
+            [camp[i] * camp[j] * ((p[i] if i == j else 0) - p[i] * p[j] / sum(p)) for j in range(self.n)]
+            for i in range(self.n)
+        ]
+        ZL = product(Z, self.L)
+        S = combined(combined(ZL, transposed(ZL), Fraction(1)), Z, -rate)
+        return positive_definite(part(S, *[list(range(self.n - 1))] * 2))
+
+    def coupled(self, theorem: str) -> Rows:
+        """``Phi`` of 2.1 or ``Pi`` of 3.1; the decrease of each leader block is proved first."""
+        gamma: list[Fraction] = []
+        leaders = [(nodes, weights) for nodes, weights, times_rho in self.blocks if not times_rho]
+        for (nodes, weights), step in zip(leaders, self.data["proof"], strict=False):
+            assert nodes in self.closed
+            A = part(self.L, nodes, nodes)
+            S = lyapunov(weights, A)
+            if self.camps(nodes) is not None:  # on the range of L_k, whose kernel is G_k 1
+                b = number(step["numbers"]["b"])
+                assert b > 0
+                S = combined(S, diagonal(weights), -b)
+                S = product(transposed(A), product(S, A))
+                assert positive_definite(part(S, *[list(range(len(nodes) - 1))] * 2))
+                gamma += [b * w for w in weights] if theorem == "2.1" else [b * min(weights)] * len(nodes)
+            else:
+                m = number(step["numbers"]["m"])
+                assert m > 0 and positive_definite(combined(S, diagonal([Fraction(1)] * len(nodes)), -m))
+                gamma += [m] * len(nodes)
+        K = [v for nodes, _ in leaders for v in nodes]
+        F = [v for v in self.weights if v not in K]
+        S_F = lyapunov([self.weights[v] for v in F], part(self.L, F, F))
+        C = [[self.weights[v] * x for x in row] for v, row in zip(F, part(self.L, F, K), strict=True)]
+        top = [[*row, *(line[i] for line in C)] for i, row in enumerate(diagonal(gamma))]
+        return top + [[*line, *S_F[i]] for i, line in enumerate(C)]
+
+    def decreases(self, rate: Fraction) -> bool:
+        """Tell whether ``V' <= -rate V`` for every state, whatever the theorem's way to it.
+
+        ``V = E'Omega E`` with ``E = -LX``: ``L'(Omega L + L'Omega - rate Omega)L`` must be positive definite modulo the
+        kernel of ``L``; one node of each balanced closed component is left out.
+        """
+        if self.data["paper"]["theorem"] == "1.1":
+            return self.deviation_decays(rate)
+        weights = [self.weights.get(v, Fraction(0)) for v in range(self.n)]
+        S = combined(lyapunov(weights, self.L), diagonal(weights), -rate)
+        kept = [v for v in range(self.n) if v not in {g[0] for g in self.closed if self.camps(g) is not None}]
+        return positive_definite(part(product(transposed(self.L), product(S, self.L)), kept, kept))
+
+    def rates(self) -> None:
+        data = self.data
+        paper, members = data["paper"], data["lyapunov"]["members"]
+        if not paper["blocks"]:
+            assert not any(any(row) for row in self.L)  # nobody listens, nothing moves
+            assert paper["rate"] is None and data["rates"] == dict.fromkeys(("paper", "diagonal", "certified"))
+            assert members == [] and data["prefactor"] is None
+            return
+        rate = number(paper["rate"])
+        assert rate > 0
+        assert self.proves(rate)
+        assert self.decreases(rate)
+        assert data["rates"] == {"paper": paper["rate"], "diagonal": None, "certified": paper["rate"]}
+        prefactor = max(self.weights.values()) / min(self.weights.values())
+        assert number(paper["prefactor"]) == number(data["prefactor"]["value"]) == prefactor
+        assert data["prefactor"]["of"] == f"||{paper['coordinates']}||^2"
+        shared = {k: paper[k] for k in ("coordinates", "blocks", "rho", "rate", "prefactor")}
+        assert members == [{"class": "paper", **shared}]
+        interval = paper["rho_interval"]
+        if interval is not None and interval["exact"] is not None:
+            assert 0 < number(interval["printed"]) <= number(interval["exact"])
+            assert self.rho <= number(interval["exact"])
+
+    # ------------------------------------------------------------------ the outcome
+
+    def outcome(self) -> None:
+        """``L x = 0`` and ``eta' G (x - x0) = 0``: together they determine the limit."""
+        said = self.data["outcome"]
+        x = self.state(said["final_state"])
+        x0 = self.state(self.data["initial_state"])
+        assert not any(sum((a * v for a, v in zip(row, x, strict=True) if a), Fraction(0)) for row in self.L)
+        balanced = [group for group in self.closed if self.camps(group) is not None]
+        voices = said["influence"]["components"]
+        assert [self.numbers(c["nodes"]) for c in voices] == balanced
+        degenerate = []
+        for group, entry in zip(balanced, voices, strict=True):
+            camp = self.camps(group)
+            assert camp is not None
+            voice = [number(v) for v in entry["voices"]]
+            eta = [camp[v] * w * camp[group[0]] for v, w in zip(group, voice, strict=True)]
+            eta = eta if eta[0] > 0 else [-w for w in eta]
+            assert min(eta) > 0 and sum(eta) == 1
+            for j in group:  # eta' M(L_k) = 0
+                M = [abs(self.L[i][j]) * (1 if i == j else -1) for i in group]
+                assert sum(a * b for a, b in zip(eta, M, strict=True)) == 0
+            assert sum(w * (x[v] - x0[v]) for v, w in zip(group, voice, strict=True)) == 0
+            if all(x[v] == 0 for v in group):
+                degenerate.append(self.closed.index(group) + 1)
+        assert said["degenerate"] == degenerate
+        assert all(x[v] == 0 for group in self.closed if group not in balanced for v in group)
+        self.pulls(said["influence"], balanced)
+        for entry in self.data.get("components", []):
+            assert entry["outcome"] == {label: said["final_state"][label] for label in entry["nodes"]}
+
+    def pulls(self, influence: dict[str, Any], balanced: list[list[int]]) -> None:
+        """Each column of the followers' weights extends ``G_k 1`` to a vector of the kernel of ``L``."""
+        assert self.numbers(list(influence["followers"])) == self.followers
+        for k, entry in enumerate(self.data["structure"]["closed_components"]):
+            if not entry["balanced"]:
+                continue
+            column = balanced.index(self.closed[k])
+            state = [Fraction(0)] * self.n
+            for v, sign in zip(self.closed[k], entry["gauge"], strict=True):
+                state[v] = Fraction(sign)
+            for label, pull in influence["followers"].items():
+                state[self.index[label]] = number(pull[column])
+                assert sum(abs(number(w)) for w in pull) <= 1
+            assert not any(sum((a * v for a, v in zip(row, state, strict=True) if a), Fraction(0)) for row in self.L)
+
+    def state(self, values: dict[str, str]) -> list[Fraction]:
+        assert list(values) == self.nodes
+        return [number(text) for text in values.values()]
+
+    def everything(self) -> None:
+        assert self.data["verdict"] == "certified"
+        self.structure()
+        self.rates()
+        self.outcome()
+
+
+# ---------------------------------------------------------------------- certificates to judge
+
+
+def random_start(n: int, seed: int) -> list[Fraction]:
+    return [Fraction(int(v), 100) for v in np.random.default_rng(seed).integers(-1000, 1001, n)]
+
+
+def through_json(certificate: Certificate) -> dict[str, Any]:
+    return json.loads(certificate.to_json())
+
+
+@cache
+def example(name: str) -> Certificate:
+    (run,) = select(name)
+    protocol = NominalProtocol(run[0].T, run[0].rho1, run[0].rho2, run[0].kappa)
+    return certify(load_graph(name), protocol, run[0].x0.split(","))
+
+
+@cache
+def of_class(name: str, seed: int = 3) -> dict[str, Any]:
+    weights = "small ints" if seed % 2 else "decimals"
+    made = random_graph(np.random.default_rng(seed), **{"weights": weights, **dict(CLASSES)[name]})
+    return through_json(certify(made.graph, PROTOCOL, random_start(made.graph.n_nodes, seed), simulation=False))
+
+
+# ---------------------------------------------------------------------- the paper's examples
+
+
+@pytest.fixture
+def precision() -> Iterator[None]:
+    before, flint.ctx.prec = flint.ctx.prec, BITS
+    yield
+    flint.ctx.prec = before
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_the_examples_behave_as_the_paper_reports(name: str):
+    ((_, _, reported),) = select(name)
+    cert = example(name)
+    assert cert.claim is not None and cert.comparison is not None
+    assert cert.claim.behaviour == reported
+    assert cert.claim.theorem == cert.theorem.number
+    assert cert.theorem.number == dict(zip(GRAPHS, ("1.2", "1.1", "2.1", "2.2", "3.1", "3.2"), strict=True))[name]
+    assert cert.verdict == "certified"
+    assert cert.notes == ()
+    assert 0 < cert.comparison.worst_ratio <= 1 + 1e-6
+    assert cert.tightness is not None and 0 < cert.tightness <= 1
+    assert cert.outcome is not None and cert.outcome.exact and cert.outcome.degenerate == ()
+    Recheck(through_json(cert)).everything()
+
+
+@pytest.mark.usefixtures("precision")
+@pytest.mark.parametrize("name", GRAPHS)
+def test_at_the_last_instant_the_run_lacks_what_the_exact_clock_leaves(name: str):
+    """x - Qx0 at 1 - t/T = 1e-8 is exp(-L s) x0 - Q x0, to the integrator's accuracy."""
+    cert = example(name)
+    run, outcome, start = cert.trajectory, cert.outcome, cert.start
+    assert run is not None and outcome is not None and start is not None
+    last = int(np.flatnonzero(run.remaining > 0)[-1])
+    assert run.remaining[last] == pytest.approx(1e-8)
+    exact = states(cert.graph, clock(cert.protocol, Fraction(float(run.remaining[last]))), start)
+    left = np.array([float(x - ball(Fraction(y))) for x, y in zip(exact, outcome.final_state, strict=True)])
+    size = float(max(map(abs, start)))
+    assert np.abs(run.states[:, last] - outcome.values - left).max() <= 1e-9 * size
+    if name == "fig5b":  # rho2 kappa min Re lambda = 0.78: far from settled, and seen to be
+        assert np.abs(left).max() > 1e-7 * size
+
+
+# ---------------------------------------------------------------------- the schema
+
+KEYS = {
+    "": "schema producer graph structure claim protocol paper lyapunov rates prefactor initial_state sigma0 outcome "
+    "reaching_time effort proof verdict unverified",
+    "graph": "nodes edges read sha256",
+    "graph.read": "orientation duplicates self_loops undirected",
+    "structure": "connectivity closed_components leaders followers balanced sign_symmetric",
+    "claim": "theorem behaviour corollaries",
+    "protocol": "kind T rho1 rho2 kappa",
+    "paper": "theorem objective coordinates blocks rho rho_interval rate prefactor",
+    "lyapunov": "members",
+    "rates": "paper diagonal certified",
+    "prefactor": "value of",
+    "outcome": "final_state degenerate influence",
+    "outcome.influence": "components followers",
+    "unverified": "spectral tightness paper_rate residual final_state simulation notes",
+    "unverified.simulation": "worst_ratio floor resolved_until ratios stop tolerances deadline_resolved judged",
+}
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_every_key_of_the_schema_is_there(name: str):
+    data = through_json(example(name))
+    assert data["schema"] == "ptcc-certificate/1"
+    assert data["producer"].startswith("ptcc-certify ")
+    for path, keys in KEYS.items():
+        place = data
+        for step in path.split(".") if path else ():
+            place = place[step]
+        assert set(place) >= set(keys.split()), path
+    for member in data["lyapunov"]["members"]:
+        assert set(member) == {"class", "coordinates", "blocks", "rho", "rate", "prefactor"}
+    for step in data["proof"]:
+        assert set(step) == {"kind", "statement", "lemma", "numbers"}
+        assert all(number(text) > 0 for text in step["numbers"].values())
+    assert len(data["graph"]["sha256"]) == 64
+    said = structure_json(example(name).structure)
+    assert said == {key: data[key] for key in ("graph", "structure", "claim")}
+
+
+#: Where integers and booleans may stand outside ``unverified``; everything else there is text.
+PLAIN = re.compile(
+    r"\.structure\.(balanced|sign_symmetric)|\.structure\.closed_components\[\]\.(balanced|gauge\[\])"
+    r"|\.graph\.read\.undirected|.*\.times_rho|\.outcome\.degenerate\[\]"
+)
+#: Where the texts are exact numbers.
+EXACT = re.compile(
+    r"\.graph\.edges\[\]\[2\]|\.protocol\.(T|rho1|rho2|kappa)|\.(paper|lyapunov\.members\[\])\.(rho|rate|prefactor)"
+    r"|.*\.diagonal\[\]|\.paper\.rho_interval\.\w+|\.rates\.\w+|\.prefactor\.value|\.initial_state\.\*"
+    r"|\.outcome\.final_state\.\*|\.outcome\.influence\.components\[\]\.voices\[\]"
+    r"|\.outcome\.influence\.followers\.\*\[\]|\.components\[\]\.outcome\.\*|\.proof\[\]\.numbers\.\w+"
+)
+#: Objects whose keys are labels of nodes.
+BY_LABEL = {".initial_state", ".outcome.final_state", ".outcome.influence.followers", ".components[].outcome"}
+
+
+def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from leaves(item, f"{path}.{'*' if path in BY_LABEL else key}")
+    elif isinstance(value, list) and path == ".graph.edges[]":
+        for position, item in enumerate(value):
+            yield f"{path}[{position}]", item
+    elif isinstance(value, list):
+        for item in value:
+            yield from leaves(item, path + "[]")
+    else:
+        yield path, value
+
+
+@pytest.mark.parametrize("name", [name for name, _ in CLASSES])
+def test_numbers_are_exact_texts(name: str):
+    data = of_class(name)
+    seen = 0
+    for path, value in leaves({key: item for key, item in data.items() if key != "unverified"}):
+        assert not isinstance(value, float), path
+        if isinstance(value, int):  # bool too
+            assert PLAIN.fullmatch(path), path
+        if EXACT.fullmatch(path) and value is not None:
+            assert isinstance(value, str), path
+            assert parse_exact(value) == number(value)
+            seen += 1
+    assert seen > len(data["graph"]["nodes"])  # each has at least its start, and there is the protocol
+
+
+@pytest.mark.parametrize("name", [name for name, _ in CLASSES][::4])
+def test_the_edges_give_the_graph_back_whatever_their_order(name: str):
+    data = of_class(name)
+    graph = data["graph"]
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        edges = [graph["edges"][i] for i in rng.permutation(len(graph["edges"]))]
+        nodes = [graph["nodes"][i] for i in rng.permutation(len(graph["nodes"]))]
+        rebuilt = SignedDigraph.from_edges(edges, nodes)
+        assert rebuilt.sha256 == graph["sha256"]
+        assert structure_json(analyse(rebuilt))["graph"] == graph  # integer labels: the order is theirs
+    if edges:
+        s, t, w = edges[0]
+        other = SignedDigraph.from_edges([(s, t, Fraction(w) * (1 + Fraction(1, 10**30))), *edges[1:]], nodes)
+        assert other.sha256 != graph["sha256"]
+
+
+def test_writing_and_reading_back(tmp_path: Path):
+    cert = example("fig5a")
+    cert.save(tmp_path / "c.json")
+    assert read_certificate(tmp_path / "c.json") == cert.to_dict() == through_json(cert)
+    assert repr(cert).startswith("Certificate(bipartite containment, Theorem 3.1, rate ")
+    assert repr(cert).endswith(", certified)")
+
+
+BROKEN: dict[str, Callable[[str], str | bytes]] = {
+    "not JSON": lambda text: text[:-3],
+    "a key twice": lambda text: text.replace('"schema"', '"verdict": "certified", "schema"', 1),
+    "NaN": lambda text: text.replace('"spectral": ', '"spectral": NaN, "was": ', 1),
+    "infinite": lambda text: text.replace('"spectral": ', '"spectral": -Infinity, "was": ', 1),
+    "beyond float64": lambda text: text.replace('"spectral": ', '"spectral": 1e999, "was": ', 1),
+    "another schema": lambda text: text.replace("ptcc-certificate/1", "ptcc-certificate/999"),
+    "a list": lambda text: f"[{text}]",
+    "nested": lambda text: "[" * 200_000,
+    "an integer of 10^5 digits": lambda text: text.replace('"spectral": ', f'"spectral": {"7" * 10**5}, "was": ', 1),
+    "not UTF-8": lambda text: text.replace("stability", "\xe9", 1).encode("latin-1"),
+}
+
+
+@pytest.mark.parametrize("how", BROKEN)
+def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
+    path = tmp_path / "c.json"
+    broken = BROKEN[how](example("fig1a").to_json())
+    path.write_bytes(broken if isinstance(broken, bytes) else broken.encode())
+    with pytest.raises(FormatError, match=r"c\.json: not a") as refusal:
+        read_certificate(path)
+    assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 500
+    for missing in (tmp_path / "nowhere.json", tmp_path):
+        with pytest.raises(FormatError):
+            read_certificate(missing)
+
+
+# ---------------------------------------------------------------------- the proof, anew
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("name", [name for name, _ in CLASSES])
+def test_the_json_alone_proves_the_claim(name: str, seed: int):
+    Recheck(of_class(name, seed)).everything()
+
+
+@pytest.mark.parametrize("name", [name for name, _ in CLASSES])
+def test_a_rate_a_millionth_higher_is_not_proved(name: str):
+    """The certified rate is the paper's formula, not less: 1e-6 more fails the inequality of the row."""
+    data = of_class(name)
+    if data["paper"]["blocks"]:
+        judge = Recheck(data)
+        rate = number(data["paper"]["rate"])
+        assert judge.proves(rate)
+        assert not judge.proves(rate * (1 + Fraction(1, 10**6)))
+
+
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed no single", "3.2"])
+def test_the_recheck_sees_what_is_wrong(name: str):
+    """A judge that accepts everything would prove nothing."""
+    Recheck(of_class(name)).everything()
+
+    def spoilt(change: Callable[[dict[str, Any]], None]) -> bool:
+        data = json.loads(json.dumps(of_class(name)))
+        change(data)
+        try:
+            Recheck(data).everything()
+        except AssertionError:
+            return True
+        return False
+
+    def more(text: str) -> str:
+        return str(Fraction(text) + Fraction(1, 10**30))
+
+    def weight(data: dict[str, Any]) -> None:
+        data["paper"]["blocks"][0]["diagonal"][0] = str(Fraction(data["paper"]["blocks"][0]["diagonal"][0]) * 1000)
+
+    def state(data: dict[str, Any]) -> None:
+        label = data["graph"]["nodes"][-1]
+        data["outcome"]["final_state"][label] = more(data["outcome"]["final_state"][label])
+
+    def sign(data: dict[str, Any]) -> None:
+        for edge in data["graph"]["edges"]:
+            edge[2] = str(-Fraction(edge[2]))
+
+    assert spoilt(weight) and spoilt(state) and spoilt(sign)
+    assert spoilt(lambda data: data["paper"].update(prefactor=more(data["paper"]["prefactor"])))
+    assert spoilt(lambda data: data["structure"].update(balanced=not data["structure"]["balanced"]))
+    assert spoilt(lambda data: data["structure"].update(leaders=data["structure"]["leaders"][:-1]))
+
+
+REAL = {
+    "bales": "2.1",
+    "highland_tribes": "1.2",
+    "regulatory_007": "1.1",
+    "regulatory_109": "1.2",
+    "regulatory_123": "3.1",
+    "regulatory_143": "3.1",
+    "regulatory_192": "1.2",
+    "sampson_sanctions": "3.1",
+    "sampson_t4": "1.2",
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_graphs_are_certified(name: str, real_data: Path):
+    graph = read_graph(real_data / f"{name}.csv")
+    assert graph.n_nodes <= 105
+    cert = certify(graph, PROTOCOL, random_start(graph.n_nodes, 1))
+    assert cert.verdict == "certified", cert.notes
+    assert cert.claim is not None and cert.comparison is not None
+    assert cert.claim.theorem == REAL[name]
+    assert cert.comparison.worst_ratio <= 1 + 1e-6
+    judge = Recheck(through_json(cert))
+    judge.structure()
+    judge.outcome()
+    rate = number(judge.data["paper"]["rate"])
+    assert judge.proves(rate)
+    assert not judge.proves(rate * (1 + Fraction(1, 10**6)))
+
+
+def test_every_small_real_graph_is_in_the_table(real_data: Path):
+    assert {path.stem for path in real_data.glob("*.csv")} - set(REAL) == {"regulatory_005_unknown_signs"}
+
+
+def test_unknown_signs_are_refused_by_name(real_data: Path):
+    path = real_data / "regulatory_005_unknown_signs.csv"
+    unknown = [row.split(",")[:2] for row in path.read_text().splitlines() if row.endswith(",0")]
+    assert unknown
+    run = ptcc("certify", str(path))
+    assert run.code == 2 and run.out == ""
+    (line,) = run.err.splitlines()
+    source, target = unknown[0]
+    assert f"weight 0 of edge {source} -> {target}" in line
+    assert str(len(unknown)) in line and "unknown sign" in line
+
+
+# ---------------------------------------------------------------------- special starts, special graphs
+
+
+def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
+    """Foes whose weighted signed mean is 0 meet at 0: bipartite consensus, but not at a positive value."""
+    path = tmp_path / "g.csv"
+    path.write_text("a,b,-1\nb,a,-2\nc,d,1\nd,c,1\nb,e,1\nd,e,1\n")  # eta' G = (1, -2)/3 on a, b
+    data = json.loads(ptcc("certify", str(path), "--x0", "a=1,b=2,c=1,d=1,e=5", "--json").out)
+    assert data["outcome"]["degenerate"] == []
+    assert data["outcome"]["final_state"] == {"a": "-1", "b": "1", "c": "1", "d": "1", "e": "1"}
+    special = "a=2,b=1,c=1,d=1,e=5"
+    data = json.loads(ptcc("certify", str(path), "--x0", special, "--json").out)
+    assert data["outcome"]["degenerate"] == [1]
+    assert data["outcome"]["final_state"] == {"a": "0", "b": "0", "c": "1", "d": "1", "e": "1/2"}
+    Recheck(data).everything()
+    screen = ptcc("certify", str(path), "--x0", special).out
+    assert "degenerate start: leader group 1 meets at 0, although it is balanced" in screen
+    assert len(screen.splitlines()) <= 24
+    unbalanced = certify(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), PROTOCOL, [1, 1], simulation=False)
+    assert unbalanced.to_dict()["outcome"]["degenerate"] == []  # 0 is what an unbalanced group is for
+
+
+def test_a_disconnected_graph_has_components_and_no_claim():
+    graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (3, 4, -1), (4, 3, -1), (4, 5, 2)], [6])
+    data = through_json(certify(graph, PROTOCOL, [1, 2, 3, 4, 5, 6]))
+    Recheck(data).everything()
+    assert data["claim"] is None
+    assert data["components"] == [
+        {
+            "nodes": ["1", "2"],
+            "connectivity": "strong",
+            "claim": {"theorem": "1.2", "behaviour": "stability", "corollaries": []},
+            "outcome": {"1": "0", "2": "0"},
+        },
+        {
+            "nodes": ["3", "4", "5"],
+            "connectivity": "quasi-strong",
+            "claim": {"theorem": "2.1", "behaviour": "interval bipartite consensus", "corollaries": ["3"]},
+            "outcome": {"3": "-1/2", "4": "1/2", "5": "1/2"},
+        },
+        {
+            "nodes": ["6"],
+            "connectivity": "strong",
+            "claim": {"theorem": "1.1", "behaviour": "bipartite consensus", "corollaries": ["1.1", "2"]},
+            "outcome": {"6": "6"},
+        },
+    ]
+    assert data["unverified"]["simulation"]["worst_ratio"] <= 1 + 1e-6
+    without = certify(graph, PROTOCOL).to_dict()
+    assert [c["outcome"] for c in without["components"]] == [None] * 3
+    assert without["initial_state"] is None and without["outcome"]["final_state"] is None
+    assert without["outcome"]["influence"] == data["outcome"]["influence"]
+    assert without["unverified"]["simulation"] is None
+
+
+@pytest.mark.parametrize("edges", [[], [(1, 2, -1), (2, 1, -1)]])
+def test_more_than_a_hundred_components_are_grouped_in_arrays(edges: list[tuple]):
+    few, many = (
+        through_json(certify(SignedDigraph.from_edges(edges, range(1, n)), PROTOCOL, range(1, n), simulation=False))
+        for n in (100, 110)
+    )
+    assert isinstance(few["components"], list)
+    groups = many["components"]
+    assert set(groups) == {"nodes", "connectivity", "theorem", "behaviour"}
+    assert {len(array) for array in groups.values()} == {109 - len(edges) // 2}
+    assert [label for nodes in groups["nodes"] for label in nodes] == many["graph"]["nodes"]
+    assert set(groups["connectivity"]) == {"strong"} and set(groups["theorem"]) == {"1.1"}
+    assert many["verdict"] == few["verdict"] == "certified"
+
+
+def test_one_agent_keeps_its_state():
+    data = through_json(certify(SignedDigraph.from_edges([], ["alone"]), PROTOCOL, ["22/7"]))
+    Recheck(data).everything()
+    assert data["claim"] == {"theorem": "1.1", "behaviour": "bipartite consensus", "corollaries": ["1.1", "2"]}
+    assert data["outcome"]["final_state"] == {"alone": "22/7"}
+    assert data["rates"]["certified"] is None
+    assert data["paper"]["objective"] == "none: every agent keeps its state"
+
+
+def ring(n: int, last: int) -> SignedDigraph:
+    return SignedDigraph.from_edges([(i, (i + 1) % n, last if i == n - 1 else 1) for i in range(n)])
+
+
+@pytest.mark.parametrize(("n", "last", "searched"), [(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)])
+def test_beyond_120_nodes_nothing_is_claimed_but_in_floating_point(n: int, last: int, searched: bool):
+    """A ring: rate 2 (1 - cos(2 pi/n)) if balanced, 2 (1 - cos(pi/n)) if not, and the paper's formula attains it."""
+    cert = certify(ring(n, last), PROTOCOL, list(range(n)))
+    data = through_json(cert)
+    assert data["verdict"] == "undecided"
+    assert data["rates"] == dict.fromkeys(("paper", "diagonal", "certified"))
+    assert data["lyapunov"]["members"] == [] and data["proof"] == [] and data["prefactor"] is None
+    assert data["outcome"] is None
+    assert data["claim"]["theorem"] == ("1.1" if last > 0 else "1.2")  # the structure is exact all the same
+    Recheck(data).structure()
+    said = data["unverified"]
+    rate = 2 * (1 - np.cos((2 if last > 0 else 1) * np.pi / n))
+    assert said["spectral"] == pytest.approx(rate, rel=1e-6)
+    assert set(said["residual"].values()) == {None}  # nothing proved, nothing bounded
+    assert cert.envelope.residual(0.5) == cert.envelope.bound(1.0, np.arange(n)) == np.inf
+    assert said["simulation"] is None
+    mean = (n - 1) / 2 if last > 0 else 0.0
+    assert list(said["final_state"].values()) == pytest.approx([mean] * n, abs=1e-6)
+    if searched:
+        assert said["paper_rate"] == pytest.approx(rate, rel=1e-6)
+        assert data["paper"]["rate"] is None and data["paper"]["blocks"]
+    else:
+        assert said["paper_rate"] is None and data["paper"] is None
+    assert any("nodes" in note for note in said["notes"])
+
+
+# ---------------------------------------------------------------------- invariance, refusals
+
+
+@settings(max_examples=40)
+@given(made_graphs(max_nodes=8, weights=("units", "small ints")), st.integers(0, 2**32 - 1))
+def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Made, seed: int):
+    graph = made.graph
+    rng = np.random.default_rng(seed)
+    start = random_start(graph.n_nodes, seed)
+    order = rng.permutation(graph.n_nodes)
+    names = {label: f"agent {order[i]}" for i, label in enumerate(graph.labels)}
+    labels = sorted(names.values(), key=lambda label: int(label.split()[1]))
+    moved = SignedDigraph.from_edges([(names[s], names[t], w) for s, t, w in graph.edges], labels)
+    values = dict(zip(names.values(), start, strict=True))
+    first = through_json(certify(graph, PROTOCOL, start, simulation=False))
+    second = through_json(certify(moved, PROTOCOL, [values[label] for label in labels], simulation=False))
+    Recheck(second).everything()
+    for key in ("claim", "protocol", "verdict"):
+        assert first[key] == second[key]
+    assert {names[k]: v for k, v in first["initial_state"].items()} == second["initial_state"]
+    assert {names[k]: v for k, v in first["outcome"]["final_state"].items()} == second["outcome"]["final_state"]
+    for key in ("connectivity", "balanced", "sign_symmetric"):
+        assert first["structure"][key] == second["structure"][key]
+    for key in ("leaders", "followers"):
+        assert {names[label] for label in first["structure"][key]} == set(second["structure"][key])
+    groups = [
+        {(frozenset(name[label] for label in c["nodes"]), c["balanced"]) for c in d["structure"]["closed_components"]}
+        for d, name in ((first, names), (second, dict(zip(labels, labels, strict=True))))
+    ]
+    assert groups[0] == groups[1]
+    assert len(first["outcome"]["degenerate"]) == len(second["outcome"]["degenerate"])
+    assert first["paper"]["objective"] == second["paper"]["objective"]
+    if first["paper"]["blocks"]:
+        rates = [float(number(d["rates"]["certified"])) for d in (first, second)]
+        assert rates[1] == pytest.approx(rates[0], rel=1e-6)
+        assert second["unverified"]["spectral"] == pytest.approx(first["unverified"]["spectral"], rel=1e-6)
+        assert len(first["proof"]) == len(second["proof"])
+        sizes = [sorted((len(b["nodes"]), b["times_rho"]) for b in d["paper"]["blocks"]) for d in (first, second)]
+        assert sizes[0] == sizes[1]
+
+
+@pytest.mark.parametrize(
+    ("x0", "says"),
+    [
+        ([1, 2, 3], "3 values for 2 agents"),
+        ([1, float("nan")], "agent b"),
+        ([1, "1e400"], "agent b is beyond 1e300"),
+        (["0." + "3" * 3000, 1], "agent a has too many digits"),
+        ([1, "two"], "agent b"),
+        ([1, True], "agent b"),
+    ],
+)
+def test_a_bad_start_is_refused_with_its_agent(x0: list, says: str):
+    with pytest.raises(ParameterError, match=says):
+        certify(SignedDigraph.from_edges([("a", "b", 1)]), PROTOCOL, x0)
+
+
+def test_without_a_deadline_there_is_nothing_to_certify():
+    protocol = NominalProtocol(T=1, rho1=1, rho2=0, kappa=1)
+    with pytest.raises(ParameterError, match="rho2"):
+        certify(SignedDigraph.from_edges([("a", "b", 1)]), protocol, [1, 2])
+
+
+@given(st.integers(-(10**300), 10**300), st.integers(0, 9000))
+def test_a_number_is_written_exactly_or_enclosed(numerator: int, power: int):
+    value = Fraction(numerator, 3**power)
+    written = exact_or_ball(value)
+    if isinstance(written, str):
+        assert number(written) == value
+    else:
+        mid, radius = parse_exact(written["mid"]), parse_exact(written["radius"])
+        assert abs(value - mid) <= radius
+
+
+def test_the_limit_of_rates_is_twice_the_mean_eigenvalue():
+    """No certified rate exceeds it, nor does the spectral rate."""
+    for name in GRAPHS:
+        cert = example(name)
+        assert cert.rate is not None and cert.rate_limit is not None and cert.spectral_rate is not None
+        assert cert.rate < cert.rate_limit
+        assert cert.spectral_rate <= float(cert.rate_limit) * (1 + 1e-12)
+        L = cert.graph.laplacian().toarray()
+        nonzero = sorted(np.linalg.eigvals(L), key=abs)[len(cert.influence.balanced) :]
+        assert float(cert.rate_limit) == pytest.approx(2 * float(np.mean(nonzero).real))
+
+
+def test_residuals_fall_from_instant_to_instant():
+    for name in GRAPHS:
+        residual = list(through_json(example(name))["unverified"]["residual"].values())
+        assert len(residual) == 5
+        assert all(later < earlier for earlier, later in pairwise(residual))

@@ -1,0 +1,604 @@
+"""The command line as a user meets it: what it prints, writes, refuses, and with which code it ends."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bad_inputs import BAD_INPUTS, BadInput, Run, listing, ptcc, write
+from scipy.linalg import expm
+
+from ptcc_certify.bounds import Envelope
+from ptcc_certify.certificate import read_certificate
+from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import write_graph
+from ptcc_certify.structure import BEHAVIOURS, analyse
+
+X0 = "5,2,-4,3,-2,1"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def one_object(text: str) -> dict[str, Any]:
+    """Parse exactly one JSON object; no NaN, no infinity, no key twice."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in pairs]
+        assert len(set(keys)) == len(keys)
+        return dict(pairs)
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    def finite(number: str) -> float:
+        assert math.isfinite(float(number)), number
+        return float(number)
+
+    data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
+    assert isinstance(data, dict)
+    return data
+
+
+def save(name: str, edges: list[tuple], nodes: list = []) -> str:  # noqa: B006
+    write_graph(SignedDigraph.from_edges(edges, nodes), name)
+    return name
+
+
+def ring(n: int, last: int = 1) -> list[tuple[int, int, int]]:
+    """A directed ring; balanced iff ``last`` is positive."""
+    return [(i, i % n + 1, last if i == n else 1) for i in range(1, n + 1)]
+
+
+# ---------------------------------------------------------------------- bad input
+
+
+def assert_refused(run: Run) -> None:
+    assert run.code == 2, run
+    assert run.out == ""
+    (line,) = run.err.splitlines()
+    assert line.startswith("ptcc: ") and len(line) > 10
+    assert line.isprintable()
+    assert "Traceback" not in line
+
+
+@pytest.mark.parametrize("case", BAD_INPUTS, ids=lambda case: case.name)
+def test_bad_input_is_refused_in_one_line(case: BadInput, folder: Path):
+    write(case.files, folder)
+    before, started = listing(folder), time.perf_counter()
+    run = ptcc(*case.args, stdin=case.stdin)
+    assert time.perf_counter() - started < 10
+    assert_refused(run)
+    assert re.search(case.says, run.err), run.err
+    assert listing(folder) == before
+
+
+def test_the_names_of_the_table_differ():
+    assert len({case.name for case in BAD_INPUTS}) == len(BAD_INPUTS) >= 45
+
+
+SAMPLE = ("weight NaN", "directory", "gzip cut short", "XML entity bomb", "T NaN", "x0 too short", "unknown command")
+
+
+@pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
+def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
+    write(case.files, folder)
+    before = listing(folder)
+    assert_refused(process(*case.args))
+    assert listing(folder) == before
+
+
+def process(*args: str, stdin: bytes = b"", env: dict[str, str] | None = None) -> Run:
+    done = subprocess.run(
+        [sys.executable, "-m", "ptcc_certify.cli", *args],
+        input=stdin,
+        capture_output=True,
+        timeout=60,
+        env=os.environ | (env or {}),
+    )
+    encoding = (env or {}).get("PYTHONIOENCODING", "utf-8")
+    return Run(done.returncode, done.stdout.decode(encoding), done.stderr.decode(encoding))
+
+
+@pytest.mark.parametrize(
+    "edges",
+    [
+        [("a", "b", "1e-300"), ("b", "a", "1e300")],
+        [("a", "b", "1e-300"), ("b", "a", "-1e300")],
+        [("a", "b", "1e-300"), ("b", "c", "1e300"), ("c", "b", "1e300")],
+        [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d", "-1e300"), ("d", "c", "1e-300")],
+        [("a", "c", "1e300"), ("b", "c", "-1e-300"), ("c", "d", "1e-300"), ("d", "c", "1")],
+        [("a", "c", "1.6e308"), ("b", "c", "-1.6e308")],
+        [("a", "b", "1.6e308"), ("b", "a", "1.6e308"), ("c", "a", "1.6e308"), ("a", "c", "1.6e308")],
+        [("a", "b", "1e-300"), ("b", "a", "-1e-300")],
+    ],
+)
+def test_weights_at_the_ends_of_float64_give_an_answer(edges: list[tuple]):
+    name = save("wide.csv", edges)
+    for command in ("classify", "certify", "simulate"):
+        run = ptcc(command, name)
+        assert run.code in ({0} if command == "classify" else {0, 2, 4}), run
+        assert "Traceback" not in run.err and "Warning" not in run.err
+        if run.code == 2:
+            assert_refused(run)
+    run = ptcc("certify", name, "--json")
+    assert run.code in {0, 4}
+    assert one_object(run.out)["verdict"] == {0: "certified", 4: "undecided"}[run.code]
+
+
+def test_starts_of_any_size_are_compared_alike():
+    """The problem is linear: a start 10^200 times as large has the same ratios."""
+    ratios = []
+    for scale in ("", "e200", "e-200"):
+        run = ptcc("certify", "fig1a", "--x0", ",".join(x + scale for x in X0.split(",")), "--json")
+        assert run.code == 0 and run.err == ""
+        ratios.append(one_object(run.out)["unverified"]["simulation"]["worst_ratio"])
+    assert ratios[0] > 0.01
+    assert ratios == pytest.approx([ratios[0]] * 3, rel=1e-3)
+
+
+# ---------------------------------------------------------------------- exit codes
+
+
+def test_proved_is_0():
+    run = ptcc("certify", "fig1b", "--x0", X0)
+    assert run.code == 0
+    assert run.out.splitlines()[-1].split() == ["verdict", "certified"]
+    assert run.err == ""
+
+
+def test_a_violated_bound_is_1(monkeypatch: pytest.MonkeyPatch):
+    compare = Envelope.compare
+    monkeypatch.setattr(Envelope, "compare", lambda self, run: replace(compare(self, run), worst_ratio=1.01))
+    run = ptcc("certify", "fig1b", "--expect", "stability")
+    assert run.code == 1
+    assert "VIOLATED" in run.out
+    assert "violated" in run.err
+    assert ptcc("examples", "fig1a").code == 1
+
+
+def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: pytest.MonkeyPatch):
+    def fail(*_: object) -> None:
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr("ptcc_certify.certificate.certify", fail)
+    run = ptcc("certify", "fig1b")
+    assert run.code == 70
+    assert "RuntimeError" in run.err and "report" in run.err and run.out == ""
+    for error, code in ((MemoryError(), 2), (OverflowError(), 2), (KeyboardInterrupt(), 130)):
+        monkeypatch.setattr("ptcc_certify.certificate.certify", lambda *_, error=error: (_ for _ in ()).throw(error))
+        run = ptcc("certify", "fig1b")
+        assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
+
+
+@pytest.mark.parametrize("command", ["classify", "certify"])
+def test_a_refuted_expectation_is_3(command: str):
+    run = ptcc(command, "fig1b", "--expect", "stability")
+    assert run.code == 3
+    assert run.err == "refuted: stability does not follow for this graph\n"
+    assert run.out  # the answer is printed all the same
+
+
+def test_a_rate_beyond_the_exact_limit_is_3_and_one_below_it_4():
+    """fig1b: trace(L) = 10 over 5 nonzero eigenvalues bounds every rate; between it and the proved rate lies doubt."""
+    data = one_object(ptcc("certify", "fig1b", "--json").out)
+    proved = Fraction(data["rates"]["certified"])
+    limit = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5
+    assert proved < limit
+    for wanted, code in ((proved, 0), (proved + Fraction(1, 10**6), 4), (limit, 4), (limit + Fraction(1, 10**6), 3)):
+        run = ptcc("certify", "fig1b", "--min-rate", str(wanted))
+        assert run.code == code
+        assert len(run.err.splitlines()) == (code != 0)
+        assert run.out
+
+
+def test_a_large_graph_is_undecided():
+    name = save("ring.csv", ring(121))
+    run = ptcc("certify", name)
+    assert run.code == 4
+    assert "exact proofs stop at 120 nodes" in run.out
+    assert "not proved; numerically" in run.out
+    assert ptcc("certify", name, "--min-rate", "0.001").code == 4
+    assert ptcc("certify", name, "--min-rate", "1000").code == 3
+    assert ptcc("certify", name, "--expect", "stability").code == 3
+    assert ptcc("classify", name).code == 0
+
+
+def test_every_behaviour_can_be_expected_with_hyphens_and_implies_the_weaker_ones():
+    graphs = {
+        "stability": save("s.csv", ring(3, -1)),
+        "consensus": save("c.csv", ring(3)),
+        "signed-average-consensus": save("a.csv", [(1, 2, -1), (2, 1, -1)]),
+        "bipartite-consensus": save("b.csv", [(1, 2, -1), (2, 1, -2)]),
+        "interval-bipartite-consensus": save("i.csv", [(1, 2, -1), (1, 3, 1), (2, 3, 1)]),
+        "containment": save("h.csv", [(1, 3, 1), (2, 3, 1)]),
+        "bipartite-containment": save("d.csv", [(1, 3, 1), (2, 3, 1), (1, 4, 1), (3, 4, -1)]),
+    }
+    assert {name.replace("-", " ") for name in graphs} == {name.replace("-", " ") for name in BEHAVIOURS}
+    follows = {
+        "stability": {"stability"},
+        "consensus": {
+            "consensus",
+            "signed-average-consensus",  # the ring is regular
+            "containment",
+            "bipartite-consensus",
+            "interval-bipartite-consensus",
+            "bipartite-containment",
+        },
+        "signed-average-consensus": {
+            "signed-average-consensus",
+            "bipartite-consensus",
+            "interval-bipartite-consensus",
+            "bipartite-containment",
+        },
+        "bipartite-consensus": {"bipartite-consensus", "interval-bipartite-consensus", "bipartite-containment"},
+        "interval-bipartite-consensus": {"interval-bipartite-consensus", "bipartite-containment"},
+        "containment": {"containment", "bipartite-containment"},
+        "bipartite-containment": {"bipartite-containment"},
+    }
+    for kind, name in graphs.items():
+        for wanted in graphs:
+            assert ptcc("classify", name, "--expect", wanted).code == (0 if wanted in follows[kind] else 3), kind
+    assert ptcc("certify", graphs["interval-bipartite-consensus"], "--expect", "bipartite-containment").code == 0
+
+
+def test_of_a_disconnected_graph_the_worst_component_counts():
+    name = save("apart.csv", [(1, 2, 1), (2, 1, 1), (3, 4, -1), (4, 3, -1)])
+    assert ptcc("classify", name, "--expect", "bipartite-consensus").code == 0
+    assert ptcc("classify", name, "--expect", "consensus").code == 3
+
+
+# ---------------------------------------------------------------------- JSON
+
+
+def odd_graphs() -> dict[str, str]:
+    return {
+        "apart": save("apart.csv", [(1, 2, 1), (2, 1, -1), (3, 4, -1), (4, 3, -1)], [5]),
+        "one": save("one.csv", [], ["alone"]),
+        "isolated": save("isolated.csv", [], ["a", "b", "c"]),
+    }
+
+
+@pytest.mark.parametrize("command", ["classify", "certify"])
+@pytest.mark.parametrize("name", [*GRAPHS, "apart", "one", "isolated"])
+def test_json_is_exactly_one_object(command: str, name: str):
+    graph = odd_graphs().get(name, name)
+    run = ptcc(command, graph, "--json")
+    assert run.code == 0
+    assert run.err == ""
+    data = one_object(run.out)
+    assert run.out.count("\n") == 1 and run.out.isascii()
+    assert {"graph", "structure", "claim"} <= set(data)
+    assert (data["claim"] is None) == (name in ("apart", "isolated")) == ("components" in data)
+    if command == "certify":
+        assert data["verdict"] == "certified"
+        assert data == one_object(json.dumps(data))
+
+
+def test_json_goes_out_also_when_an_expectation_is_refuted():
+    run = ptcc("certify", "fig1a", "--json", "--expect", "consensus", "-o", "c.json")
+    assert run.code == 3
+    assert one_object(run.out) == read_certificate("c.json")
+
+
+# ---------------------------------------------------------------------- files in and out
+
+
+def test_the_certificate_is_written_whole(folder: Path):
+    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json", "--json")
+    data = one_object(run.out)
+    assert one_object(Path("c.json").read_text(encoding="utf-8")) == data == read_certificate("c.json")
+    assert listing(folder) == ["c.json"]
+    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json")
+    assert run.out.splitlines()[-1] == "written    c.json"
+    Path("c.json").write_text("an older file")
+    assert ptcc("certify", "fig1b", "--x0", "1,2", "-o", "c.json").code == 2
+    assert Path("c.json").read_text() == "an older file"
+
+
+def test_a_graph_from_standard_input():
+    text = b"a,b,-1\nb,a,-1\n"
+    for run in (ptcc("certify", "-", "--json", stdin=text), process("certify", "-", "--json", stdin=text)):
+        data = one_object(run.out)
+        assert data["graph"]["edges"] == [["b", "a", "-1"], ["a", "b", "-1"]]
+        assert data["claim"]["behaviour"] == "bipartite consensus"
+
+
+def test_a_local_file_wins_over_a_packaged_graph():
+    def claim(name: str) -> str:
+        return one_object(ptcc("classify", name, "--json").out)["claim"]["behaviour"]
+
+    assert claim("fig1a") == "stability"
+    Path("fig1a").mkdir()
+    assert claim("fig1a") == "stability"
+    Path("fig1b").write_text("a,b,1\nb,a,-1\n")
+    assert claim("fig1b") == "stability"
+
+
+@pytest.mark.parametrize("form", ["plain", "labelled", "file"])
+def test_starts_in_every_form(form: str):
+    Path("x0.csv").write_text("node,value\n6,1\n" + "".join(f"{k + 1},{v}\n" for k, v in enumerate(X0.split(",")[:5])))
+    labelled = "6=1," + ",".join(f"{k + 1}={v}" for k, v in enumerate(X0.split(",")[:5]))
+    data = one_object(
+        ptcc("certify", "fig1b", "--json", "--x0", {"plain": X0, "labelled": labelled, "file": "x0.csv"}[form]).out
+    )
+    assert data["initial_state"] == dict(zip("123456", X0.split(","), strict=True))
+
+
+def test_a_random_start_depends_on_the_seed_alone():
+    starts = [
+        one_object(ptcc("certify", "fig1b", "--json", "--seed", seed).out)["initial_state"] for seed in ("0", "0", "7")
+    ]
+    assert starts[0] == starts[1] != starts[2]
+    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in starts[2].values())
+
+
+def test_edges_are_read_the_way_that_is_asked_and_it_is_said():
+    Path("g.csv").write_text("a,b,1\n")
+    for edges, leader, words in ((None, "a", "flows a -> b"), ("listens", "b", "a listens to b")):
+        options = [] if edges is None else ["--edges", edges]
+        assert one_object(ptcc("classify", "g.csv", "--json", *options).out)["structure"]["leaders"] == [leader]
+        assert words in ptcc("classify", "g.csv", *options).out
+        assert words in ptcc("certify", "g.csv", *options).out
+
+
+def test_what_was_merged_dropped_or_mirrored_is_said():
+    Path("g.csv").write_text("a,b,1\na,b,2\nb,b,5\n")
+    run = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected", "--json")
+    data = one_object(run.out)
+    assert data["graph"]["edges"] == [["b", "a", "3"], ["a", "b", "3"]]
+    read = {"orientation": "information", "duplicates": "sum", "self_loops": "dropped 1", "undirected": True}
+    assert data["graph"]["read"] == read
+    screen = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected").out
+    assert "duplicates sum" in screen and "self-loops dropped 1" in screen and "undirected" in screen
+
+
+LABELS = ["two words", "a,b", 'say "no"', "ünï ☃ 中", "line\nbreak", "\x1b[31mred", "\x9b2J", "\u202egnihton", "=1"]
+
+
+def test_labels_of_any_kind_are_printed_safely_and_kept():
+    edges = [(a, b, 1) for a, b in zip(LABELS, LABELS[1:] + LABELS[:1], strict=True)]
+    name = save("labels.csv", edges, LABELS)
+    for command in ("classify", "certify"):
+        run = ptcc(command, name)
+        assert run.code == 0
+        assert all(line.isprintable() for line in run.out.splitlines())
+        data = one_object(ptcc(command, name, "--json").out)
+        assert data["graph"]["nodes"] == LABELS
+    assert len(ptcc("certify", name).out.splitlines()) <= 24
+    run = ptcc("simulate", name, "--samples", "2")
+    assert next(csv.reader(io.StringIO(run.out))) == ["t", "remaining", *LABELS]
+    items = [f"{label}={k}".replace('"', '""') for k, label in enumerate(LABELS)]
+    run = ptcc("certify", name, "--json", "--x0", ",".join(f'"{item}"' for item in items))
+    assert one_object(run.out)["initial_state"] == {label: str(k) for k, label in enumerate(LABELS)}
+    run = ptcc("certify", name, "--x0", ",".join(f'"{item}"' for item in items[:-3]))
+    assert_refused(run)
+    assert "\u202e" not in run.err
+    np.savez("surrogate.npz", A=[[0.0, 1.0], [1.0, 0.0]], labels=["\ud800", "b"])
+    run = ptcc("certify", "surrogate.npz", "-o", "c.json", "--json")
+    assert run.code == 0
+    assert read_certificate("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
+    assert ptcc("simulate", "surrogate.npz").code == 0
+
+
+def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
+    name = save("labels.csv", [("中", "b", -1), ("b", "中", -1)])
+    for encoding in ("cp1252", "latin-1"):
+        env = {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+        assert process("certify", name, env=env).code == 0
+        assert one_object(process("certify", name, "--json", env=env).out)["graph"]["nodes"] == ["中", "b"]
+        assert process("classify", "中.csv", env=env).code == 2
+
+
+def test_a_reader_that_stops_early_is_no_error():
+    with subprocess.Popen(
+        [sys.executable, "-m", "ptcc_certify.cli", "simulate", "fig1a", "--samples", "20000"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as child:
+        assert child.stdout is not None and child.stderr is not None
+        assert child.stdout.readline().startswith(b"t,remaining")
+        child.stdout.close()
+        assert child.stderr.read() == b""
+    assert child.returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_told():
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "ptcc_certify.cli", "classify", "fig1a"], stdout=full, stderr=subprocess.PIPE
+        )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    run = ptcc("classify", "fig1a")
+    assert run.code == 0
+
+
+# ---------------------------------------------------------------------- the screens
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_the_screen_of_certify_fits_24_lines(name: str):
+    (example, _, _) = select(name)[0]
+    parameters = ["--T", example.T, "--rho1", example.rho1, "--rho2", example.rho2, "--kappa", example.kappa]
+    for options in ([], [*parameters, "--x0", example.x0]):
+        run = ptcc("certify", name, *options)
+        assert run.code == 0
+        lines = run.out.splitlines()
+        assert len(lines) <= 24
+        heads = {line.split(maxsplit=1)[0] for line in lines}
+        expected = {"graph", "read", "structure", "claim", "protocol", "start", "ends", "rate", "left", "proof"}
+        assert expected | {"simulated", "verdict"} <= heads
+        assert "Theorem" in run.out
+
+
+def test_the_screen_of_classify_names_camps_and_cycles():
+    out = ptcc("classify", "fig1b").out
+    assert "camps {1, 2, 5, 6} against {3, 4}" in out
+    structure = analyse(load_graph("fig1a"))
+    cycle = structure.closed_components[0].negative_cycle
+    assert cycle is not None
+    labels = structure.graph.labels
+    assert "negative cycle " + " ".join(f"{labels[s]}->{labels[t]}" for s, t in cycle) in ptcc("classify", "fig1a").out
+
+
+def test_help_is_printed():
+    for args in (["--help"], ["certify", "-h"], ["simulate", "--help"]):
+        run = ptcc(*args)
+        assert run.code == 0
+        assert "Usage: ptcc" in run.out
+    run = ptcc()
+    assert run.code in (0, 2)
+    assert "certify" in run.out + run.err
+    assert re.fullmatch(r"ptcc, version \d+\.\d+.*\n", ptcc("--version").out)
+
+
+# ---------------------------------------------------------------------- simulate
+
+
+def table(text: str) -> tuple[list[str], np.ndarray]:
+    header, *rows = csv.reader(io.StringIO(text))
+    return header, np.array(rows, dtype=float)
+
+
+def test_simulate_prints_csv_up_to_the_deadline_and_past_it():
+    run = ptcc("simulate", "fig1b", "--T", "0.6", "--x0", X0, "--samples", "50")
+    assert run.code == 0 and run.err == ""
+    header, rows = table(run.out)
+    assert header == ["t", "remaining", *"123456"]
+    t, remaining, states = rows[:, 0], rows[:, 1], rows[:, 2:]
+    assert (np.diff(t) >= 0).all() and t[0] == 0 and t[-1] > 0.6
+    assert (np.diff(remaining) <= 0).all() and remaining[0] == 1 and remaining[-1] == 0
+    assert remaining[remaining > 0].min() == pytest.approx(1e-8)
+    assert len(rows) >= 50
+    assert states[0].tolist() == [float(x) for x in X0.split(",")]
+    final = one_object(ptcc("certify", "fig1b", "--T", "0.6", "--x0", X0, "--json").out)["outcome"]["final_state"]
+    settled = states[remaining == 0]
+    assert np.abs(settled - [float(Fraction(final[k])) for k in "123456"]).max() < 1e-8
+
+
+def test_simulate_without_a_deadline_is_the_plain_exponential():
+    run = ptcc("simulate", "fig1b", "--rho1", "0.7", "--rho2", "0", "--x0", X0)
+    assert run.code == 0
+    assert run.err == ""  # nobody promised that it settles
+    _, rows = table(run.out)
+    L = load_graph("fig1b").laplacian().toarray()
+    start = np.array([float(x) for x in X0.split(",")])
+    for row in rows[::20]:
+        assert row[2:] == pytest.approx(expm(-0.7 * row[0] * L) @ start, abs=1e-8)
+
+
+def test_simulate_agents_of_two_dimensions():
+    """The components of a vector-valued agent do not see each other."""
+    both = ptcc("simulate", "fig1a", "--dimension", "2", "--x0", "5,1,2,2,-4,3,3,4,-2,5,1,6")
+    first, second = (ptcc("simulate", "fig1a", "--x0", x0) for x0 in (X0, "1,2,3,4,5,6"))
+    header, rows = table(both.out)
+    assert header == ["t", "remaining", *(f"{k}[{c}]" for k in range(1, 7) for c in (1, 2))]
+    for component, alone in enumerate((first, second)):
+        assert rows[:, 2 + component :: 2] == pytest.approx(table(alone.out)[1][:, 2:], abs=1e-7)
+    assert ptcc("simulate", "fig1a", "--dimension", "3").code == 0
+
+
+def test_simulate_says_when_the_run_has_not_settled():
+    run = ptcc("simulate", save("slow.csv", [(1, 2, "1e-300"), (2, 1, "1e-300")]))
+    assert run.code == 0
+    assert run.err.startswith("note: ")
+    assert "note" not in run.out
+
+
+@pytest.mark.parametrize(
+    ("name", "magic"), [("a.png", b"\x89PNG\r\n\x1a\n"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF"), ("A.PNG", b"\x89PNG")]
+)
+def test_simulate_draws_figures(name: str, magic: bytes, folder: Path):
+    run = ptcc("simulate", "fig5a", "-o", name)
+    assert (run.code, run.out, run.err) == (0, "", "")
+    data = Path(name).read_bytes()
+    assert data.startswith(magic) and len(data) > 5000
+    assert listing(folder) == [name]
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.txt", "run"])
+def test_simulate_writes_tables(name: str):
+    assert ptcc("simulate", "fig1a", "-o", name).out == ""
+    assert Path(name).read_text(encoding="utf-8") == ptcc("simulate", "fig1a").out
+
+
+# ---------------------------------------------------------------------- examples, cite, imports
+
+
+def test_all_examples_behave_as_the_paper_reports(folder: Path):
+    run = ptcc("examples", "all", "-o", "new/results")
+    assert run.code == 0, run
+    header, *rows = run.out.splitlines()
+    assert header.split() == ["example", "theorem", "behaviour", "rate", "tightness", "worst", "verdict"]
+    reported = [
+        (str(example.number), graph, behaviour)
+        for example in EXAMPLES.values()
+        for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
+    ]
+    assert len(rows) == len(reported) == 6
+    for row, (number, graph, behaviour) in zip(rows, reported, strict=True):
+        match = re.fullmatch(r"(\d) (\w+) +([\d.]+) +(\D+?) +([\d.]+) +([\d.]+) +([\d.]+)  (\w+)", row)
+        assert match is not None, row
+        assert match.group(1, 2, 4, 8) == (number, graph, behaviour, "certified")
+        rate, tightness, worst = (float(x) for x in match.group(5, 6, 7))
+        assert rate > 0 and 0 < tightness <= 1 and 0 < worst <= 1
+        data = read_certificate(f"new/results/{graph}.json")
+        assert data["claim"]["theorem"] == match[3]
+        assert data["claim"]["behaviour"] == behaviour
+        assert float(Fraction(data["rates"]["certified"])) == pytest.approx(rate, abs=1e-4)
+        for figure in ("states", "decay"):
+            assert Path(f"new/results/{graph}_{figure}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+    assert len(listing(folder / "new" / "results")) == 18
+
+
+def test_examples_can_be_chosen():
+    assert [row.split()[1] for row in ptcc("examples", "2").out.splitlines()[1:]] == ["fig3a", "fig3b"]
+    assert [row.split()[1] for row in ptcc("examples", "fig1b").out.splitlines()[1:]] == ["fig1b"]
+
+
+@pytest.mark.parametrize("theorem", [None, "1.1", "1.2", "2.1", "2.2", "3.1", "3.2"])
+def test_cite_is_bibtex_and_invents_nothing(theorem: str | None):
+    run = ptcc("cite", *([] if theorem is None else [theorem]))
+    assert run.code == 0 and run.err == ""
+    match = re.fullmatch(r"@(\w+)\{(\w+),\n((?:  \w+ *= \{.*\},?\n)+)\}\n", run.out)
+    assert match is not None
+    fields = dict(re.findall(r"^  (\w+) *= \{(.*)\},?$", match[3], flags=re.MULTILINE))
+    assert set(fields) == {"author", "title", "note"}
+    assert "Zhu" in fields["author"] and fields["author"].count(" and ") == 5
+    assert fields["title"].startswith("Robust prescribed-time coordination control")
+    assert not re.search(r"doi|\b(19|20)\d\d\b|http", run.out)
+    assert all(text.count("{") == text.count("}") for text in fields.values())
+    if theorem:
+        assert f"Theorem {theorem}: " in fields["note"]
+
+
+def test_classify_loads_nothing_heavy():
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "ptcc_certify.cli", "classify", "fig1a"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0
+    loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines() if "|" in line}
+    assert {"ptcc_certify", "numpy", "scipy", "click"} <= loaded
+    assert not loaded & {"casadi", "cvxpy", "clarabel", "matplotlib", "networkx", "flint", "lmi", "rich"}
