@@ -12,6 +12,7 @@ from generators import all_classes, random_graph
 
 from ptcc_certify.bounds import Envelope, Member
 from ptcc_certify.certificate import certify
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.simulation import simulate
@@ -174,3 +175,35 @@ def test_more_members_make_the_envelope_the_pointwise_best():
     for s in (0.0, 1.0, 5.0, 50.0):
         alone = [replace(envelope, members=(m,)).norm_factor(s) for m in (slow, fast)]
         assert both.norm_factor(s) == min(alone)
+
+
+def test_a_run_is_judged_from_its_first_sample_and_only_against_its_own_graph():
+    envelope, protocol, graph = pair_envelope(2.0)
+    late = envelope.compare(simulate(graph, protocol, [3, 1], times=[0.4, 0.45]))
+    assert not late.violated
+    assert late.ratios == {}
+    assert late.judged == 1
+    other = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -2)])
+    with pytest.raises(ParameterError, match="another graph"):
+        envelope.compare(simulate(other, protocol, [3, 1]))
+    with pytest.raises(ParameterError, match="another graph"):
+        envelope.compare(simulate(graph, NominalProtocol(T=2, rho1=1, rho2=1, kappa=2), [3, 1]))
+    with pytest.raises(ParameterError, match="no sample before"):
+        envelope.compare(simulate(graph, protocol, [3, 1], times=[1, 2]))
+
+
+def test_a_run_that_never_rises_above_the_floor_judges_nothing():
+    envelope, protocol, graph = pair_envelope(2.0)
+    assert envelope.compare(simulate(graph, protocol, [0, 0])).judged == 0
+    assert envelope.compare(simulate(graph, protocol, [3, 1])).judged > 10
+
+
+def test_margins_below_the_sight_of_the_solver_are_proved_from_closed_forms():
+    """Unbalanced by an edge 10^11 times weaker: Lemma 3.2 by the left vector; weak followers block by block."""
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    nearly = [(1, 2, 1), (2, 3, 1), (3, 1, 1), (3, 2, "-1e-11")]
+    weak = [(0, 1, 1), (1, 0, -2), (1, 2, "1.5e-11"), (2, 3, 1), (3, 2, "0.7"), (0, 4, 1), (3, 4, -2)]
+    for edges in (nearly, weak):
+        cert = certify(SignedDigraph.from_edges(edges), protocol, simulation=False)
+        assert cert.verdict == "certified", cert.notes
+        assert cert.rate is not None and cert.rate > 0

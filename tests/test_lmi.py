@@ -309,3 +309,58 @@ def test_a_proved_margin_is_below_and_near_the_smallest_eigenvalue(seed, n):
 def test_rounding_to_bits(value, bits):
     rounded = lmi.round_to_bits(value, bits)
     assert abs(rounded - Fraction(value)) <= abs(Fraction(value)) / 2**bits
+
+
+@given(SEEDS, st.integers(21, 40), st.sampled_from([0.0, 3.0]), st.booleans())
+def test_both_exact_routes_agree(seed, n, magnitude, spoil):
+    """The residual of a rounded Cholesky factor (n > 20) and the elimination, judged by python-flint's determinants."""
+    from lmi import exact
+
+    rng = np.random.default_rng(seed)
+    A = random_h_matrix(rng, n, magnitude)
+    omega = lmi.h_matrix_diagonal(A)
+    S = [
+        [Fraction(omega[i]) * Fraction(A[i, j]) + Fraction(omega[j]) * Fraction(A[j, i]) for j in range(n)]
+        for i in range(n)
+    ]
+    if spoil:
+        S[n - 1][n - 1] = Fraction(0)
+    rows = exact._scaled_lower_triangle(exact._rationals(S))
+    quick = exact._residual_test([list(row) for row in rows])
+    slow = exact.prove_positive_definite(S)
+    assert slow.proved is not spoil
+    assert slow.proved or not quick
+    whole = flint.fmpq_mat(n, n, [flint.fmpq(x.numerator, x.denominator) for row in S for x in row])
+    assert (whole.det() > 0) or spoil
+
+
+def test_the_residual_test_never_proves_a_singular_or_indefinite_matrix():
+    from lmi import exact
+
+    n = 30
+    singular = [[n - 1 if i == j else -1 for j in range(n)] for i in range(n)]  # a Laplacian
+    for shift in (0, Fraction(-1, 10**18)):
+        S = [[Fraction(x) + (shift if i == j else 0) for j, x in enumerate(row)] for i, row in enumerate(singular)]
+        assert not exact._residual_test(exact._scaled_lower_triangle(S))
+        assert not lmi.prove_positive_definite(S)
+    better = [
+        [Fraction(x) + (Fraction(1, 10**6) if i == j else 0) for j, x in enumerate(r)] for i, r in enumerate(singular)
+    ]
+    assert exact._residual_test(exact._scaled_lower_triangle(better))
+
+
+def test_exact_proofs_take_numpy_numbers_and_refuse_others():
+    assert lmi.prove_positive_definite(np.array([[2, 1], [1, 1]]))
+    assert lmi.prove_positive_definite(np.array([[2.0, 1.0], [1.0, 1.0]]))
+    for bad in ([[math.nan]], [["x"]], [[1j]], [[math.inf]]):
+        with pytest.raises(lmi.MatrixError, match="finite real"):
+            lmi.prove_positive_definite(bad)
+
+
+def test_leaders_that_do_not_decay_are_refused():
+    with pytest.raises(lmi.MatrixError, match="positive decrease"):
+        lmi.coupled_lyapunov([lmi.FixedLeader(np.ones(2), np.array([-2.0, 2.0]))], [[-1.0, 0.0]], [[1.0]])
+    with pytest.raises(lmi.MatrixError, match="admissible"):
+        lmi.Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[1.0]]), np.array([[-1.0]])).interval()
+    weak = lmi.Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1e-170]]), np.array([[1.0]])).interval()
+    assert math.isfinite(weak.exact)  # a weak coupling still bounds rho

@@ -132,6 +132,14 @@ def test_bad_starts_are_refused(x0, message):
         outcome(st_, x0)
 
 
+def test_a_start_by_label():
+    st_ = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]))
+    assert outcome(st_, {"2": 1, 1: 5}).final_state == (3, 3)
+    for bad in ({"1": 5}, {"1": 5, "3": 2}, "52", {5, 2}, iter([1, 2])):
+        with pytest.raises(ParameterError, match="start"):
+            outcome(st_, bad)
+
+
 def test_the_definitions_on_states():
     pair = analyse(SignedDigraph.from_edges([("a", "f", 1), ("b", "f", 1)]))
     assert is_stability([0, 0, 0], pair) and not is_stability([0, 1e-9, 0], pair)
