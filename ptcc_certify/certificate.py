@@ -20,13 +20,13 @@ import numpy as np
 
 from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS, Comparison, Envelope, Member
-from ptcc_certify.errors import FormatError, HypothesisError, NumberError, ParameterError, SimulationError
+from ptcc_certify.errors import FormatError, HypothesisError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, laplacian_spectrum
 from ptcc_certify.outcome import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.rationals import MAX_CHARACTERS, format_exact, shorten
+from ptcc_certify.rationals import format_exact, shorten, writable
 from ptcc_certify.simulation import Trajectory, simulate
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, theorem_for
@@ -364,10 +364,8 @@ def _start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any]) -> tuple
     for label, value in zip(structure.graph.labels, start, strict=True):
         if abs(value) > LARGEST_STATE:
             raise ParameterError(f"x0 of agent {shorten(label)} is beyond 1e300; choose another unit")
-        try:
-            format_exact(value)
-        except NumberError:
-            raise ParameterError(f"x0 of agent {shorten(label)} has too many digits to be kept; round it") from None
+        if not writable(value):
+            raise ParameterError(f"x0 of agent {shorten(label)} has too many digits to keep; round it")
     return start
 
 
@@ -449,8 +447,7 @@ def exact_or_ball(value: Fraction) -> str | dict[str, str]:
     >>> sorted(exact_or_ball(Fraction(1, 3**9000)))
     ['mid', 'radius']
     """
-    bits = value.numerator.bit_length() + value.denominator.bit_length()
-    if bits * 0.30103 < MAX_CHARACTERS - 6:
+    if writable(value):
         return format_exact(value)
     scale = 10**60
     mid = round(value * scale)
@@ -544,6 +541,7 @@ def _components_section(structure: Structure, result: Outcome | None) -> Any:
             "connectivity": [c.connectivity for c in components],
             "theorem": [c.claim.theorem for c in components],
             "behaviour": [c.claim.behaviour for c in components],
+            "corollaries": [list(c.claim.corollaries) for c in components],
         }
     state = result.final_state if result is not None and result.exact else None
     return [

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ptcc_certify.structure import Structure
 
 OK, VIOLATED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4
+#: From this size on the search may take more than a second, which a terminal is told.
+SLOW_NODES = 40
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
@@ -114,7 +116,10 @@ def certify(
     _refuse_output(output, graph)
     protocol = _protocol(options)
     signed = _read(graph, **options)
-    certificate = run(signed, protocol, _start(x0, seed, signed))
+    start = _start(x0, seed, signed)
+    if signed.n_nodes > SLOW_NODES and sys.stderr.isatty():
+        click.echo(f"searching a Lyapunov matrix of {signed.n_nodes} rows ...", err=True)
+    certificate = run(signed, protocol, start)
     if output:
         certificate.save(output)
     if as_json:

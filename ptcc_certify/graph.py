@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError
-from ptcc_certify.rationals import as_fraction, format_exact, nearest_float, shorten
+from ptcc_certify.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -155,6 +155,10 @@ class SignedDigraph:
                 "remove it or give a weight"
             )
         size = np.abs(self.weights)
+        if self._weights.kind == "fraction":
+            for edge, weight in enumerate(table.tolist()):
+                if not writable(weight):
+                    raise GraphError(f"weight of edge {self._edge_text(edge)} has too many digits to keep; round it")
         if (odd := np.flatnonzero((size < SMALLEST_WEIGHT) | (size > LARGEST_WEIGHT))).size:
             raise GraphError(
                 f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"

@@ -144,6 +144,18 @@ def nearest_float(value: Fraction) -> float:
         return math.inf if value > 0 else -math.inf
 
 
+def writable(value: Fraction) -> bool:
+    """Tell whether a rational is short enough to be written in the exact grammar.
+
+    Examples
+    --------
+    >>> writable(Fraction(1, 3)), writable(Fraction(1, 3**9000))
+    (True, False)
+    """
+    # One bit is at most 0.30103 decimal digits; the guard comes before the expensive conversion.
+    return (value.numerator.bit_length() + value.denominator.bit_length()) * 0.30103 <= MAX_CHARACTERS - 6
+
+
 def format_exact(value: Fraction) -> str:
     """Write a rational as ``p`` or ``p/q``, the inverse of :func:`parse_exact`.
 
@@ -157,7 +169,6 @@ def format_exact(value: Fraction) -> str:
     >>> format_exact(Fraction(6, -4)), format_exact(Fraction(3))
     ('-3/2', '3')
     """
-    # 1 bit is at most 0.30103 decimal digits; the guard comes before the expensive conversion.
-    if (value.numerator.bit_length() + value.denominator.bit_length()) * 0.30103 > MAX_CHARACTERS - 6:
+    if not writable(value):
         raise NumberError("a rational is too long to be written in the exact grammar")
     return str(value.numerator) if value.denominator == 1 else f"{value.numerator}/{value.denominator}"

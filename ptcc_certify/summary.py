@@ -14,7 +14,6 @@ from ptcc_certify.structure import Claim, Structure
 if TYPE_CHECKING:
     from ptcc_certify.certificate import Certificate
 
-WIDTH = 118
 _ORIENTATION = {
     "information": "a row a,b: information flows a -> b, b listens",
     "listens": "a row a,b: a listens to b",

@@ -687,8 +687,8 @@ def test_unknown_signs_are_refused_by_name(real_data: Path):
     run = ptcc("certify", str(path))
     assert run.code == 2 and run.out == ""
     (line,) = run.err.splitlines()
-    source, target = unknown[0]
-    assert f"weight 0 of edge {source} -> {target}" in line
+    assert "weight 0 of edge" in line
+    assert all(f"{source} -> {target}" in line for source, target in unknown)
     assert str(len(unknown)) in line and "unknown sign" in line
 
 
@@ -755,7 +755,7 @@ def test_more_than_a_hundred_components_are_grouped_in_arrays(edges: list[tuple]
     )
     assert isinstance(few["components"], list)
     groups = many["components"]
-    assert set(groups) == {"nodes", "connectivity", "theorem", "behaviour"}
+    assert set(groups) == {"nodes", "connectivity", "theorem", "behaviour", "corollaries"}
     assert {len(array) for array in groups.values()} == {109 - len(edges) // 2}
     assert [label for nodes in groups["nodes"] for label in nodes] == many["graph"]["nodes"]
     assert set(groups["connectivity"]) == {"strong"} and set(groups["theorem"]) == {"1.1"}

@@ -335,3 +335,8 @@ def test_one_node_is_a_graph():
     assert graph.laplacian().toarray().tolist() == [[0]]
     assert graph.exact_laplacian() == [[0]]
     assert repr(graph) == "SignedDigraph(1 nodes, 0 edges, 0 negative)"
+
+
+def test_a_weight_that_could_not_be_written_again_is_refused():
+    with pytest.raises(GraphError, match="too many digits"):
+        SignedDigraph.from_edges([("a", "b", "0." + "3" * 2500)])

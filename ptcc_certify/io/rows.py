@@ -133,7 +133,8 @@ class _Draft:
     def refuse_zeros(self, what: str) -> None:
         edges = np.flatnonzero(np.array([not value for value in self.values], dtype=bool)[self.codes])
         if edges.size:
-            which = f"{what} of edge {self.edge(edges[0])}{_in_all(edges.size)}"
+            named = ", ".join(self.edge(edge) for edge in edges[:5].tolist())
+            which = f"{what} of edge {named}{_in_all(edges.size)}"
             self.refuse(edges[0], f"{which}, and an unknown sign is not an edge; remove it or give a weight")
 
     def merge_duplicates(self, duplicates: str, undirected: bool) -> tuple[str, ...]:
