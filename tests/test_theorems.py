@@ -5,9 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 
 import casadi as ca
+import cvxpy as cp
 import numpy as np
 import pytest
 from generators import Made, all_classes, made_graphs, random_graph
+from generators import smallest as smallest_size
 from hypothesis import given
 from hypothesis import strategies as st
 from test_latex import read, rows_of
@@ -98,6 +100,53 @@ def test_every_row(name: str, kwargs: dict):
         if proof.interval is not None and V.rho is not None and proof.interval.exact is not None:
             assert 0 < proof.interval.printed <= proof.interval.exact
             assert V.rho <= proof.interval.exact
+
+
+def optimum_of_another_solver(structure: Structure, V: LyapunovFunction, theorem: str) -> float:
+    """The largest quotient of the row over its free matrices and ``rho`` by SCS, with a full matrix variable."""
+    L, n = laplacian(structure.graph), len(V.nodes)
+    A = L[np.ix_(V.nodes, V.nodes)]
+    unit = np.abs(A).max()
+    t, s, w, S = cp.Variable(), cp.Variable(), cp.Variable(n), cp.Variable((n, n), PSD=True)
+    product = cp.multiply(cp.reshape(w, (n, 1), order="C") @ np.ones((1, n)), A / unit)
+    form = product + product.T
+    constraints = [w >= 0, w <= 1]
+    at = 0
+    for block in V.blocks:
+        own, here = list(block.nodes), slice(at, at + len(block.nodes))
+        at += len(own)
+        if block.times_rho or theorem not in ("2.1", "3.1") or V.rho is None:
+            continue
+        d = np.array([float(x) for x in block.diagonal])
+        L_k = L[np.ix_(own, own)] / unit
+        picked = np.zeros((n, n))
+        picked[here, here] = 1.0
+        if next(c.balanced for c in structure.closed_components if list(c.nodes) == own):
+            decrease = s * (connectivity(L_k, d) * (d if theorem == "2.1" else np.full(len(own), d.min())))
+            constraints.append(w[here] == s * d)
+        else:
+            t_k, S_k = cp.Variable(), cp.Variable((len(own), len(own)), PSD=True)
+            inner = cp.multiply(cp.reshape(w[here], (len(own), 1), order="C") @ np.ones((1, len(own))), L_k)
+            constraints.append(inner + inner.T - t_k * np.eye(len(own)) == S_k)
+            decrease = t_k * np.ones(len(own))
+        selection = np.eye(n)[:, here]
+        form = form - cp.multiply(picked, form) + selection @ cp.diag(decrease) @ selection.T
+    problem = cp.Problem(cp.Maximize(t), [*constraints, form - t * np.eye(n) == S])
+    problem.solve(solver=cp.SCS, eps_abs=1e-9, eps_rel=1e-9, max_iters=200_000)
+    return float(t.value) * unit
+
+
+@pytest.mark.parametrize("name", ["1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 all single", "3.1 mixed no single", "3.2"])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed: int):
+    kwargs = dict(all_classes())[name]
+    made = random_graph(np.random.default_rng(seed), **dict(kwargs, n=smallest_size(**kwargs) + 1))
+    structure = analyse(made.graph)
+    theorem = theorem_for(structure)
+    V = theorem.lyapunov(structure)
+    assert theorem.rate(structure, V) == pytest.approx(
+        optimum_of_another_solver(structure, V, theorem.number), rel=1e-5
+    )
 
 
 @pytest.mark.parametrize("theorem", ["2.1", "2.2", "3.1 no single", "3.1 mixed", "3.2"])
