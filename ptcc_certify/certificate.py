@@ -7,6 +7,7 @@ corroborates and never proves.
 
 from __future__ import annotations
 
+import html
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -29,6 +30,7 @@ from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.rationals import format_exact, shorten, writable
 from ptcc_certify.simulation import Trajectory, simulate
 from ptcc_certify.structure import Claim, Structure, analyse
+from ptcc_certify.summary import certificate_lines
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, theorem_for
 
 SCHEMA = "ptcc-certificate/1"
@@ -262,6 +264,10 @@ class Certificate:
             "simulation": simulation,
             "notes": list(self.notes),
         }
+
+    def _repr_html_(self) -> str:
+        """Show the screen of ``ptcc certify`` in a notebook."""
+        return f"<pre>{html.escape(chr(10).join(certificate_lines(self, 'graph')))}</pre>"
 
     def __repr__(self) -> str:
         rate = "none" if self.proof.rate is None else f"{float(self.proof.rate):.6g}"
