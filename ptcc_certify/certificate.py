@@ -11,7 +11,7 @@ import html
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -360,8 +360,6 @@ def certify(
     )
     if trajectory is None or not certificate.envelope.members:
         return certificate
-    from dataclasses import replace
-
     return replace(certificate, comparison=certificate.envelope.compare(trajectory))
 
 
