@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import LyapunovFunction
 
 if TYPE_CHECKING:
-    from ptcc_certify.simulation import Trajectory
+    from ptcc_certify.trajectory import Trajectory
 
 #: Instants, as fractions of the deadline, at which ratios and residuals are reported.
 FRACTIONS = (0.5, 0.9, 0.99)
@@ -120,6 +120,10 @@ class Comparison:
         Smallest ``1 - t/T`` that was sampled before the deadline.
     deadline_resolved : bool
         Whether the run settled, so that samples from the deadline on were judged too.
+    sliding_ratio : float or None
+        Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound`` with ``f = floor * tolerance * |sigma(0)|``.
+    reaching_kept : bool or None
+        Sliding mode: whether every sliding variable was 0 at its certified reaching time.
     """
 
     worst_ratio: float
@@ -130,11 +134,21 @@ class Comparison:
     ratios: dict[float, float]
     stop: float
     deadline_resolved: bool
+    sliding_ratio: float | None = None
+    reaching_kept: bool | None = None
 
     @property
     def violated(self) -> bool:
         """Whether a bound was exceeded by more than rounding."""
-        return self.worst_ratio > 1 + 1e-6
+        return max(self.worst_ratio, self.sliding_ratio or 0.0) > 1 + 1e-6 or self.reaching_kept is False
+
+
+class History(NamedTuple):
+    """``sqrt(V)`` of one run and its bound over time, (M,) each, and the floor ``f`` of the integrator."""
+
+    root: np.ndarray
+    bound: np.ndarray
+    floor: float
 
 
 @dataclass(frozen=True)
@@ -205,44 +219,48 @@ class Envelope:
         if not np.isfinite(trajectory.clock[0]):
             raise ParameterError("the run has no sample before the deadline, where a bound could be compared")
         T = float(self.gain.T)
-        elapsed = trajectory.clock - trajectory.clock[0]
-        judged = elapsed > 0
+        judged = trajectory.clock > trajectory.clock[0]
         if not trajectory.deadline_resolved:
             judged &= trajectory.t < T
-        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
-        states = states / _sizes(states)
         worst, floor, resolved, count = 0.0, 0.0, 0.0, 0
         ratios: dict[float, float] = {}
-        for member in self.members:
-            z = member.coordinates_of(states, self._laplacian)
-            unit = _sizes(z)
-            root = np.sqrt(member.value(z / unit))
-            decay = np.exp(-member.rate * elapsed / 2)
-            for column in range(states.shape[1]):
-                bound = root[column, 0] * decay
-                f = (
-                    FLOOR_FACTOR
-                    * trajectory.rtol
-                    * self._state_scale(member, states[:, column], float(unit[column, 0]))
-                )
-                excess = np.maximum(root[column] - f, 0.0)[judged]
-                with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                    ratio = np.where(excess > 0, excess / bound[judged], 0.0)
-                    plain = np.where(root[column] > 0, root[column] / bound, 0.0)
-                worst = max(worst, float(ratio.max(initial=0.0)))
-                count += int((excess > 0).sum())
-                if root[column, 0] > 0:
-                    floor = max(floor, float(f / (trajectory.rtol * root[column, 0])))
-                below = trajectory.remaining[(bound < f) & (trajectory.remaining > 0)]
-                resolved = max(resolved, float(below.max(initial=0.0)))
-                for fraction in FRACTIONS:
-                    at = int(np.argmin(np.abs(trajectory.t - fraction * T)))
-                    if abs(trajectory.t[at] - fraction * T) <= 1e-9 * T:
-                        ratios[fraction] = max(ratios.get(fraction, 0.0), float(plain[at]))
+        for history in (h for member in self.members for h in self.histories(member, trajectory)):
+            root, bound, f = history
+            excess = np.maximum(root - f, 0.0)[judged]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                ratio = np.where(excess > 0, excess / bound[judged], 0.0)
+                plain = np.where(root > 0, root / bound, 0.0)
+            worst = max(worst, float(ratio.max(initial=0.0)))
+            count += int((excess > 0).sum())
+            if root[0] > 0:
+                floor = max(floor, float(f / (trajectory.rtol * root[0])))
+            below = trajectory.remaining[(bound < f) & (trajectory.remaining > 0)]
+            resolved = max(resolved, float(below.max(initial=0.0)))
+            for fraction in FRACTIONS:
+                at = int(np.argmin(np.abs(trajectory.t - fraction * T)))
+                if abs(trajectory.t[at] - fraction * T) <= 1e-9 * T:
+                    ratios[fraction] = max(ratios.get(fraction, 0.0), float(plain[at]))
         before = trajectory.remaining[trajectory.remaining > 0]
         return Comparison(
             worst, floor, trajectory.rtol, resolved, count, ratios, float(before.min()), trajectory.deadline_resolved
         )
+
+    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start."""
+        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        states = states / _sizes(states)
+        z = member.coordinates_of(states, self._laplacian)
+        unit = _sizes(z)
+        root = np.sqrt(member.value(z / unit))
+        decay = np.exp(-member.rate * (trajectory.clock - trajectory.clock[0]) / 2)
+        return [
+            History(
+                root[column],
+                root[column, 0] * decay,
+                FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column], float(unit[column, 0])),
+            )
+            for column in range(states.shape[1])
+        ]
 
     def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:
         """Return ``||dz||_weights / unit`` for an error ``|dx_k| = max |x_k|`` in every entry, the worst case."""

@@ -25,15 +25,19 @@ from ptcc_certify.errors import FormatError, HypothesisError, ParameterError, Si
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, laplacian_spectrum
-from ptcc_certify.outcome import Influence, Outcome, exact_start, influence, outcome
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
+from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import format_exact, shorten, writable
-from ptcc_certify.simulation import Trajectory, simulate
+from ptcc_certify.reaching import ReachingTime, certified_reaching_times
+from ptcc_certify.simulation import simulate
+from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.summary import certificate_lines
-from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, theorem_for
+from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
+from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
 SCHEMA = "ptcc-certificate/1"
+PROPOSITION_1 = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 CERTIFIED, UNDECIDED = "certified", "undecided"
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
@@ -54,7 +58,7 @@ class Certificate:
     Attributes
     ----------
     structure : Structure
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
     theorem : Theorem
         Whose Lyapunov function is used.
     lyapunov : LyapunovFunction or None
@@ -66,10 +70,14 @@ class Certificate:
     spectral_rate : float or None
         ``2 min Re lambda`` in floating point: no certificate can reach further.
     start : tuple of Fraction or None
+    sigma0 : tuple of Fraction or None
+        ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
+    reaching : tuple of ReachingTime or None
+        When each sliding variable is proved to be 0, whatever the disturbance.
     influence : Influence
         ``Q``, factored.
     outcome : Outcome or None
-        ``Q X(0)``; None without a start.
+        ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without a start.
     trajectory : Trajectory or None
     comparison : Comparison or None
     notes : tuple of str
@@ -77,16 +85,19 @@ class Certificate:
     """
 
     structure: Structure
-    protocol: NominalProtocol
+    protocol: Protocol
     theorem: Theorem
     lyapunov: LyapunovFunction | None
     proof: RateProof
     numerical_rate: float | None
     spectral_rate: float | None
     start: tuple[Fraction, ...] | None
+    sigma0: tuple[Fraction, ...] | None
+    reaching: tuple[ReachingTime, ...] | None
     influence: Influence
     outcome: Outcome | None
     outcome_proof: tuple[Obligation, ...]
+    sliding_proof: tuple[Obligation, ...]
     trajectory: Trajectory | None
     comparison: Comparison | None
     notes: tuple[str, ...]
@@ -98,8 +109,14 @@ class Certificate:
 
     @property
     def claim(self) -> Claim | None:
-        """What is claimed of a weakly connected graph; None if disconnected (see ``structure.components``)."""
-        return self.structure.claim
+        """What is claimed of a weakly connected graph; None if disconnected (see ``claims``)."""
+        return self.claims[0] if len(self.claims) == 1 else None
+
+    @cached_property
+    def claims(self) -> tuple[Claim, ...]:
+        """What is claimed of each of ``structure.components``."""
+        claims = tuple(component.claim for component in self.structure.components)
+        return tuple(map(sliding_claim, claims)) if isinstance(self.protocol, SlidingModeProtocol) else claims
 
     @property
     def rate(self) -> Fraction | None:
@@ -110,6 +127,11 @@ class Certificate:
     def constant(self) -> bool:
         """Whether every agent keeps its state, so that there is no decay to certify."""
         return self.lyapunov is not None and not self.lyapunov.blocks
+
+    @property
+    def obligations(self) -> tuple[Obligation, ...]:
+        """Everything that was proved."""
+        return (*self.proof.obligations, *self.sliding_proof, *self.outcome_proof)
 
     @property
     def verdict(self) -> str:
@@ -124,6 +146,11 @@ class Certificate:
             return None
         return float(self.proof.rate) / self.spectral_rate
 
+    @property
+    def direct(self) -> bool:
+        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
+        return not any(self.sigma0 or ())
+
     @cached_property
     def rate_limit(self) -> Fraction | None:
         """An exact upper bound of every rate: ``2 trace(L) / r``, twice the mean of the ``r`` nonzero eigenvalues."""
@@ -137,6 +164,9 @@ class Certificate:
         members: tuple[Member, ...] = ()
         if self.lyapunov is not None and self.proof.rate is not None:
             members = (Member.of("paper", self.structure, self.lyapunov, float(self.proof.rate)),)
+        if isinstance(self.protocol, SlidingModeProtocol):
+            sigma0, reaching = self.sigma0 or (), self.reaching or ()
+            return SlidingEnvelope(self.structure, self.protocol.gain, members, self.protocol, sigma0, reaching)
         return Envelope(self.structure, self.protocol.gain, members)
 
     def best_possible_residual(self, remaining: float) -> float | None:
@@ -154,18 +184,18 @@ class Certificate:
             "graph": _graph_section(self.graph),
             "structure": _structure_section(self.structure),
             "claim": None if self.claim is None else _claim_section(self.claim),
-            **({} if self.claim else {"components": _components_section(self.structure, self.outcome)}),
-            "protocol": self.protocol.to_dict(),
+            **({} if self.claim else {"components": _components_section(self.structure, self.claims, self.outcome)}),
+            "protocol": self._protocol_section(),
             "paper": self._paper_section(),
             "lyapunov": {"members": self._members_section()},
             "rates": {"paper": _text(self.proof.rate), "diagonal": None, "certified": _text(self.proof.rate)},
             "prefactor": self._prefactor_section(),
             "initial_state": self.start and dict(zip(labels, map(format_exact, self.start), strict=True)),
-            "sigma0": None,
+            "sigma0": self.sigma0 and dict(zip(labels, map(format_exact, self.sigma0), strict=True)),
             "outcome": self._outcome_section(),
-            "reaching_time": None,
+            "reaching_time": self._reaching_section(),
             "effort": None,
-            "proof": [_obligation_section(o) for o in (*self.proof.obligations, *self.outcome_proof)],
+            "proof": [_obligation_section(o) for o in self.obligations],
             "verdict": self.verdict,
             "unverified": self._unverified_section(),
         }
@@ -178,6 +208,21 @@ class Certificate:
         """Write the certificate to ``path``; the file appears whole or not at all."""
         # What UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape.
         write_atomically(path, self.to_json().encode("utf-8", "backslashreplace"))
+
+    def _protocol_section(self) -> dict[str, Any]:
+        run = self.trajectory
+        if not isinstance(self.protocol, SlidingModeProtocol):
+            return self.protocol.to_dict()
+        return {**self.protocol.to_dict(), "disturbance": run.source if isinstance(run, SlidingTrajectory) else None}
+
+    def _reaching_section(self) -> dict[str, Any] | None:
+        if self.reaching is None:
+            return None
+        return {
+            "bound": PROPOSITION_1,
+            "clock": "z = ln(T_r / (T_r - t)); null: certain at T_r only",
+            "z": {label: _text(r.z) for label, r in zip(self.graph.labels, self.reaching, strict=True)},
+        }
 
     def _paper_section(self) -> dict[str, Any] | None:
         V = self.lyapunov
@@ -248,6 +293,7 @@ class Certificate:
             "stop": comparison.stop,
             "tolerances": {"relative": comparison.tolerance},
             "deadline_resolved": comparison.deadline_resolved,
+            **self._sliding_run_section(),
         }
         floats = None
         if self.outcome is not None and not self.outcome.exact:
@@ -259,10 +305,24 @@ class Certificate:
             "residual": {
                 str(1 - q if q > 1e-3 else f"1-{q:g}"): _finite(self.envelope.residual(q))
                 for q in (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
-            },
+            }
+            if self.direct
+            else None,
             "final_state": floats,
             "simulation": simulation,
             "notes": list(self.notes),
+        }
+
+    def _sliding_run_section(self) -> dict[str, Any]:
+        run, seen = self.trajectory, self.comparison
+        if not isinstance(run, SlidingTrajectory) or seen is None:
+            return {}
+        z = run.reaching_z.tolist()
+        return {
+            "sliding_ratio": _finite(seen.sliding_ratio),
+            "reaching_kept": seen.reaching_kept,
+            "reached": {label: _finite(value) for label, value in zip(self.graph.labels, z, strict=True)},
+            "disturbance_bounded_by": run.bounded_by,
         }
 
     def _repr_html_(self) -> str:
@@ -277,9 +337,11 @@ class Certificate:
 
 def certify(
     graph: SignedDigraph,
-    protocol: NominalProtocol,
+    protocol: Protocol,
     x0: Sequence[Any] | Mapping[Any, Any] | None = None,
     *,
+    sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    disturbance: Any = None,
     simulation: bool = True,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -288,10 +350,14 @@ def certify(
     ----------
     graph : SignedDigraph
         Any signed digraph, disconnected ones included.
-    protocol : NominalProtocol
-        With ``rho2 > 0``.
+    protocol : NominalProtocol or SlidingModeProtocol
+        With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
     x0 : sequence of N numbers or mapping of label to number, optional
         The start, in node order or by label. Without it there is no final state and no simulation.
+    sigma0 : sequence of N numbers or mapping of label to number, optional
+        Sliding mode: ``sigma(0)``, by default 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
+    disturbance : optional
+        Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
     simulation : bool
         Whether to compare the proved bound with a CVODES run.
 
@@ -302,45 +368,61 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), or a start of the wrong length, beyond 1e300 or of thousands of digits.
+        ``rho2 = 0`` (no deadline), a start of the wrong length, beyond 1e300 or of thousands of digits, or a
+        disturbance that exceeds ``delta``.
 
     References
     ----------
-    Theorems 1 to 3 and Corollaries 1 to 5 of Zhu et al., Robust prescribed-time coordination control of
+    Theorems 1 to 6, Corollaries 1 to 10 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
     cooperative-antagonistic networks with disturbances.
 
     Examples
     --------
+    >>> from ptcc_certify.protocols import NominalProtocol
     >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
     >>> cert
     Certificate(bipartite consensus, Theorem 1.1, rate 4, certified)
     >>> cert.outcome
     Outcome(1=-1, 2=1)
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
+    >>> cert, cert.reaching
+    (Certificate(bipartite consensus, Theorem 4.1, rate 4, certified), (ReachingTime(0.43409, 0.566 before T_r), \
+ReachingTime(0, 1 before T_r)))
+    >>> cert.outcome
+    Outcome(1=-1.5, 2=1.5)
     """
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    sliding = isinstance(protocol, SlidingModeProtocol)
+    for name, value in (("sigma0", sigma0), ("disturbance", disturbance)):
+        if value is not None and not sliding:
+            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
     structure = analyse(graph)
-    theorem = theorem_for(structure)
-    notes: list[str] = []
-    V, proof, numerical = _search_and_prove(structure, theorem, notes)
-    start = None if x0 is None else _start(structure, x0)
-    matrix = influence(structure)
-    result = None if start is None else outcome(structure, start)
-    obligations: tuple[Obligation, ...] = ()
-    if matrix.exact:
-        obligations = _prove_outcome(structure, matrix)
-    else:
-        notes.append(f"the outcome of a graph of more than {EXACT_NODES} nodes is computed in floating point only")
+    start = None if x0 is None else _start(structure, x0, "x0")
+    manifold, reaching, sliding_proof = _reaching(structure, protocol, sigma0)
     trajectory = comparison = None
+    notes: list[str] = []
     if simulation and start is not None:
+        more = {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance} if sliding else {}
         try:
-            trajectory = simulate(graph, protocol, [float(x) for x in start])
+            trajectory = simulate(graph, protocol, [float(x) for x in start], **more)
         except SimulationError as error:
             notes.append(f"simulation: {error}")
+    theorem = theorem_for(structure, protocol.kind)
+    V, proof, numerical = _search_and_prove(structure, theorem, notes)
+    matrix = influence(structure)
+    gone = manifold or [Fraction(0)] * graph.n_nodes
+    result = None if start is None else outcome(structure, [x - s for x, s in zip(start, gone, strict=True)])
+    obligations: tuple[Obligation, ...] = ()
+    if matrix.exact:
+        obligations = _prove_outcome(structure, matrix, sliding)
+    else:
+        notes.append(f"the outcome of a graph of more than {EXACT_NODES} nodes is computed in floating point only")
     if trajectory is not None and result is not None:
         gap = float(np.abs(trajectory.final_state - result.values).max())
-        if gap > SETTLED * max(float(max(map(abs, start or (Fraction(0),)))), 1e-300):
+        if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
             notes.append(f"the simulated run is still {gap:.1e} from the outcome: its slowest modes had not settled")
     certificate = Certificate(
         structure=structure,
@@ -351,9 +433,12 @@ def certify(
         numerical_rate=numerical,
         spectral_rate=_spectral_rate(structure, proof.rate, notes),
         start=start,
+        sigma0=manifold,
+        reaching=reaching,
         influence=matrix,
         outcome=result,
         outcome_proof=obligations,
+        sliding_proof=sliding_proof,
         trajectory=trajectory,
         comparison=comparison,
         notes=tuple(notes),
@@ -363,14 +448,35 @@ def certify(
     return replace(certificate, comparison=certificate.envelope.compare(trajectory))
 
 
-def _start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any]) -> tuple[Fraction, ...]:
-    start = tuple(exact_start(structure, x0))
+def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
+    start = tuple(exact_start(structure, values, name))
     for label, value in zip(structure.graph.labels, start, strict=True):
         if abs(value) > LARGEST_STATE:
-            raise ParameterError(f"x0 of agent {shorten(label)} is beyond 1e300; choose another unit")
+            raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
         if not writable(value):
-            raise ParameterError(f"x0 of agent {shorten(label)} has too many digits to keep; round it")
+            raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
     return start
+
+
+def _reaching(
+    structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
+) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None, tuple[Obligation, ...]]:
+    """Return ``sigma(0)``, the proved reaching times and what was proved; nothing for the nominal protocol."""
+    if not isinstance(protocol, SlidingModeProtocol):
+        return None, None, ()
+    labels = structure.graph.labels
+    start = (Fraction(0),) * len(labels) if sigma0 is None else _start(structure, sigma0, "sigma0")
+    times = certified_reaching_times(protocol, start)
+    statement = f"mu1 > delta, mu2 > 0, mu3 > 0, so {PROPOSITION_1}, 0 from T_r on"
+    numbers = {name: getattr(protocol, name) for name in ("mu1", "delta", "mu2", "mu3")}
+    proved = [Obligation("sliding-bound", statement, "Proposition 1", numbers)]
+    early = {label: r.z for label, r in zip(labels, times, strict=True) if r.z is not None}
+    if any(start) and early:
+        statement = (
+            "|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at ln(T_r/(T_r - t)) = z_k, so sigma_k = 0 from t on"
+        )
+        proved.append(Obligation("reaching-time", statement, "comparison with the adversary", early))
+    return start, times, tuple(proved)
 
 
 def _search_and_prove(
@@ -401,7 +507,7 @@ def _search_and_prove(
     return V, proof, numerical
 
 
-def _prove_outcome(structure: Structure, matrix: Influence) -> tuple[Obligation, ...]:
+def _prove_outcome(structure: Structure, matrix: Influence, sliding: bool) -> tuple[Obligation, ...]:
     """Check in rationals that ``Q`` maps into the kernel of ``L`` and keeps what the motion keeps.
 
     ``L Q = 0`` column by column of the factored form, ``eta_k' M(L_Lk) = 0`` and ``eta_k' 1 = 1``; since the kernel
@@ -424,6 +530,8 @@ def _prove_outcome(structure: Structure, matrix: Influence) -> tuple[Obligation,
         if not kept or sum(eta) != 1:
             raise ArithmeticError("internal check failed: the outcome does not keep eta' G X")
     statement = "L Q = 0 and eta_k' G_k X_Lk is kept by the motion, so X(T) = Q X(0)"
+    if sliding:
+        statement = "L Q = 0 and Q (X - sigma) is kept by the motion, so X(T_r + T_s) = Q (X(0) - sigma(0))"
     return (Obligation("outcome", statement, "Lemmas 2, 8 and 9"),)
 
 
@@ -463,7 +571,8 @@ def structure_json(structure: Structure) -> dict[str, Any]:
     data = {"graph": _graph_section(structure.graph), "structure": _structure_section(structure)}
     if structure.claim is not None:
         return {**data, "claim": _claim_section(structure.claim)}
-    return {**data, "claim": None, "components": _components_section(structure, None)}
+    claims = [component.claim for component in structure.components]
+    return {**data, "claim": None, "components": _components_section(structure, claims, None)}
 
 
 def read_certificate(path: str | Path) -> dict[str, Any]:
@@ -537,25 +646,25 @@ def _claim_section(claim: Claim) -> dict[str, Any]:
     return {"theorem": claim.theorem, "behaviour": claim.behaviour, "corollaries": list(claim.corollaries)}
 
 
-def _components_section(structure: Structure, result: Outcome | None) -> Any:
+def _components_section(structure: Structure, claims: Sequence[Claim], result: Outcome | None) -> Any:
     components, labels = structure.components, structure.graph.labels
     if len(components) > MANY_COMPONENTS:
         return {
             "nodes": [[labels[v] for v in c.nodes] for c in components],
             "connectivity": [c.connectivity for c in components],
-            "theorem": [c.claim.theorem for c in components],
-            "behaviour": [c.claim.behaviour for c in components],
-            "corollaries": [list(c.claim.corollaries) for c in components],
+            "theorem": [claim.theorem for claim in claims],
+            "behaviour": [claim.behaviour for claim in claims],
+            "corollaries": [list(claim.corollaries) for claim in claims],
         }
     state = result.final_state if result is not None and result.exact else None
     return [
         {
             "nodes": [labels[v] for v in c.nodes],
             "connectivity": c.connectivity,
-            "claim": _claim_section(c.claim),
+            "claim": _claim_section(claim),
             "outcome": None if state is None else {labels[v]: exact_or_ball(Fraction(state[v])) for v in c.nodes},
         }
-        for c in components
+        for c, claim in zip(components, claims, strict=True)
     ]
 
 

@@ -22,7 +22,7 @@ from ptcc_certify.errors import ParameterError, PTCCError
 if TYPE_CHECKING:
     from ptcc_certify.certificate import Certificate
     from ptcc_certify.graph import SignedDigraph
-    from ptcc_certify.protocols import NominalProtocol
+    from ptcc_certify.protocols import Protocol
     from ptcc_certify.structure import Structure
 
 OK, VIOLATED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4
@@ -50,14 +50,30 @@ _graph_options = _options(
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
 )
 _protocol_options = _options(
-    click.option("--protocol", "kind", type=click.Choice(["nominal"]), default="nominal", show_default=True),
-    click.option("--T", "T", default="1", show_default=True, help="Deadline."),
+    click.option(
+        "--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal", show_default=True
+    ),
+    click.option("--T", "T", show_default="1", help="Deadline (nominal)."),
     click.option("--rho1", default="1", show_default=True, help="Constant part of the gain."),
     click.option("--rho2", default="1", show_default=True, help="Factor of the growing part of the gain."),
     click.option("--kappa", default="2", show_default=True, help="Exponent of the time scaling."),
+    click.option("--T-r", "T_r", show_default="0.5", help="Sliding mode: time to reach the manifold."),
+    click.option("--T-s", "T_s", show_default="0.5", help="Sliding mode: time on it; the deadline is T_r + T_s."),
+    click.option("--mu1", show_default="2", help="Sliding mode: switching gain, above delta."),
+    click.option("--mu2", show_default="1", help="Sliding mode: constant part of the reaching gain."),
+    click.option("--mu3", show_default="1", help="Sliding mode: factor of its growing part."),
+    click.option("--delta", show_default="1", help="Sliding mode: bound of every disturbance."),
+    click.option(
+        "--disturbance",
+        metavar="EXPR",
+        show_default="adversary",
+        help="Of the simulated run: an expression of k and t, adversary, telegraph or none.",
+    ),
+    click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
     click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
-    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of a random start."),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random starts."),
 )
+_SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
@@ -114,12 +130,12 @@ def certify(
 
     expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
     _refuse_output(output, graph)
-    protocol = _protocol(options)
+    protocol = _protocol(kind, options)
     signed = _read(graph, **options)
     start = _start(x0, seed, signed)
     if signed.n_nodes > SLOW_NODES and sys.stderr.isatty():
         click.echo(f"searching a Lyapunov matrix of {signed.n_nodes} rows ...", err=True)
-    certificate = run(signed, protocol, start)
+    certificate = run(signed, protocol, start, **_sliding_options(protocol, options, seed, signed))
     if output:
         certificate.save(output)
     if as_json:
@@ -138,14 +154,23 @@ def certify(
     "--dimension", type=click.IntRange(1, 1000), default=1, show_default=True, help="State components per agent."
 )
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
+@click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
 def simulate(
-    graph: str, kind: str, x0: str, seed: int, dimension: int, samples: int, output: str | None, **options: Any
+    graph: str,
+    kind: str,
+    x0: str,
+    seed: int,
+    dimension: int,
+    samples: int,
+    boundary_layer: float | None,
+    output: str | None,
+    **options: Any,
 ) -> int:
     """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
 
-    rho2 = 0 runs the protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d numbers,
-    agent after agent.
+    rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
+    numbers, agent after agent. Under the sliding-mode protocol columns sigma(<label>) follow the states.
     """
     from ptcc_certify.io import write_atomically
     from ptcc_certify.simulation import simulate as run
@@ -156,14 +181,23 @@ def simulate(
     if suffix in FIGURES and dimension > 1:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     _refuse_output(output, graph)
-    protocol = _protocol(options)
+    protocol = _protocol(kind, options)
+    if kind == "sliding-mode" and dimension > 1:
+        raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = _read(graph, **options)
-    trajectory = run(signed, protocol, _start_columns(x0, seed, signed, dimension), samples=samples)
+    trajectory = run(
+        signed,
+        protocol,
+        _start_columns(x0, seed, signed, dimension),
+        samples=samples,
+        boundary_layer=boundary_layer,
+        **_sliding_options(protocol, options, seed, signed),
+    )
     if output and suffix in FIGURES:
-        from ptcc_certify.plots import plot_trajectory
+        from ptcc_certify.plots import plot_run
         from ptcc_certify.structure import analyse
 
-        _save_figure(plot_trajectory(trajectory, analyse(signed)).figure, output)
+        _save_figure(plot_run(trajectory, analyse(signed)), output)
     elif output:
         write_atomically(output, trajectory.to_csv())
     else:
@@ -177,35 +211,42 @@ def simulate(
 @click.argument("name", default="all")
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 def examples(name: str, output: str | None) -> int:
-    """Run the paper's examples (all, a number 1 to 3, or a graph such as fig1a) and print one row each."""
+    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each."""
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.plots import plot_decay, plot_trajectory
-    from ptcc_certify.protocols import NominalProtocol
+    from ptcc_certify.plots import plot_decay, plot_run
 
     chosen, code = select(name), OK
     if output:
         _make_folder(output)
-    click.echo(f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}  verdict")
+    click.echo(
+        f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}"
+        f"{'reached':>10}{'proved by':>11}{'T_r':>5}  verdict"
+    )
     for example, graph_name, reported in chosen:
-        protocol = NominalProtocol(T=example.T, rho1=example.rho1, rho2=example.rho2, kappa=example.kappa)
-        certificate = run(load_graph(graph_name), protocol, example.x0.split(","))
+        certificate = run(
+            load_graph(graph_name),
+            example.protocol(),
+            example.x0.split(","),
+            sigma0=example.sigma0 and example.sigma0.split(","),
+            disturbance=example.disturbance,
+        )
         claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
         assert claim is not None
         click.echo(
             f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
             f"{float(rate or 0):>9.4f}{certificate.tightness or 0:>11.3f}"
-            f"{seen.worst_ratio if seen else 0:>8.3f}  {certificate.verdict}"
+            f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  {certificate.verdict}"
         )
         code = max(code, _exit_code(certificate, reported, None))
         if output:
-            folder = Path(output)
-            certificate.save(folder / f"{graph_name}.json")
+            stem = Path(output) / (graph_name if example.sigma0 is None else f"{graph_name}_sliding")
+            certificate.save(f"{stem}.json")
             if certificate.trajectory is not None:
-                axes = plot_trajectory(certificate.trajectory, certificate.structure)
-                _save_figure(axes.figure, folder / f"{graph_name}_states.png")
+                figure = plot_run(certificate.trajectory, certificate.structure, certificate.reaching)
+                _save_figure(figure, f"{stem}_states.png")
             if seen is not None:
-                _save_figure(plot_decay(certificate).figure, folder / f"{graph_name}_decay.png")
+                _save_figure(plot_decay(certificate).figure, f"{stem}_decay.png")
     return code
 
 
@@ -259,13 +300,52 @@ def _read(
     )
 
 
-def _protocol(options: dict[str, Any]) -> NominalProtocol:
-    from ptcc_certify.protocols import NominalProtocol
+def _protocol(kind: str, options: dict[str, Any]) -> Protocol:
+    from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
-    return NominalProtocol(**{name: options[name] for name in ("T", "rho1", "rho2", "kappa")})
+    shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
+    if kind == "nominal":
+        for name in (*_SLIDING_DEFAULTS, "disturbance", "sigma0"):
+            if options[name] is not None:
+                flag = name.replace("_", "-")
+                raise ParameterError(
+                    f"--{flag} belongs to --protocol sliding-mode; leave it out or change the protocol"
+                )
+        return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
+    if options["T"] is not None:
+        raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
+    own = {name: default if options[name] is None else options[name] for name, default in _SLIDING_DEFAULTS.items()}
+    return SlidingModeProtocol(**own, **shared)
 
 
-def _start(x0: str, seed: int, graph: SignedDigraph) -> list[Fraction]:
+def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, graph: SignedDigraph) -> dict[str, Any]:
+    """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
+    from ptcc_certify.disturbance import as_disturbance
+    from ptcc_certify.protocols import SlidingModeProtocol
+
+    if not isinstance(protocol, SlidingModeProtocol):
+        return {}
+    sigma0 = "0" if options["sigma0"] is None else options["sigma0"]
+    source = "adversary" if options["disturbance"] is None else options["disturbance"]
+    horizon = 2 * float(protocol.T)
+    return {
+        "sigma0": [Fraction(0)] * graph.n_nodes if sigma0 == "0" else _start(sigma0, [seed, 1], graph),
+        "disturbance": as_disturbance(source, graph.n_nodes, protocol.delta, horizon, seed),
+    }
+
+
+def _reached(certificate: Certificate) -> str:
+    """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
+    from ptcc_certify.protocols import SlidingModeProtocol
+    from ptcc_certify.trajectory import SlidingTrajectory
+
+    run, reaching, protocol = certificate.trajectory, certificate.reaching, certificate.protocol
+    if reaching is None or not isinstance(run, SlidingTrajectory) or not isinstance(protocol, SlidingModeProtocol):
+        return f"{'-':>10}{'-':>11}{'-':>5}"
+    return f"{run.reaching_times.max():>10.5f}{max(r.time for r in reaching):>11.5f}{float(protocol.T_r):>5.2g}"
+
+
+def _start(x0: str, seed: Any, graph: SignedDigraph) -> list[Fraction]:
     if x0 != "random":
         from ptcc_certify.io import read_state
 
@@ -289,7 +369,7 @@ def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> 
     return np.array([_number(text, "--x0") for text in texts]).reshape(graph.n_nodes, dimension)
 
 
-def _random_start(seed: int, n: int, dimension: int) -> list[list[Fraction]]:
+def _random_start(seed: Any, n: int, dimension: int) -> list[list[Fraction]]:
     """Return starts uniform on [-10, 10], to three decimals, so that they can be written down."""
     import numpy as np
 

@@ -64,7 +64,7 @@ class Gain:
 
     def __init__(self, T: Exact, rho1: Exact, rho2: Exact, kappa: Exact):
         for name, given in (("T", T), ("rho1", rho1), ("rho2", rho2), ("kappa", kappa)):
-            object.__setattr__(self, name, _parameter(name, given, zero_allowed=name == "rho2"))
+            object.__setattr__(self, name, parameter(name, given, zero_allowed=name == "rho2"))
         for name, value in (("rho1 T", self.rho1 * self.T), ("rho2 kappa", self.pole), ("rho2 kappa/T", self._peak)):
             _refuse_out_of_range(name, value)
 
@@ -146,8 +146,16 @@ class Gain:
         """Return the clock ``s`` as a CasADi expression of the symbol ``t``."""
         return self._clock(t, self._numbers())
 
-    def latex(self, of: Literal["gain", "phi", "clock"] = "gain", *, numbers: bool = True) -> str:
+    def latex(
+        self,
+        of: Literal["gain", "phi", "clock"] = "gain",
+        *,
+        numbers: bool = True,
+        letters: Iterable[str] = _PARAMETERS,
+    ) -> str:
         r"""Return the LaTeX of the expression itself, with the parameters as numbers or as letters.
+
+        ``letters`` names ``T``, ``rho1``, ``rho2`` and ``kappa``, for a gain whose parameters are called otherwise.
 
         Examples
         --------
@@ -159,7 +167,11 @@ class Gain:
         forms = {"gain": self._gain, "phi": self._phi, "clock": self._clock}
         if of not in forms:
             raise ParameterError(f'LaTeX of "{shorten(str(of))}" is unknown; use "gain", "phi" or "clock"')
-        parameters = self._numbers() if numbers else {name: ca.SX.sym(name) for name in _PARAMETERS}
+        parameters = (
+            self._numbers()
+            if numbers
+            else {name: ca.SX.sym(letter) for name, letter in zip(_PARAMETERS, letters, strict=True)}
+        )
         return to_latex(forms[of](ca.SX.sym("t"), parameters))
 
     def _numbers(self) -> dict[str, Any]:
@@ -216,7 +228,7 @@ def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Ex
     array([8., 1., 0., 0.])
     """
     rates = {"a": a, "b": b, "T": T, "kappa": kappa}
-    decay, power, deadline, exponent = (float(_parameter(name, value)) for name, value in rates.items())
+    decay, power, deadline, exponent = (float(parameter(name, value)) for name, value in rates.items())
     t = np.asarray(t, dtype=float)
     q = np.maximum(1 - t / deadline, 0)
     return np.asarray(V0, dtype=float) * q ** (exponent * power) * np.exp(-decay * t)
@@ -240,7 +252,14 @@ def readable(value: Fraction) -> str:
     return shorten(str(value))
 
 
-def _parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
+def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
+    """Return a parameter as an exact rational, or refuse it by name.
+
+    Examples
+    --------
+    >>> parameter("mu1", "1.2")
+    Fraction(6, 5)
+    """
     domain = ">= 0" if zero_allowed else "> 0"
     try:
         value = as_fraction(given, name)

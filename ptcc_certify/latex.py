@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _RELATION, _SUM, _PRODUCT, _POWER, _ATOM = range(5)
 
 _GREEK = re.compile(
-    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega|"
+    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|varsigma|tau|phi|chi|psi|omega|"
     "Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
 )
 _SYMBOL = re.compile(r"([A-Za-z]+)_?([A-Za-z0-9]*)")
@@ -73,11 +73,15 @@ def to_latex(expression: ca.SX) -> str:
 def symbol_latex(name: str) -> str:
     r"""Return the LaTeX of a symbol's name: letters, then an index with or without ``_`` before it.
 
+    A name that holds a brace is LaTeX already.
+
     Examples
     --------
     >>> symbol_latex("rho1"), symbol_latex("T_r"), symbol_latex("tau"), symbol_latex("dist2")
     ('\\rho_{1}', 'T_{r}', '\\tau', '\\mathrm{dist}_{2}')
     """
+    if "{" in name:
+        return name
     match = _SYMBOL.fullmatch(name)
     if not match:
         return rf"\mathrm{{{name}}}".replace("_", r"\_")

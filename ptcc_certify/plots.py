@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptcc_certify.simulation import Trajectory
 from ptcc_certify.structure import Structure
+from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from ptcc_certify.certificate import Certificate
+    from ptcc_certify.reaching import ReachingTime
 
 #: Colour-blind safe (Okabe and Ito): first camp, second camp, unbalanced leaders, followers.
 CAMP_COLOURS = {
@@ -56,9 +59,69 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
         )
         seen.add(name)
     if trajectory.protocol.prescribed:
-        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
+    if isinstance(trajectory, SlidingTrajectory):
+        ax.axvline(float(trajectory.protocol.T_r), color="#7F7F7F", linewidth=0.8, linestyle="-.", label="$T_r$")
     ax.set_xlabel("time $t$")
     ax.set_ylabel("state $x_k$")
+    _legend_above(ax)
+    return ax
+
+
+def plot_run(trajectory: Trajectory, structure: Structure, reaching: Sequence[ReachingTime] | None = None) -> Figure:
+    """Draw the states; under the sliding-mode protocol with a reaching phase the sliding variables below them.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of one start.
+    structure : Structure
+        Of the same graph.
+    reaching : sequence of N ReachingTime, optional
+        Proved reaching times.
+
+    Returns
+    -------
+    Figure
+    """
+    from matplotlib.figure import Figure
+
+    if not isinstance(trajectory, SlidingTrajectory) or not trajectory.sigma0.any():
+        return plot_trajectory(trajectory, structure).figure  # type: ignore[return-value]
+    upper, lower = Figure(figsize=(6, 6.4), layout="constrained").subplots(2, 1)
+    plot_trajectory(trajectory, structure, upper)
+    plot_sliding(trajectory, reaching, lower)
+    return upper.figure
+
+
+def plot_sliding(
+    trajectory: SlidingTrajectory, reaching: Sequence[ReachingTime] | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw ``sigma_k(t)`` up to a little beyond ``T_r``, dots where each reaches 0, ticks where that is proved.
+
+    Parameters
+    ----------
+    trajectory : SlidingTrajectory
+    reaching : sequence of N ReachingTime, optional
+        Proved reaching times (``certificate.reaching``).
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+    """
+    ax, T_r = _axes(ax), float(trajectory.protocol.T_r)
+    shown = trajectory.t <= 1.1 * T_r
+    for row in trajectory.sigma:
+        ax.plot(trajectory.t[shown], row[shown], color="#0072B2", linewidth=0.9)
+    reached = trajectory.reaching_times[trajectory.sigma0 != 0]
+    ax.plot(reached, np.zeros(reached.size), "o", color="#0072B2", markersize=3, label="$\\sigma_k$ reaches 0")
+    if reaching is not None:
+        proved = [r.time for r in reaching if r.z is None or r.z > 0]
+        ax.plot(proved, [0.0] * len(proved), "|", color="#D55E00", markersize=12, label="proved at the latest")
+    ax.axvline(T_r, color="black", linewidth=0.8, linestyle=":", label="$T_r$")
+    ax.set_xlabel("time $t$")
+    ax.set_ylabel("sliding variable $\\sigma_k$")
     _legend_above(ax)
     return ax
 
@@ -87,19 +150,15 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
     if run is None or seen is None:
         raise ValueError("the certificate holds no simulated run with a proved bound")
     ax = _axes(ax)
-    member = certificate.envelope.members[0]
-    z = member.coordinates_of(run.states, run.graph.laplacian())
-    root = np.sqrt(member.value(z))
+    history = certificate.envelope.histories(certificate.envelope.members[0], run)[0]
     before = run.remaining > 0
-    remaining = run.remaining[before]
-    ax.loglog(remaining, np.exp(-member.rate * run.clock[before] / 2), color="#D55E00", label="proved bound")
-    if root[0] > 0:
-        ax.loglog(remaining, np.maximum(root[before] / root[0], 1e-300), color="#0072B2", label="simulated (CVODES)")
-        ax.axhline(
-            seen.floor * seen.tolerance, color="#7F7F7F", linewidth=0.8, linestyle=":", label="integrator's floor"
-        )
-        lowest = float((root[before] / root[0]).min())
-        ax.set_ylim(bottom=max(lowest, 1e-18) / 3)
+    remaining, scale = run.remaining[before], history.root[0] or history.bound[0] or 1.0
+    ax.loglog(remaining, history.bound[before] / scale, color="#D55E00", label="proved bound")
+    if history.root[0] > 0:
+        root = history.root[before] / scale
+        ax.loglog(remaining, np.maximum(root, 1e-300), color="#0072B2", label="simulated (CVODES)")
+        ax.axhline(history.floor / scale, color="#7F7F7F", linewidth=0.8, linestyle=":", label="integrator's floor")
+        ax.set_ylim(bottom=max(float(root.min()), 1e-18) / 3)
     ax.invert_xaxis()
     ax.set_xlabel("time left, $1 - t/T$")
     ax.set_ylabel(r"$\sqrt{V(t)/V(0)}$")

@@ -9,7 +9,10 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ptcc_certify.structure import Claim, Structure
+from ptcc_certify.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate import Certificate
@@ -19,6 +22,9 @@ _ORIENTATION = {
     "listens": "a row a,b: a listens to b",
     "matrix": "row = listener",
 }
+
+#: 1 - t/T and its name, where the screen tells what may be left.
+_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -47,7 +53,7 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
         lines.append(_line("", f"... {len(structure.closed_components)} closed components in all"))
     if structure.followers.size:
         lines.append(_line("followers", _listed([graph.labels[v] for v in structure.followers.tolist()])))
-    lines += _claim_lines(structure)
+    lines += _claim_lines(structure, [component.claim for component in structure.components])
     return lines
 
 
@@ -56,16 +62,18 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     structure, p = certificate.structure, certificate.protocol
     graph = structure.graph
     negative = int((graph.sign < 0).sum())
-    parameters = ", ".join(f"{key} {float(getattr(p, key)):g}" for key in ("T", "rho1", "rho2", "kappa"))
+    names = [name for name in p.to_dict() if name != "kind"]
+    parameters = ", ".join(f"{name} {float(getattr(p, name)):g}" for name in names)
     lines = [
         _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
         _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
         _line("structure", _structure_text(structure)),
-        *_claim_lines(structure, f" at T = {float(p.T):g}"),
+        *_claim_lines(structure, certificate.claims, _deadline(certificate)),
         _line("protocol", f"{p.kind}: {parameters}"),
     ]
     if certificate.start is not None:
         lines.append(_line("start", _pairs(graph.labels, certificate.start)))
+    lines += _sliding_lines(certificate)
     if certificate.outcome is not None:
         kind = "exact" if certificate.outcome.exact else "floating point"
         lines.append(_line("ends at", f"{_pairs(graph.labels, certificate.outcome.final_state)} ({kind})"))
@@ -92,9 +100,9 @@ def _rate_lines(certificate: Certificate) -> list[str]:
         lines.append(
             _line("", f"{V.objective}{rho}; ||{V.coordinates}||^2 carries the prefactor {_up(V.prefactor, 4)}")
         )
-        lines += _residual_lines(certificate)
-        count = len(certificate.proof.obligations) + len(certificate.outcome_proof)
-        lines.append(_line("proof", f"{count} statement(s) proved in exact arithmetic"))
+        lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
+        arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
+        lines.append(_line("proof", f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"))
     elif certificate.numerical_rate is not None:
         lines.append(_line("rate", f"not proved; numerically {certificate.numerical_rate:.6g}{best}"))
     else:
@@ -103,11 +111,10 @@ def _rate_lines(certificate: Certificate) -> list[str]:
 
 
 def _residual_lines(certificate: Certificate) -> list[str]:
-    instants = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
     coordinates = certificate.lyapunov.coordinates if certificate.lyapunov else "E"
-    proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in instants]
+    proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
     lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
-    slowest = [certificate.best_possible_residual(q) for q, _ in instants]
+    slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
         lines.append(_line("", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)))
         if slowest[-1] > 0.01:
@@ -115,6 +122,21 @@ def _residual_lines(certificate: Certificate) -> list[str]:
                 _line("", "most of the error is left to the last instant: raise rho2 * kappa for a usable deadline")
             )
     return lines
+
+
+def _reaching_lines(certificate: Certificate) -> list[str]:
+    """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
+    from ptcc_certify.sliding_bounds import SlidingEnvelope
+
+    envelope, coordinates = certificate.envelope, certificate.lyapunov.coordinates if certificate.lyapunov else "E"
+    if certificate.start is None or not isinstance(envelope, SlidingEnvelope):
+        return []
+    p = envelope.protocol
+    share = float(p.T_s / p.T)
+    chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
+    bounds = envelope.state_bound(np.array([q for q, _ in chosen]), np.array([float(x) for x in certificate.start]))
+    said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
+    return [_line("left", f"||{coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)")]
 
 
 def _simulation_lines(certificate: Certificate) -> list[str]:
@@ -132,6 +154,14 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
                 f"resolved {resolved}",
             )
         )
+    if seen is not None and isinstance(run, SlidingTrajectory) and not certificate.direct:
+        last = int(run.reaching_z.argmax())
+        when = "at T_r only"
+        if math.isfinite(run.reaching_z[last]):
+            when = f"at t = {run.reaching_times[last]:.6g}, {run.reaching_left[last]:.3g} before T_r"
+        kept = "kept" if seen.reaching_kept else "VIOLATED"
+        ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
+        lines.append(_line("", f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}"))
     if certificate.outcome is not None:
         gap = float(abs(run.final_state - certificate.outcome.values).max())
         settled = "" if run.deadline_resolved else " (the run had not settled)"
@@ -139,14 +169,45 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
     return lines
 
 
-def _claim_lines(structure: Structure, when: str = "") -> list[str]:
-    if structure.claim is not None:
-        return [_line("claim", _claim_text(structure.claim, when))]
-    counts = Counter(component.claim for component in structure.components)
+def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> list[str]:
+    if len(claims) == 1:
+        return [_line("claim", _claim_text(claims[0], when))]
+    counts = Counter(claims)
     return [
         _line("claim" if i == 0 else "", f"{count} component(s): {_claim_text(claim, when)}")
         for i, (claim, count) in enumerate(sorted(counts.items(), key=lambda item: item[0].theorem))
     ]
+
+
+def _deadline(certificate: Certificate) -> str:
+    p = certificate.protocol
+    if certificate.reaching is None:
+        return f" at T = {float(p.T):g}"
+    return f" at T_r + T_s = {float(p.T):g} whatever the disturbance"
+
+
+def _sliding_lines(certificate: Certificate) -> list[str]:
+    """Tell ``sigma(0)``, what is proved of the sliding variables, and which disturbance the run met."""
+    reaching, labels, run = certificate.reaching, certificate.graph.labels, certificate.trajectory
+    if reaching is None or certificate.sigma0 is None:
+        return []
+    if certificate.direct:
+        lines = [_line("sigma(0)", "0: no reaching phase, the agents slide from the beginning")]
+    else:
+        lines = [_line("sigma(0)", _pairs(labels, certificate.sigma0))]
+        late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
+        last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
+        said = []
+        if last is not None and last.z:
+            agent = labels[reaching.index(last)]
+            left = f"{_down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
+            said.append(f"{'others' if late else 'all'} by t = {_up(last.time, 6)}, {left} (agent {agent})")
+        if late:
+            said.append(f"only at T_r for {_listed(late, 40)}: mu3 kappa < 1 and sigma(0) is large")
+        lines.append(_line("sliding", f"sigma_k = 0 proved: {'; '.join(said)}"))
+    if isinstance(run, SlidingTrajectory):
+        lines.append(_line("disturbed", f"the run meets d = {run.source}; |d| <= delta: {run.bounded_by}"))
+    return lines
 
 
 def _claim_text(claim: Claim, when: str) -> str:

@@ -399,9 +399,8 @@ def through_json(certificate: Certificate) -> dict[str, Any]:
 
 @cache
 def example(name: str) -> Certificate:
-    (run,) = select(name)
-    protocol = NominalProtocol(run[0].T, run[0].rho1, run[0].rho2, run[0].kappa)
-    return certify(load_graph(name), protocol, run[0].x0.split(","))
+    run, _, _ = select(name)[0]
+    return certify(load_graph(name), run.protocol(), run.x0.split(","))
 
 
 @cache
@@ -423,7 +422,7 @@ def precision() -> Iterator[None]:
 
 @pytest.mark.parametrize("name", GRAPHS)
 def test_the_examples_behave_as_the_paper_reports(name: str):
-    ((_, _, reported),) = select(name)
+    _, _, reported = select(name)[0]
     cert = example(name)
     assert cert.claim is not None and cert.comparison is not None
     assert cert.claim.behaviour == reported

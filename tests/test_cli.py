@@ -438,7 +438,7 @@ def test_a_full_disk_is_told():
 @pytest.mark.parametrize("name", GRAPHS)
 def test_the_screen_of_certify_fits_24_lines(name: str):
     (example, _, _) = select(name)[0]
-    parameters = ["--T", example.T, "--rho1", example.rho1, "--rho2", example.rho2, "--kappa", example.kappa]
+    parameters = [text for key, value in example.parameters.items() for text in (f"--{key}", value)]
     for options in ([], [*parameters, "--x0", example.x0]):
         run = ptcc("certify", name, *options)
         assert run.code == 0
@@ -548,17 +548,26 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
     run = ptcc("examples", "all", "-o", "new/results")
     assert run.code == 0, run
     header, *rows = run.out.splitlines()
-    assert header.split() == ["example", "theorem", "behaviour", "rate", "tightness", "worst", "verdict"]
+    assert header.split() == [
+        *("example", "theorem", "behaviour", "rate", "tightness", "worst", "reached", "proved", "by", "T_r", "verdict")
+    ]
     reported = [
         (str(example.number), graph, behaviour)
         for example in EXAMPLES.values()
         for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
     ]
-    assert len(rows) == len(reported) == 6
+    assert len(rows) == len(reported) == 12
     for row, (number, graph, behaviour) in zip(rows, reported, strict=True):
-        match = re.fullmatch(r"(\d) (\w+) +([\d.]+) +(\D+?) +([\d.]+) +([\d.]+) +([\d.]+)  (\w+)", row)
+        match = re.fullmatch(
+            r"(\d) (\w+) +([\d.]+) +(\D+?) +([\d.]+) +([\d.]+) +([\d.]+) +(\S+) +(\S+) +(\S+)  (\w+)", row
+        )
         assert match is not None, row
-        assert match.group(1, 2, 4, 8) == (number, graph, behaviour, "certified")
+        assert match.group(1, 2, 4, 11) == (number, graph, behaviour, "certified")
+        if number in "456":
+            assert 0 < float(match[8]) < float(match[9]) < float(match[10])
+            graph += "_sliding"
+        else:
+            assert match.group(8, 9, 10) == ("-", "-", "-")
         rate, tightness, worst = (float(x) for x in match.group(5, 6, 7))
         assert rate > 0 and 0 < tightness <= 1 and 0 < worst <= 1
         data = read_certificate(f"new/results/{graph}.json")
@@ -567,15 +576,15 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
         assert float(Fraction(data["rates"]["certified"])) == pytest.approx(rate, abs=1e-4)
         for figure in ("states", "decay"):
             assert Path(f"new/results/{graph}_{figure}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
-    assert len(listing(folder / "new" / "results")) == 18
+    assert len(listing(folder / "new" / "results")) == 36
 
 
 def test_examples_can_be_chosen():
     assert [row.split()[1] for row in ptcc("examples", "2").out.splitlines()[1:]] == ["fig3a", "fig3b"]
-    assert [row.split()[1] for row in ptcc("examples", "fig1b").out.splitlines()[1:]] == ["fig1b"]
+    assert [row.split()[1] for row in ptcc("examples", "fig1b").out.splitlines()[1:]] == ["fig1b", "fig1b"]
 
 
-@pytest.mark.parametrize("theorem", [None, "1.1", "1.2", "2.1", "2.2", "3.1", "3.2"])
+@pytest.mark.parametrize("theorem", [None, "1.1", "1.2", "2.1", "2.2", "3.1", "3.2", "4.1", "6.2"])
 def test_cite_is_bibtex_and_invents_nothing(theorem: str | None):
     run = ptcc("cite", *([] if theorem is None else [theorem]))
     assert run.code == 0 and run.err == ""

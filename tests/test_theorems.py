@@ -19,7 +19,7 @@ from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.structure import Structure, analyse
 from ptcc_certify.symbolic import symbolic_lyapunov
-from ptcc_certify.theorems import THEOREMS, LyapunovFunction, theorem_for
+from ptcc_certify.theorems import THEOREMS, LyapunovFunction, sliding_claim, theorem_for
 
 PROTOCOL = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
 
@@ -81,7 +81,11 @@ def test_every_row(name: str, kwargs: dict):
         assert all(theorem.hypotheses(structure).values())
         assert theorem.statement
         if structure.claim is not None:
-            assert [t.number for t in THEOREMS if t.applies(structure)] == [structure.claim.theorem] == [theorem.number]
+            counterpart = theorem_for(structure, "sliding-mode")
+            applying = [t.number for t in THEOREMS if t.applies(structure)]
+            assert applying == [structure.claim.theorem, counterpart.number]
+            assert [theorem.number, sliding_claim(structure.claim).theorem] == applying
+            assert counterpart.hypotheses(structure) == theorem.hypotheses(structure)
         V = theorem.lyapunov(structure)
         proof = theorem.prove(structure, V)
         spectral = laplacian_spectrum(structure).spectral_rate

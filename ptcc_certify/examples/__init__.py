@@ -5,72 +5,126 @@ The paper prints its topologies as pictures only; the packaged graphs are stand-
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 
 GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
 
 
 @dataclass(frozen=True)
 class Example:
-    """One example of Section 4 with the nominal protocol, exact numbers as texts.
+    """One example of Section 4, exact numbers as texts.
 
     Attributes
     ----------
     number : int
     graphs : tuple of str
         Panels (a) and (b) of its figure.
-    T, rho1, rho2, kappa : str
+    parameters : mapping of str to str
+        Of the protocol: with ``T`` the nominal one, with ``T_r`` and ``T_s`` the sliding-mode one.
     x0 : str
         In node order.
     behaviours : tuple of str
         What the paper reports for each graph.
+    sigma0, disturbance : str or None
+        Of the sliding-mode protocol.
     """
 
     number: int
     graphs: tuple[str, str]
-    T: str
-    rho1: str
-    rho2: str
-    kappa: str
+    parameters: Mapping[str, str]
     x0: str
     behaviours: tuple[str, str]
+    sigma0: str | None = None
+    disturbance: str | None = None
 
+    def protocol(self) -> Protocol:
+        """Return the protocol of the example.
+
+        Examples
+        --------
+        >>> EXAMPLES[1].protocol()
+        NominalProtocol(T=3/5, rho1=1/10, rho2=3/10, kappa=1)
+        """
+        return NominalProtocol(**self.parameters) if "T" in self.parameters else SlidingModeProtocol(**self.parameters)
+
+
+_FIG1 = (("fig1a", "fig1b"), ("stability", "bipartite consensus"))
+_FIG3 = (("fig3a", "fig3b"), ("interval bipartite consensus", "stability"))
+_FIG5 = (("fig5a", "fig5b"), ("bipartite containment", "stability"))
 
 EXAMPLES: dict[int, Example] = {
-    1: Example(
-        1,
-        ("fig1a", "fig1b"),
-        T="0.6",
-        rho1="0.1",
-        rho2="0.3",
-        kappa="1",
-        x0="5,2,-4,3,-2,1",
-        behaviours=("stability", "bipartite consensus"),
-    ),
-    2: Example(
-        2,
-        ("fig3a", "fig3b"),
-        T="0.6",
-        rho1="0.2",
-        rho2="0.5",
-        kappa="1",
-        x0="-4,3,-1,2,-2,5",
-        behaviours=("interval bipartite consensus", "stability"),
-    ),
+    1: Example(1, _FIG1[0], {"T": "0.6", "rho1": "0.1", "rho2": "0.3", "kappa": "1"}, "5,2,-4,3,-2,1", _FIG1[1]),
+    2: Example(2, _FIG3[0], {"T": "0.6", "rho1": "0.2", "rho2": "0.5", "kappa": "1"}, "-4,3,-1,2,-2,5", _FIG3[1]),
     3: Example(
         3,
-        ("fig5a", "fig5b"),
-        T="0.2",
-        rho1="0.1",
-        rho2="0.3",
-        kappa="1",
-        x0="-6,4,5,-7,8,-5,-3,7,-5,6,4,2,-5,3,-8,1",
-        behaviours=("bipartite containment", "stability"),
+        _FIG5[0],
+        {"T": "0.2", "rho1": "0.1", "rho2": "0.3", "kappa": "1"},
+        "-6,4,5,-7,8,-5,-3,7,-5,6,4,2,-5,3,-8,1",
+        _FIG5[1],
+    ),
+    4: Example(
+        4,
+        _FIG1[0],
+        {
+            "T_r": "0.5",
+            "T_s": "1",
+            "rho1": "0.1",
+            "rho2": "0.3",
+            "kappa": "2",
+            "mu1": "1.2",
+            "mu2": "0.6",
+            "mu3": "0.9",
+            "delta": "1",
+        },
+        "-4,3,-1,2,-2,5",
+        _FIG1[1],
+        sigma0="-9,1,-5,8,-4,6",
+        disturbance="sin(2*k*t + pi/3)",
+    ),
+    5: Example(
+        5,
+        _FIG3[0],
+        {
+            "T_r": "1",
+            "T_s": "0.5",
+            "rho1": "0.25",
+            "rho2": "0.3",
+            "kappa": "3",
+            "mu1": "2",
+            "mu2": "0.4",
+            "mu3": "0.5",
+            "delta": "1",
+        },
+        "-4,4,5,-7,8,1",
+        _FIG3[1],
+        sigma0="-10,10,9,-5,5,4",
+        disturbance="sin(2*k*t + pi/2)",
+    ),
+    6: Example(
+        6,
+        _FIG5[0],
+        {
+            "T_r": "0.4",
+            "T_s": "0.6",
+            "rho1": "0.2",
+            "rho2": "0.1",
+            "kappa": "3",
+            "mu1": "2",
+            "mu2": "0.1",
+            "mu3": "0.5",
+            "delta": "1",
+        },
+        "2.6,-1.2,-1.2,-1,-0.2,0.9,-2.9,2,0.3,2.1,-1,-0.3,-2.7,-2,1,-1",
+        _FIG5[1],
+        sigma0="2.9,-3,0.5,0,0.75,-0.8,-1.5,3.8,2.3,3.6,0.2,-0.27,-4,-2.3,-0.5,-2.9",
+        disturbance="cos(k*t - pi/3)",
     ),
 }
 

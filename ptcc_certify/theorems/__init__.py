@@ -1,14 +1,15 @@
-"""Theorems 1 to 3: one file for each family, each reading like the theorem."""
+"""Theorems 1 to 6: one file for each family, each reading like the theorem."""
 
 from __future__ import annotations
 
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import LyapunovBlock, LyapunovFunction, Obligation, RateProof, Theorem
 from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
+from ptcc_certify.theorems.sliding_mode import SlidingMode, sliding_claim
 from ptcc_certify.theorems.strong import BalancedStrong, UnbalancedStrong
 from ptcc_certify.theorems.weak import BalancedWeak, UnbalancedWeak
 
-THEOREMS: tuple[Theorem, ...] = (
+_NOMINAL: tuple[Theorem, ...] = (
     BalancedStrong(),
     UnbalancedStrong(),
     BalancedQuasiStrong(),
@@ -16,18 +17,36 @@ THEOREMS: tuple[Theorem, ...] = (
     BalancedWeak(),
     UnbalancedWeak(),
 )
+_SLIDING: tuple[Theorem, ...] = tuple(map(SlidingMode, _NOMINAL))
+THEOREMS: tuple[Theorem, ...] = (*_NOMINAL, *_SLIDING)
 
-__all__ = ["THEOREMS", "LyapunovBlock", "LyapunovFunction", "Obligation", "RateProof", "Theorem", "theorem_for"]
+__all__ = [
+    "THEOREMS",
+    "LyapunovBlock",
+    "LyapunovFunction",
+    "Obligation",
+    "RateProof",
+    "Theorem",
+    "sliding_claim",
+    "theorem_for",
+]
 
 
-def theorem_for(structure: Structure) -> Theorem:
-    """Return the theorem whose hypotheses the graph meets; a disconnected graph takes the composite of Theorem 3.
+def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
+    """Return the theorem whose hypotheses the graph meets; a disconnected graph takes the composite of Theorem 3 or 6.
+
+    Parameters
+    ----------
+    structure : Structure
+    protocol : {"nominal", "sliding-mode"}
 
     Examples
     --------
     >>> from ptcc_certify.graph import SignedDigraph
     >>> from ptcc_certify.structure import analyse
-    >>> theorem_for(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)]))).number
-    '1.1'
+    >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)]))
+    >>> theorem_for(st).number, theorem_for(st, "sliding-mode").number
+    ('1.1', '4.1')
     """
-    return next(theorem for theorem in THEOREMS if theorem.applies(structure))
+    rows = _SLIDING if protocol == "sliding-mode" else _NOMINAL
+    return next(theorem for theorem in rows if theorem.applies(structure))

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import laplacian_spectrum
-from ptcc_certify.outcome import (
+from ptcc_certify.outcomes import (
     influence,
     is_bipartite_consensus,
     is_bipartite_containment,

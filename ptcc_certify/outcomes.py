@@ -27,7 +27,7 @@ from ptcc_certify.rationals import as_fraction, shorten
 from ptcc_certify.structure import ClosedComponent, Structure
 
 if TYPE_CHECKING:
-    from ptcc_certify.simulation import Trajectory
+    from ptcc_certify.trajectory import Trajectory
 
 Number = Fraction | float
 
@@ -201,8 +201,8 @@ def outcome(structure: Structure, x0: Sequence[Any], *, exact: bool | None = Non
     return Outcome(structure.graph.labels, tuple(final), tuple(values), degenerate, matrix)
 
 
-def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any]) -> list[Fraction]:
-    """Return a start as N rationals; ``x0`` in node order, or by label.
+def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0") -> list[Fraction]:
+    """Return a start as N rationals; ``x0`` in node order, or by label. ``name`` is what messages call it.
 
     Raises
     ------
@@ -213,19 +213,19 @@ def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any]) -> 
     if isinstance(x0, Mapping):
         if set(map(str, x0)) != set(labels) or len(x0) != len(labels):
             odd = shorten(str(sorted(set(map(str, x0)) ^ set(labels))[:1]))
-            raise ParameterError(f"the start needs one value for each agent; {odd} is missing or unknown")
+            raise ParameterError(f"the start {name} needs one value for each agent; {odd} is missing or unknown")
         by_label = {str(key): value for key, value in x0.items()}
         x0 = [by_label[label] for label in labels]
     elif isinstance(x0, str) or not hasattr(x0, "__getitem__"):
-        raise ParameterError("the start is a sequence of numbers in node order, or a mapping of label to number")
+        raise ParameterError(f"the start {name} is a sequence of numbers in node order, or a mapping by label")
     if len(x0) != len(labels):
-        raise ParameterError(f"the start has {len(x0)} values for {len(labels)} agents")
+        raise ParameterError(f"the start {name} has {len(x0)} values for {len(labels)} agents")
     start = []
     for label, value in zip(labels, x0, strict=True):
         try:
-            start.append(as_fraction(value, f"x0 of agent {label}"))
+            start.append(as_fraction(value, f"{name} of agent {label}"))
         except NumberError as error:
-            where = f"x0 of agent {label}"
+            where = f"{name} of agent {label}"
             raise ParameterError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
     return start
 

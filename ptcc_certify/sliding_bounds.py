@@ -1,0 +1,204 @@
+"""What the proved rate says under the sliding-mode protocol, through the reaching phase and on to ``T_r + T_s``.
+
+With ``y = x - sigma`` and ``A`` the matrix of the certificate's coordinates ``z`` (rows of ``E``, or ``eps``),
+
+    z_y' = -gain (A z_y + B sigma),      sqrt(V)' <= -(rate/2) gain sqrt(V) + gain || |B| |sigma| ||_Omega
+
+so that on the clock ``s``, ``v = sqrt(V(y))``:
+
+    v(s) <= e^(-rate s/2) v(0) + int_0^s e^(-rate (s - r)/2) || |B| b ||_Omega dr
+
+where ``b_k`` bounds ``|sigma_k|`` whatever the disturbance. The coordinates of ``x`` are those of ``y`` and of
+``sigma``: ``||z_x||_Omega <= v + || |C| b ||_Omega``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.reaching import LAST_Z, ReachingTime, sliding_bound
+from ptcc_certify.trajectory import SlidingTrajectory
+
+if TYPE_CHECKING:
+    from ptcc_certify.trajectory import Trajectory
+
+# The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
+_PIECES = 4000
+
+
+@dataclass(frozen=True)
+class SlidingEnvelope(Envelope):
+    """The proved bounds under the sliding-mode protocol, for one ``sigma(0)`` and every disturbance within ``delta``.
+
+    Attributes
+    ----------
+    protocol : SlidingModeProtocol
+    sigma0 : tuple of Fraction
+    reaching : tuple of ReachingTime
+        Proved reaching times.
+    """
+
+    protocol: SlidingModeProtocol
+    sigma0: tuple[Fraction, ...]
+    reaching: tuple[ReachingTime, ...]
+
+    @property
+    def direct(self) -> bool:
+        """Whether ``sigma(0) = 0``: there is no reaching phase, and the bounds are those of the nominal protocol."""
+        return not any(self.sigma0)
+
+    def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
+        """Bound of ``||z(t)|| / ||z(0)||``; see :meth:`Envelope.norm_factor`.
+
+        Raises
+        ------
+        ParameterError
+            ``sigma(0)`` is not 0: sliding variables drive the agents, and no multiple of their start bounds them.
+        """
+        self._need_direct()
+        return super().norm_factor(clock)
+
+    def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``||z||`` at clock values; see :meth:`Envelope.bound`, and :meth:`state_bound` for any sigma(0).
+
+        Raises
+        ------
+        ParameterError
+            ``sigma(0)`` is not 0.
+        """
+        self._need_direct()
+        return super().bound(clock, x0)
+
+    def _need_direct(self) -> None:
+        if not self.direct:
+            raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
+
+    def state_bound(self, remaining: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, from ``x0``.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+            Between 0 and 1.
+        x0 : (N,) array
+
+        Returns
+        -------
+        array
+            Of the shape of ``remaining``; infinite where nothing was proved.
+        """
+        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        with np.errstate(divide="ignore"):
+            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
+            clock = np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
+        bound = np.full(q.size, np.inf)
+        for member in self.members:
+            v, sliding = self._bounds(member, np.asarray(x0, dtype=float), z, clock)
+            bound = np.minimum(bound, (v + sliding) / np.sqrt(member.weights.min()))
+        return bound if np.ndim(remaining) else bound[0]
+
+    def sliding_norm(self, z: np.ndarray) -> np.ndarray:
+        """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``."""
+        size = float(np.linalg.norm([float(x) for x in self.sigma0]))
+        return size * np.exp(-self.protocol.reaching_gain.clock_at_tau(z))
+
+    def compare(self, trajectory: Trajectory) -> Comparison:
+        """Compare a simulated run with every bound: Lyapunov functions, sliding variables, reaching times.
+
+        Raises
+        ------
+        ParameterError
+            The run is of another graph or protocol, begins later than 0, from another ``sigma(0)``, or is the
+            boundary-layer imitation, of which nothing was proved.
+        """
+        if not isinstance(trajectory, SlidingTrajectory) or trajectory.protocol != self.protocol:
+            raise ParameterError("the run is of another protocol than the envelope")
+        if trajectory.boundary_layer is not None:
+            raise ParameterError("nothing was proved about the boundary-layer imitation; compare the true solution")
+        sigma0 = np.array([float(x) for x in self.sigma0])
+        if trajectory.t[0] != 0 or (trajectory.sigma0 != sigma0).any():
+            raise ParameterError("the run starts later than 0, or from another sigma(0) than the envelope")
+        certain = np.array([np.inf if r.z is None else float(r.z) for r in self.reaching])
+        kept = bool((trajectory.reaching_z <= certain * (1 + 1e-9)).all())
+        z = self._z(trajectory)
+        bound, size = sliding_bound(self.protocol, self.sigma0, z), np.abs(sigma0).max(initial=0.0)
+        excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(excess > 0, excess / bound, 0.0)
+        return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
+
+    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of the start."""
+        assert isinstance(trajectory, SlidingTrajectory)
+        if self.direct:
+            return super().histories(member, trajectory)
+        y = trajectory.states - trajectory.sigma
+        size = max(float(np.abs(part).max()) for part in (trajectory.states, y)) or 1.0
+        v, sliding = self._bounds(member, trajectory.states[:, 0], self._z(trajectory), trajectory.clock)
+        unit = float((v + sliding).max()) or 1.0
+        floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
+        values = [
+            member.value(member.coordinates_of(state, self._laplacian) / unit) for state in (trajectory.states, y)
+        ]
+        return [
+            History(np.sqrt(value), bound / unit, floor) for value, bound in zip(values, (v + sliding, v), strict=True)
+        ]
+
+    @staticmethod
+    def _z(trajectory: SlidingTrajectory) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return -np.log(trajectory.reaching_remaining)
+
+    def _bounds(
+        self, member: Member, x0: np.ndarray, z: np.ndarray, clock: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks."""
+        sigma0 = np.array([float(x) for x in self.sigma0])
+        start = float(np.sqrt(member.value(member.coordinates_of(x0 - sigma0, self._laplacian))))
+        half = member.rate / 2
+        C, B = self._drive(member)
+        knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
+        size = sliding_bound(self.protocol, self.sigma0, knots)
+        forcing = np.sqrt(member.value(B @ size))
+        s = self._clock_at(knots)
+        decay = np.exp(-half * np.diff(s, append=self._clock_at(np.array([np.inf]))))
+        v = np.empty(knots.size + 1)
+        v[0] = start
+        for i in range(knots.size):
+            v[i + 1] = decay[i] * v[i] + forcing[i] * (1 - decay[i]) / half
+        at = np.searchsorted(knots, z)
+        last = self._clock_at(np.array([np.inf]))[0]
+        later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
+        sliding = np.append(np.sqrt(member.value(C @ size)), 0.0)
+        return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
+
+    @cached_property
+    def _pieces(self) -> np.ndarray:
+        """Instants ``z`` at which the pieces begin, until all sliding variables are certainly 0."""
+        certain = [LAST_Z if r.z is None else float(min(r.z, Fraction(LAST_Z))) for r in self.reaching]
+        fine = np.concatenate([[0.0], np.geomspace(1e-9, 1, 2000) * max(certain)])
+        levels = self.protocol.reaching_gain.clock_at_tau(fine)
+        return np.interp(np.linspace(0, levels[-1], _PIECES), levels, fine)
+
+    def _clock_at(self, z: np.ndarray) -> np.ndarray:
+        """Return ``s`` at instants ``z`` before ``T_r``, and at ``T_r`` where ``z`` is infinite."""
+        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
+
+    def _drive(self, member: Member) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``|C|`` and ``|B|``: how the sliding variables enter the coordinates, and how they drive them."""
+        L = self.structure.graph.laplacian()
+        if member.coordinates == "E":
+            rows = L[member.nodes]
+            return abs(rows).toarray(), abs(rows @ L).toarray()
+        deviation = member.coordinates_of(np.eye(L.shape[0]), L)
+        return np.abs(deviation), np.abs(deviation @ L)

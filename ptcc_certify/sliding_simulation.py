@@ -1,0 +1,349 @@
+"""Trajectories under the sliding-mode protocol: the Filippov solution, found event by event.
+
+While no sliding variable changes its sign the motion is as smooth as the disturbance. With ``y = x - sigma``,
+
+    y' = -gain(t) L (y + sigma),      gain with the pole at T = T_r + T_s,
+
+and ``sigma_k`` stays at 0 once it is there, whatever the disturbance. So every reaching time is found first, as the
+root of a scalar equation, the integrator runs from event to event in ``z = ln(T_r/(T_r - t))``, where the pole at
+``T_r`` is gone, and the rest is the nominal motion. No integrator ever meets a pole or a jump of the sign.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptcc_certify.cvodes import NominalMotion, Phase, SlidingMotion
+from ptcc_certify.disturbance import Disturbance, ExpressionDisturbance, StateDependent
+from ptcc_certify.errors import SimulationError
+from ptcc_certify.reaching import LAST_Z, ReachingProblem
+from ptcc_certify.trajectory import SlidingTrajectory
+
+if TYPE_CHECKING:
+    from ptcc_certify.graph import SignedDigraph
+    from ptcc_certify.protocols import SlidingModeProtocol
+
+# The imitation with a boundary layer goes so far towards each pole: 1 - t/T = 1e-13.
+_LAYER_Z = 30.0
+
+
+@dataclass(frozen=True)
+class Instants:
+    """Where a run is sampled: ``t``, ``1 - t/T`` and ``1 - t/T_r``, each (M,) and accurate however small."""
+
+    t: np.ndarray
+    left: np.ndarray
+    reaching_left: np.ndarray
+
+    @property
+    def z(self) -> np.ndarray:
+        """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
+        return _minus_log(self.reaching_left, 1 - self.reaching_left)
+
+
+def simulate_sliding(
+    graph: SignedDigraph,
+    protocol: SlidingModeProtocol,
+    start: np.ndarray,
+    sigma0: np.ndarray,
+    disturbance: Disturbance,
+    instants: Instants,
+    *,
+    rtol: float,
+    atol: float,
+    boundary_layer: float | None,
+) -> SlidingTrajectory:
+    """Integrate ``x_k' = u_k + d_k`` with (48); see :func:`ptcc_certify.simulation.simulate`.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+    protocol : SlidingModeProtocol
+    start, sigma0 : (N,) array
+    disturbance : Disturbance
+    instants : Instants
+    rtol, atol, boundary_layer
+        As there.
+    """
+    began = time.perf_counter()
+    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]))
+    unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
+    solver = _Solver(graph, protocol, disturbance, unit, rtol, atol)
+    if boundary_layer is None:
+        z, y, sigma, residual = solver.filippov(start, sigma0, instants)
+    else:
+        z = np.full(start.size, np.nan)
+        y, sigma, residual = solver.imitation(start, sigma0, instants, boundary_layer)
+    at_deadline = np.flatnonzero((instants.left == 0) & (instants.t == float(protocol.T)))
+    with np.errstate(divide="ignore"):
+        clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left), np.inf)
+    return SlidingTrajectory(
+        graph=graph,
+        protocol=protocol,
+        t=instants.t,
+        remaining=instants.left,
+        clock=clock,
+        states=y + sigma,
+        rtol=rtol,
+        atol=atol,
+        deadline_index=int(at_deadline[0]) if at_deadline.size else None,
+        deadline_residual=residual,
+        stats=solver.stats | {"seconds": time.perf_counter() - began},
+        sigma=sigma,
+        disturbance=_values(disturbance, instants.t, y + sigma, sigma),
+        sigma0=sigma0,
+        reaching_remaining=instants.reaching_left,
+        reaching_z=z,
+        source=disturbance.text,
+        bounded_by=bounded_by,
+        boundary_layer=boundary_layer,
+    )
+
+
+class _Solver:
+    """One run; ``stats`` adds up what the integrators did."""
+
+    def __init__(
+        self,
+        graph: SignedDigraph,
+        protocol: SlidingModeProtocol,
+        disturbance: Disturbance,
+        unit: float,
+        rtol: float,
+        atol: float,
+    ):
+        self.graph, self.protocol, self.disturbance = graph, protocol, disturbance
+        self.unit, self.rtol, self.atol = unit, rtol, atol
+        self.stats: dict[str, float] = {"steps": 0, "rhs": 0}
+        self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
+        self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
+        self.mu1, self.mu2 = float(protocol.mu1), float(protocol.mu2)
+        reaching_pole = float(protocol.reaching_gain.pole)
+        self.reaching = Phase(0.0, self.T_r, self.rho1, self.pole, self.T_s, self.mu2, reaching_pole)
+
+    # ------------------------------------------------------------------ the true solution
+
+    def filippov(
+        self, start: np.ndarray, sigma0: np.ndarray, instants: Instants
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float | None]:
+        """Return reaching times ``z``, the (N, M) ``y`` and sliding variables, and the residual at the deadline."""
+        z, n = instants.z, start.size
+        out = np.zeros((2 * n, z.size))
+        reads_states = isinstance(self.disturbance, StateDependent) and bool(sigma0.any())
+        reach = self._coupled if reads_states else self._decoupled
+        reached, end, y_end = reach(start, sigma0, z, out)
+        # Sliding variables that are 0 at T_r only: from ``end`` on they move nobody.
+        early = end < self._last_z
+        out[:n, (z >= end) & (z < np.inf)] = y_end[:, None]
+        later = z >= end if early else np.isinf(z)
+        remaining = self.T_s + (self.T_r * math.exp(-end) if early else 0.0)
+        out[:n, later], residual = self._nominal(y_end, remaining, instants.t[later], instants.left[later])
+        return reached, out[:n] * self.unit, out[n:] * self.unit, residual
+
+    @property
+    def _last_z(self) -> float:
+        """Beyond this ``z`` what is left of the sliding variables moves nobody by a float's last bit."""
+        gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.graph.in_weight().max())
+        return LAST_Z + max(0.0, math.log(max(gain, 1.0)))
+
+    def _decoupled(
+        self, start: np.ndarray, sigma0: np.ndarray, z: np.ndarray, out: np.ndarray
+    ) -> tuple[np.ndarray, float, np.ndarray]:
+        """Fill ``out`` until all sliding variables are 0; return the reaching times, the last of them, ``y`` there."""
+        scalar = ReachingProblem(self.protocol, sigma0, self.disturbance)
+        end = min(float(scalar.z.max(initial=0.0)), self._last_z)
+        motion = self._motion(start, sigma0)
+        sign = np.sign(sigma0)
+        events = [0.0, *scalar.z[scalar.z < end], end]
+        self._stretch(motion, self.reaching, z, events, lambda at: np.where(scalar.z > at, sign, 0.0), out)
+        self._count(motion.stats)
+        # The scalar equations are solved to near machine precision.
+        out[start.size :] = scalar.sigma(z) / self.unit
+        return scalar.z, end, motion.state[: start.size]
+
+    def _coupled(
+        self, start: np.ndarray, sigma0: np.ndarray, z: np.ndarray, out: np.ndarray
+    ) -> tuple[np.ndarray, float, np.ndarray]:
+        """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
+        from scipy.integrate import solve_ivp
+
+        n, end, now = start.size, self._last_z, 0.0
+        phase, L = self.reaching, self.graph.laplacian()
+        disturbance = self.disturbance
+        assert isinstance(disturbance, StateDependent)
+        signs, reached = np.sign(sigma0), np.where(sigma0 == 0, 0.0, np.inf)
+        state = np.concatenate([start - sigma0, sigma0]) / self.unit
+
+        def motion(z: float, v: np.ndarray) -> np.ndarray:
+            R, t = float(phase.rate(z, math.exp)), float(phase.time(z, math.exp))
+            y, sigma = v[:n], np.where(signs != 0, v[n:], 0.0)
+            d = disturbance.at(t, (y + sigma) * self.unit, sigma * self.unit, self.protocol.delta, self.graph.labels)
+            push = R * (self.mu1 * signs - np.abs(signs) * d) / self.unit
+            return np.concatenate(
+                [-phase.nominal(R) * (L @ (y + sigma)), -push - (phase.mu2 * R + phase.reaching_pole) * sigma]
+            )
+
+        def crossing(k: int) -> Any:
+            def event(_: float, v: np.ndarray) -> float:
+                return float(v[n + k])
+
+            event.terminal, event.direction = True, -signs[k]  # type: ignore[attr-defined]
+            return event
+
+        while signs.any() and now < end:
+            watched = np.flatnonzero(signs).tolist()
+            run = solve_ivp(
+                motion,
+                (now, end),
+                state,
+                method="LSODA",
+                events=[crossing(k) for k in watched],
+                dense_output=True,
+                rtol=self.rtol,
+                atol=self.atol,
+            )
+            if run.status < 0:
+                raise SimulationError(f"the reaching phase stopped: {run.message}")
+            self._count({"steps": run.t.size - 1, "rhs": run.nfev})
+            inside = (z >= now) & (z < run.t[-1])
+            if inside.any():
+                out[:, inside] = run.sol(z[inside])
+                out[n:, inside] *= np.abs(signs)[:, None]
+            now, state = float(run.t[-1]), run.y[:, -1].copy()
+            hit = [k for k, at in zip(watched, run.t_events, strict=True) if at.size or state[n + k] * signs[k] <= 0]
+            reached[hit], signs[hit] = now, 0.0
+            state[n:][signs == 0] = 0
+        return reached, now, state[:n]
+
+    def _nominal(
+        self, y: np.ndarray, remaining: float, t: np.ndarray, left: np.ndarray
+    ) -> tuple[np.ndarray, float | None]:
+        """Return the (N, .) states on the sliding manifold, reached ``remaining`` before ``T``, and the residual."""
+        motion = NominalMotion(self.graph, y[:, None], self.rtol, self.atol)
+        before = left > 0
+        share = (t[before] - (self.T - remaining)) / remaining
+        tau = np.maximum(_minus_log(left[before] * (self.T / remaining), share), 0.0)
+        parts = [motion.sample(self.rho1 * remaining, self.pole, 1.0, tau)]
+        residual = None
+        if not before.all():
+            residual = motion.settle(self.rho1 * remaining, self.pole, tau[-1] if tau.size else 0.0)
+            parts.append(motion.sample(0.0, self.rho1 * self.T, 0.0, np.maximum(t[~before] / self.T - 1, 0)))
+        self._count(motion.stats)
+        return np.concatenate(parts)[:, :, 0].T, residual
+
+    # ------------------------------------------------------------------ the imitation
+
+    def imitation(
+        self, start: np.ndarray, sigma0: np.ndarray, instants: Instants, width: float
+    ) -> tuple[np.ndarray, np.ndarray, float | None]:
+        """Return the (N, M) ``y`` and sliding variables with ``tanh(sigma/width)`` for the sign, and the residual.
+
+        Towards each pole the run stops at ``1 - t/T = 1e-13``; its state there stands for what follows.
+        """
+        n, t, last = start.size, instants.t, float(instants.t[-1])
+        out = np.empty((2 * n, t.size))
+        motion = self._motion(start, sigma0, width)
+        before, after = t < self.T_r, instants.left == 0
+        between = ~before & ~after
+        settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, 0.0, self.mu2, 0.0)
+        past = Phase(self.T, self.T, self.rho1, 0.0, 0.0, self.mu2, 0.0, past=True)
+        towards_T = np.maximum(_minus_log(instants.left * (self.T / self.T_s), (t - self.T_r) / self.T_s), 0.0)
+        clocks = (
+            (self.reaching, before, instants.z, _LAYER_Z),
+            (settling, between, towards_T, _LAYER_Z),
+            (past, after, np.maximum(t / self.T - 1, 0.0), max(last / self.T - 1, 0.0)),
+        )
+        residual = None
+        for phase, here, clock, end in clocks:
+            if phase is past and after.any():
+                x = motion.state[:n] + motion.state[n:]
+                residual = float(np.abs(self.graph.laplacian() @ x).max()) / float(2 * self.graph.in_weight().max())
+            if (t >= phase.start).any():
+                z = np.where(here, clock, np.nan)
+                self._stretch(motion, phase, z, [0.0, end], lambda _: np.ones(n), out)
+                out[:, here & (clock >= end)] = motion.state[:, None]
+        self._count(motion.stats)
+        return out[:n] * self.unit, out[n:] * self.unit, residual
+
+    # ------------------------------------------------------------------ from event to event
+
+    def _motion(self, start: np.ndarray, sigma0: np.ndarray, layer: float | None = None) -> SlidingMotion:
+        return SlidingMotion(
+            self.graph,
+            np.concatenate([start - sigma0, sigma0]) / self.unit,
+            self.rtol,
+            self.atol,
+            unit=self.unit,
+            mu1=self.mu1,
+            disturbance=self._expression(),
+            layer=layer,
+        )
+
+    def _stretch(
+        self,
+        motion: SlidingMotion,
+        phase: Phase,
+        z: np.ndarray,
+        events: list[float],
+        signs: Callable[[float], np.ndarray],
+        out: np.ndarray,
+    ) -> None:
+        """Move from event to event of one phase, jumps of the disturbance among them; fill ``out`` where ``z`` lies."""
+        n, first, last = self.graph.n_nodes, events[0], events[-1]
+        jumps = self.disturbance.breaks(phase.end)
+        jumps = phase.clock(jumps[jumps > phase.start])
+        stops = np.unique(np.concatenate([events, jumps[(jumps > first) & (jumps < last)]]))
+        for a, b in pairwise(stops.tolist()):
+            sign = signs(a)
+            motion.state[n:][sign == 0] = 0
+            inside = np.flatnonzero((z >= a) & (z < b))
+            out[:, inside[z[inside] == a]] = motion.state[:, None]
+            inside = inside[z[inside] > a]
+            reached = motion.advance(phase, a, np.append(z[inside], b), sign, self._linear(phase, a, b, sign))
+            out[:, inside] = reached[:, :-1]
+
+    def _linear(self, phase: Phase, a: float, b: float, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (N,) coefficients of a disturbance that is linear in time between two events."""
+        n = signs.size
+        times = float(phase.time(a, math.exp)), float(phase.time(b, math.exp))
+        found = self.disturbance.linear(*times, np.arange(n), signs.astype(int))
+        return (np.zeros(n), np.zeros(n)) if found is None else found
+
+    def _expression(self) -> Callable[[Any, Any], Any]:
+        """Return ``t, (a, b) -> d`` for the integrator."""
+        import casadi as ca
+
+        n, disturbance = self.graph.n_nodes, self.disturbance
+        if not isinstance(disturbance, ExpressionDisturbance):
+            return lambda t, p: p[:n] + p[n:] * t
+        instant = ca.SX.sym("t")
+        values = ca.vertcat(*(disturbance.casadi(instant, k) for k in range(n)))  # type: ignore[arg-type]
+        function = ca.Function("d", [instant], [values])
+        return lambda t, _: function(t)
+
+    def _count(self, stats: dict[str, Any]) -> None:
+        for key in ("steps", "rhs"):
+            self.stats[key] += stats[key]
+
+
+def _values(disturbance: Disturbance, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Return the (N, M) disturbances along a run."""
+    if isinstance(disturbance, StateDependent):
+        columns = [disturbance.function(float(t[i]), x[:, i], sigma[:, i]) for i in range(t.size)]
+        return np.stack([np.broadcast_to(np.asarray(d, dtype=float), x.shape[0]) for d in columns], axis=1)
+    agents = np.arange(x.shape[0])
+    up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
+    return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
+
+
+def _minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return ``-ln(left)``, where ``left + share = 1``: whichever is the small one holds the digits."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(share < 0.5, -np.log1p(-share), -np.log(left))
