@@ -68,6 +68,8 @@ _EXPORTS = {
     "read_certificate": "certificate",
     "SymbolicLyapunov": "symbolic",
     "symbolic_lyapunov": "symbolic",
+    "SymbolicSliding": "symbolic",
+    "symbolic_sliding": "symbolic",
     "THEOREMS": "theorems",
     "theorem_for": "theorems",
     "plot_trajectory": "plots",

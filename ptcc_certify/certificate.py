@@ -443,7 +443,7 @@ ReachingTime(0, 1 before T_r)))
         comparison=comparison,
         notes=tuple(notes),
     )
-    if trajectory is None or not certificate.envelope.members:
+    if trajectory is None or not (certificate.envelope.members or sliding):
         return certificate
     return replace(certificate, comparison=certificate.envelope.compare(trajectory))
 

@@ -329,7 +329,7 @@ def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, gra
     source = "adversary" if options["disturbance"] is None else options["disturbance"]
     horizon = 2 * float(protocol.T)
     return {
-        "sigma0": [Fraction(0)] * graph.n_nodes if sigma0 == "0" else _start(sigma0, [seed, 1], graph),
+        "sigma0": [Fraction(0)] * graph.n_nodes if sigma0 == "0" else _start(sigma0, [seed, 1], graph, "--sigma0: "),
         "disturbance": as_disturbance(source, graph.n_nodes, protocol.delta, horizon, seed),
     }
 
@@ -345,11 +345,14 @@ def _reached(certificate: Certificate) -> str:
     return f"{run.reaching_times.max():>10.5f}{max(r.time for r in reaching):>11.5f}{float(protocol.T_r):>5.2g}"
 
 
-def _start(x0: str, seed: Any, graph: SignedDigraph) -> list[Fraction]:
+def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
     if x0 != "random":
         from ptcc_certify.io import read_state
 
-        return read_state(x0, graph)
+        try:
+            return read_state(x0, graph)
+        except PTCCError as error:
+            raise type(error)(f"{option}{error}") from None
     return [row[0] for row in _random_start(seed, graph.n_nodes, 1)]
 
 

@@ -92,7 +92,8 @@ def _rate_lines(certificate: Certificate) -> list[str]:
     V, rate, spectral = certificate.lyapunov, certificate.proof.rate, certificate.spectral_rate
     best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
     if certificate.constant:
-        return [_line("rate", "every agent keeps its state: there is nothing to decay")]
+        kept = "its state" if certificate.direct else "x - sigma"
+        return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
     if rate is not None and V is not None:
         near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
         lines.append(_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}"))
@@ -144,7 +145,7 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
     if run is None:
         return []
     lines = []
-    if seen is not None:
+    if seen is not None and not certificate.constant:
         said = "VIOLATED" if seen.violated else "kept" if seen.judged else "not tested, all is below the floor"
         resolved = f"down to 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
         lines.append(
@@ -161,11 +162,16 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
             when = f"at t = {run.reaching_times[last]:.6g}, {run.reaching_left[last]:.3g} before T_r"
         kept = "kept" if seen.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
-        lines.append(_line("", f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}"))
+        lines.append(
+            _line(
+                "" if lines else "simulated",
+                f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}",
+            )
+        )
     if certificate.outcome is not None:
         gap = float(abs(run.final_state - certificate.outcome.values).max())
         settled = "" if run.deadline_resolved else " (the run had not settled)"
-        lines.append(_line("" if seen else "simulated", f"end state within {gap:.1e} of the outcome{settled}"))
+        lines.append(_line("" if lines else "simulated", f"end state within {gap:.1e} of the outcome{settled}"))
     return lines
 
 

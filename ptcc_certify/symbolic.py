@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.latex import to_latex
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import LyapunovFunction, theorem_for
 
@@ -87,7 +88,7 @@ class SymbolicLyapunov:
         return f"${self.latex()}$"
 
 
-def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: NominalProtocol) -> SymbolicLyapunov:
+def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Protocol) -> SymbolicLyapunov:
     """Write ``E``, ``V`` and ``V'`` of a theorem row as CasADi expressions.
 
     Parameters
@@ -95,7 +96,8 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Nomin
     structure : Structure
     V : LyapunovFunction
         From the theorem that applies to the graph (``certificate.lyapunov``).
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
+        Of the sliding-mode protocol, the motion on the sliding manifold: the nominal one with ``T = T_r + T_s``.
 
     Returns
     -------
@@ -115,6 +117,8 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Nomin
     import casadi as ca
 
     graph = structure.graph
+    if isinstance(protocol, SlidingModeProtocol):
+        protocol = protocol.nominal
     loop = protocol.closed_loop(graph)
     t, x = loop["t"], loop["x"]
     gain = protocol.gain.expression(t)
@@ -145,4 +149,68 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Nomin
         V_dot=ca.jtimes(value, x, loop["ode"]),
         proof_form=-gain * ca.bilin(decrease, z, z),
         bounding_form=-gain * ca.bilin(S, z, z),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SymbolicSliding:
+    """Proposition 1 along the closed loop, symbolically.
+
+    Attributes
+    ----------
+    protocol : SlidingModeProtocol
+    t, x, varsigma, d : casadi.SX
+        Time, states, auxiliary variables and disturbances, (N, 1) each but time.
+    sigma : (N, 1) casadi.SX
+        ``x + varsigma``.
+    V : casadi.SX
+        ``sigma'sigma / 2``.
+    V_dot : casadi.SX
+        By CasADi's differentiation of ``V`` along the closed loop.
+    bounding_form : casadi.SX
+        ``-(mu1 - delta) sum |sigma_k| - (reaching gain) sigma'sigma``, above ``V_dot`` for every ``|d_k| <= delta``.
+    """
+
+    protocol: SlidingModeProtocol
+    t: ca.SX
+    x: ca.SX
+    varsigma: ca.SX
+    d: ca.SX
+    sigma: ca.SX
+    V: ca.SX
+    V_dot: ca.SX
+    bounding_form: ca.SX
+
+    def __repr__(self) -> str:
+        return f"SymbolicSliding({self.x.numel()} agents)"
+
+
+def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> SymbolicSliding:
+    """Write ``sigma``, ``V`` and ``V'`` of Proposition 1 as CasADi expressions.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
+    >>> form.sigma
+    SX([(x1+varsigma1), (x2+varsigma2)])
+    """
+    import casadi as ca
+
+    loop, n = protocol.closed_loop(graph), graph.n_nodes
+    t, x, varsigma = loop["t"], loop["x"][:n], loop["x"][n:]
+    sigma = x + varsigma
+    value = ca.sumsqr(sigma) / 2
+    reach = float(protocol.mu1 - protocol.delta) * ca.sum1(ca.fabs(sigma))
+    return SymbolicSliding(
+        protocol=protocol,
+        t=t,
+        x=x,
+        varsigma=varsigma,
+        d=loop["p"],
+        sigma=sigma,
+        V=value,
+        V_dot=ca.jtimes(value, loop["x"], loop["ode"]),
+        bounding_form=-reach - protocol.reaching_gain.expression(t) * ca.sumsqr(sigma),
     )

@@ -282,7 +282,76 @@ OPTIONS = [
     BadInput("examples below a file", ("examples", "1", "-o", "g.csv/deeper"), "g.csv/deeper", _PAIR),
 ]
 
-BAD_INPUTS = FILES + OPTIONS
+
+def _sliding(name: str, says: str, *args: str, command: str = "certify") -> BadInput:
+    return BadInput(name, (command, "fig1a", "--protocol", "sliding-mode", *args), says)
+
+
+def _disturbed(name: str, says: str, text: str, *more: str) -> BadInput:
+    return _sliding(f"disturbance: {name}", says, "--disturbance", text, *more)
+
+
+SLIDING = [
+    _disturbed("code", "__import__", "__import__('os')"),
+    _disturbed("an attribute", "column", "t.__class__"),
+    _disturbed("a string", "column", "'t'"),
+    _disturbed("an index", "column", "t[0]"),
+    _disturbed("lambda", "lambda", "lambda: 1"),
+    _disturbed("10^5 parentheses", "too long", "(" * 10**5),
+    _disturbed("400 parentheses", "nested", "(" * 400 + "t" + ")" * 400),
+    _disturbed("10^5 minus signs", "too long", "-" * 10**5 + "1"),
+    _disturbed("a tower of powers", "not finite", "9**9**9**9"),
+    _disturbed("300 powers", "nested", "1**" * 300 + "1"),
+    _disturbed("a huge number", "range", "1e999"),
+    _disturbed("an unknown name", "spam", "spam"),
+    _disturbed("an unknown function", "gamma", "gamma(t)"),
+    _disturbed("division by zero", "not finite", "1/0"),
+    _disturbed("a pole on the horizon", "agent", "0.01/(t - 0.3)"),
+    _disturbed("a pole at the start", "t = 0", "1/t"),
+    _disturbed("the root of a negative number", "agent", "sqrt(t - 0.5)"),
+    _disturbed("beyond delta", "agent", "1.5*sin(t)"),
+    _disturbed("beyond delta for one agent", "agent 6", "k/5.5"),
+    _disturbed("beyond delta late", "0.9", "t/0.99"),
+    _disturbed("empty", "number", ""),
+    _disturbed("two words", "missing after sin", "sin t t"),
+    _disturbed("an open parenthesis", "never closed", "sin(t"),
+    _disturbed("a comma", ",", "sin(t, 1)"),
+    _disturbed("a caret", "write a power", "t^2"),
+    _disturbed("digits of another script", "column", "\u0663"),
+    _disturbed("a control character", "column", "t\x1b[31m"),
+    _sliding("disturbance of the nominal protocol", "--disturbance", "--protocol", "nominal", "--disturbance", "t"),
+    _sliding("sigma0 of the nominal protocol", "--sigma0", "--protocol", "nominal", "--sigma0", "0"),
+    _sliding("T-r of the nominal protocol", "--T-r", "--protocol", "nominal", "--T-r", "1"),
+    _sliding("mu1 of the nominal protocol", "--mu1", "--protocol", "nominal", "--mu1", "1"),
+    _sliding("T of the sliding-mode protocol", "--T-r", "--T", "1"),
+    _sliding("mu1 equal to delta", "mu1 = 1 does not exceed delta", "--mu1", "1"),
+    _sliding("mu1 below delta", "mu1", "--mu1", "1", "--delta", "1.0000001"),
+    _sliding("mu2 zero", "mu2", "--mu2", "0"),
+    _sliding("mu3 negative", "mu3", "--mu3=-1"),
+    _sliding("delta negative", "delta", "--delta=-1"),
+    _sliding("T-s zero", "T_s", "--T-s", "0"),
+    _sliding("T-r a text", "T_r", "--T-r", "soon"),
+    _sliding("T-r empty", "T_r", "--T-r", ""),
+    _sliding("rho2 zero", "rho2", "--rho2", "0"),
+    _sliding("sigma0 too short", "sigma0", "--sigma0", "1,2"),
+    _sliding("sigma0 NaN", "sigma0", "--sigma0", "nan,1,2,3,4,5"),
+    _sliding("sigma0 beyond 1e300", "sigma0", "--sigma0", "1e301,1,2,3,4,5"),
+    _sliding("simulated: sigma0 too short", "sigma0", "--sigma0", "1,2", command="simulate"),
+    _sliding("simulated: two dimensions", "--dimension", "--dimension", "2", command="simulate"),
+    _sliding("simulated: layer zero", "boundary_layer", "--boundary-layer", "0", command="simulate"),
+    _sliding("simulated: layer NaN", "boundary_layer", "--boundary-layer", "nan", command="simulate"),
+    _sliding(
+        "simulated: layer of the nominal protocol",
+        "boundary_layer",
+        "--protocol",
+        "nominal",
+        "--boundary-layer",
+        "1",
+        command="simulate",
+    ),
+]
+
+BAD_INPUTS = FILES + OPTIONS + SLIDING
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Facts about the nominal protocol as a CasADi expression. Its LaTeX is tried in test_latex.py."""
+"""Facts about the protocols as CasADi expressions. LaTeX of the nominal one is tried in test_latex.py."""
 
 import pickle
 from fractions import Fraction
@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.symbolic import symbolic_lyapunov, symbolic_sliding
 
+SLIDING = SlidingModeProtocol("0.5", 1, "0.1", "0.3", 2, "1.2", "0.6", "0.9", 1)
 PROTOCOL = NominalProtocol("0.6", "0.1", "0.3", 1)
 
 
@@ -76,3 +78,87 @@ def test_latex_is_for_small_graphs():
     with pytest.raises(ParameterError, match="21 agents"):
         PROTOCOL.latex(ring)
     assert PROTOCOL._repr_latex_() == f"$${PROTOCOL.latex()}$$"
+
+
+# ---------------------------------------------------------------------- sliding mode
+
+
+@settings(deadline=None)
+@given(matrices(4), st.sampled_from([0.0, 0.3, 0.499, 0.5, 1.2, 1.5, 2.0]), st.integers(0, 99))
+def test_the_sliding_mode_input_is_48(W, instant, seed):
+    graph, rng = SignedDigraph.from_matrix(W), np.random.default_rng(seed)
+    state, varsigma = rng.normal(size=4), rng.normal(size=4)
+    varsigma[0] = -state[0]
+    x, v, t = ca.SX.sym("x", 4), ca.SX.sym("v", 4), ca.SX.sym("t")
+    u = ca.Function("u", [x, v, t], [SLIDING.input(graph, x, v, t)])(state, varsigma, instant)
+    L = np.diag(abs(W).sum(axis=1)) - W
+    gain = 0.1 + (0.6 / (1.5 - instant) if instant < 1.5 else 0)
+    reaching = 0.6 + (1.8 / (0.5 - instant) if instant < 0.5 else 0)
+    sigma = state + varsigma
+    expected = -gain * (L @ state) - 1.2 * np.sign(sigma) - reaching * sigma
+    np.testing.assert_allclose(np.array(u).ravel(), expected, rtol=1e-11, atol=1e-9)
+
+
+def test_sliding_variables_move_by_the_disturbance_and_what_drives_them_to_zero():
+    graph = SignedDigraph.from_edges([(1, 2, 3), (2, 1, -1)])
+    loop = SLIDING.closed_loop(graph)
+    sigma_dot = ca.Function("s", [loop["x"], loop["p"], loop["t"]], [loop["ode"][:2] + loop["ode"][2:]])
+    reached = sigma_dot([5, -3, -4, 1], [0.25, -1], 0.25)
+    np.testing.assert_allclose(np.array(reached).ravel(), [-1.2 - 7.8 + 0.25, 1.2 + 2 * 7.8 - 1])
+
+
+def test_v_dot_of_proposition_1_is_below_its_bounding_form():
+    graph = SignedDigraph.from_edges([(1, 2, 3), (2, 1, -1), (2, 3, 1)])
+    form = symbolic_sliding(graph, SLIDING)
+    both = ca.Function("V", [form.t, form.x, form.varsigma, form.d], [form.V_dot, form.bounding_form])
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        x, v = rng.normal(size=3), rng.normal(size=3)
+        t = float(rng.uniform(0, 1))
+        v_dot, bound = both(t, x, v, rng.uniform(-1, 1, 3))
+        assert float(v_dot) <= float(bound) + 1e-9 * abs(float(bound))
+        v_dot, bound = both(t, x, v, np.sign(x + v))  # the adversary attains it
+        assert float(v_dot) == pytest.approx(float(bound))
+
+
+def test_on_the_manifold_the_lyapunov_function_is_that_of_the_nominal_protocol():
+    from ptcc_certify.structure import analyse
+    from ptcc_certify.theorems import theorem_for
+
+    structure = analyse(SignedDigraph.from_edges([(1, 2, 3), (2, 1, -1), (2, 3, 1)]))
+    V = theorem_for(structure, "sliding-mode").lyapunov(structure)
+    slid, plain = (symbolic_lyapunov(structure, V, p) for p in (SLIDING, SLIDING.nominal))
+    assert slid.latex() == plain.latex()
+    assert slid.protocol == SLIDING.nominal
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("T_r", 0),
+        ("T_s", -1),
+        ("rho2", 0),
+        ("mu1", 1),
+        ("mu1", "0.5"),
+        ("mu2", 0),
+        ("mu3", 0),
+        ("delta", -1),
+        ("delta", "1.2"),
+    ],
+)
+def test_a_sliding_mode_parameter_outside_its_domain_is_named(name, value):
+    given = {key: text for key, text in SLIDING.to_dict().items() if key != "kind"}
+    with pytest.raises(ParameterError, match=name) as caught:
+        SlidingModeProtocol(**(given | {name: value}))
+    assert "\n" not in str(caught.value)
+    assert SlidingModeProtocol(**given) == SLIDING
+    assert pickle.loads(pickle.dumps(SLIDING)) == SLIDING  # noqa: S301
+
+
+def test_latex_of_the_sliding_mode_shows_numbers_of_a_graph():
+    graph = SignedDigraph.from_edges([(1, 2, -3)])
+    text = SLIDING.latex(graph)
+    assert r"u_{2}^{\mathrm{nom}} &= g \left(-3 \left(x_{1} + x_{2}\right)\right)" in text
+    assert r"- 1.2 \operatorname{sign}\left(\sigma_{k}\right) - h \sigma_{k}" in text
+    assert r"0.6 + \frac{1.8}{0.5 - t}" in text and r"0.1 + \frac{0.6}{1.5 - t}" in text
+    assert SLIDING._repr_latex_() == f"$${SLIDING.latex()}$$"
