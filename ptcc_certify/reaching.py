@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 #: Beyond this z the time is T_r to the last bit of a float.
 LAST_Z = 40.0
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(15)
+# Panels times agents at most, but so many panels in any case; panels times agents at a time.
 _MAX_PANELS = 200_000
+_LEAST_PANELS = 3000
+_BATCH = 200_000
 _BITS = (96, 256, 1024, 4096)
 _LARGEST_Z = Fraction(2) ** 1000
 
@@ -261,24 +264,32 @@ class ReachingProblem:
         breaks = -np.log1p(-self._disturbance.breaks(T) / T)
         edges = np.unique(np.concatenate([even, np.linspace(0, self._end, 65), breaks[breaks < self._end]]))
         a, b = edges[:-1], edges[1:]
+        previous = np.full(a.size, np.inf)
         rows = range(self._agents.size)
-        done: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        batch = max(1, _BATCH // self._agents.size)
+        most = max(_MAX_PANELS // self._agents.size, _LEAST_PANELS)
+        done: list[tuple[np.ndarray, np.ndarray]] = []
         count = 0
         while a.size:
-            count += a.size
-            if count * self._agents.size > max(_MAX_PANELS, 400 * self._agents.size):
+            count += min(a.size, batch)
+            if count > most:
                 raise SimulationError("the disturbance varies too fast, or jumps too often, to be resolved before T_r")
-            middle = (a + b) / 2
-            whole, left, right = (self._integrals(p, q, rows) for p, q in ((a, b), (a, middle), (middle, b)))
+            (low, a), (high, b), (before, previous) = (np.split(part, [batch]) for part in (a, b, previous))
+            middle = (low + high) / 2
+            whole, left, right = (self._integrals(p, q, rows) for p, q in ((low, high), (low, middle), (middle, high)))
             error = np.abs(whole - left - right).max(axis=0)
             size = (np.abs(left) + np.abs(right)).max(axis=0)
-            fits = (error <= 4e-15 * size) | (b - a <= 1e-13 * b) | ~np.isfinite(size)
-            done.append((a[fits], b[fits], (left + right)[:, fits]))
+            # Halving makes a smooth error vanish; one that only halves is rounding, if it is small, or else a jump.
+            rounding = (error <= 1e-12 * size) & (error > before / 8)
+            fits = (error <= 4e-15 * size) | rounding | (high - low <= 1e-13 * high) | ~np.isfinite(size)
+            done.append((low[fits], (left + right)[:, fits]))
             split = ~fits
-            a, b = np.concatenate([a[split], middle[split]]), np.concatenate([middle[split], b[split]])
+            a = np.concatenate([a, low[split], middle[split]])
+            b = np.concatenate([b, middle[split], high[split]])
+            previous = np.concatenate([previous, error[split], error[split]])
         starts = np.concatenate([part[0] for part in done])
         order = np.argsort(starts)
-        steps = np.concatenate([part[2] for part in done], axis=1)[:, order]
+        steps = np.concatenate([part[1] for part in done], axis=1)[:, order]
         return np.append(starts[order], self._end), steps
 
     def _root(self, row: int) -> float:

@@ -97,7 +97,7 @@ def simulate_sliding(
         deadline_residual=residual,
         stats=solver.stats | {"seconds": time.perf_counter() - began},
         sigma=sigma,
-        disturbance=_values(disturbance, instants.t, y + sigma, sigma),
+        disturbance=solver.disturbances(instants.t, y + sigma, sigma),
         sigma0=sigma0,
         reaching_remaining=instants.reaching_left,
         reaching_z=z,
@@ -328,19 +328,19 @@ class _Solver:
         function = ca.Function("d", [instant], [values])
         return lambda t, _: function(t)
 
+    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+        """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
+        disturbance, labels, delta = self.disturbance, self.graph.labels, self.protocol.delta
+        if isinstance(disturbance, StateDependent):
+            columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels) for i in range(t.size))
+            return np.stack(list(columns), axis=1)
+        agents = np.arange(x.shape[0])
+        up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
+        return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
+
     def _count(self, stats: dict[str, Any]) -> None:
         for key in ("steps", "rhs"):
             self.stats[key] += stats[key]
-
-
-def _values(disturbance: Disturbance, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return the (N, M) disturbances along a run."""
-    if isinstance(disturbance, StateDependent):
-        columns = [disturbance.function(float(t[i]), x[:, i], sigma[:, i]) for i in range(t.size)]
-        return np.stack([np.broadcast_to(np.asarray(d, dtype=float), x.shape[0]) for d in columns], axis=1)
-    agents = np.arange(x.shape[0])
-    up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
-    return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
 
 
 def _minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
