@@ -198,7 +198,7 @@ class SlidingMotion(_Motion):
         Size of the start.
     mu1 : float
     disturbance : callable
-        From a CasADi symbol of time and one of 2 N parameters ``a, b`` to the (N, 1) disturbances.
+        From CasADi expressions of time, of 2 N parameters ``a, b`` and of the signs to the (N, 1) disturbances.
     layer : float or None
         ``s`` is ``tanh(sigma/layer)`` instead of a given sign.
     """
@@ -212,7 +212,7 @@ class SlidingMotion(_Motion):
         *,
         unit: float,
         mu1: float,
-        disturbance: Callable[[Any, Any], Any],
+        disturbance: Callable[[Any, Any, Any], Any],
         layer: float | None = None,
     ):
         super().__init__(graph, rtol, atol)
@@ -233,14 +233,11 @@ class SlidingMotion(_Motion):
         x, clock, p = ca.MX.sym("x", 2 * n), ca.MX.sym("z"), ca.MX.sym("p", 3 * n)
         y, sigma, sign = x[:n], x[n:], p[:n]
         R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
-        d = self._disturbance(t, p[n:]) / self._unit
-        if self._layer is None:
-            push, active = self._mu1 / self._unit * sign, ca.fabs(sign)
-        else:
-            push, active = self._mu1 / self._unit * ca.tanh(sigma * (self._unit / self._layer)), ca.MX(1)
+        s = sign if self._layer is None else ca.tanh(sigma * (self._unit / self._layer))
+        d = self._disturbance(t, p[n:], s)
         ode = ca.vertcat(
             -phase.nominal(R) * ca.mtimes(_to_casadi(self.laplacian), y + sigma),
-            -R * (push - active * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
+            -R / self._unit * (self._mu1 * s - ca.fabs(sign) * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
         )
         problem = {"x": x, "t": clock, "p": p, "ode": ode}
         integrator = ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options)

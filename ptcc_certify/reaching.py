@@ -61,7 +61,8 @@ class ReachingTime:
         """``T_r - t``, rounded down; 0 where only ``T_r`` is certain, and where it is below the range of floats."""
         if self.z is None:
             return 0.0
-        left = float(self.deadline) * math.exp(-float(min(self.z, Fraction(1000)))) * (1 - 1e-15)
+        z = float(min(self.z, Fraction(1000)))
+        left = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
         return left if left > 1e-300 else 0.0
 
     @property

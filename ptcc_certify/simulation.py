@@ -113,8 +113,8 @@ def simulate(
         if not 1e-15 <= tolerance <= 0.1:
             raise ParameterError(f"{name} = {tolerance} is outside its domain; {name} must be between 1e-15 and 0.1")
     if isinstance(protocol, SlidingModeProtocol):
-        if np.ndim(x0) != 1:
-            raise ParameterError("the sliding-mode protocol is simulated from one start at a time; give N numbers")
+        if np.ndim(x0) != 1 or np.ndim(sigma0) > 1:
+            raise ParameterError("the sliding mode is simulated from one start at a time; give N numbers x0 and sigma0")
         if boundary_layer is not None and not 1e-12 <= boundary_layer <= 1e12:
             raise ParameterError(f"boundary_layer = {boundary_layer} is outside its domain, 1e-12 to 1e12")
         instants = _sliding_defaults(protocol, remaining, samples, past) if times is None else _sliding(protocol, times)
@@ -240,9 +240,8 @@ def _sliding_defaults(protocol: SlidingModeProtocol, remaining: float, samples: 
     later = np.append(T, _later(T, past))
     after = np.stack([later, np.zeros(later.size), np.zeros(later.size)])
     table = np.concatenate([before, between, after], axis=1)
-    order = np.lexsort((-table[2], -table[1], table[0]))
-    table = table[:, order]
-    fresh = np.append(True, np.diff(table[0]) > 0)
+    table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
+    fresh = np.append(True, np.diff(table, axis=1).any(axis=0))
     return Instants(*table[:, fresh])
 
 

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.cvodes import NominalMotion, Phase, SlidingMotion
-from ptcc_certify.disturbance import Disturbance, ExpressionDisturbance, StateDependent
-from ptcc_certify.errors import SimulationError
+from ptcc_certify.disturbance import Adversary, Disturbance, ExpressionDisturbance, StateDependent
+from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.reaching import LAST_Z, ReachingProblem
 from ptcc_certify.trajectory import SlidingTrajectory
 
@@ -83,7 +83,7 @@ def simulate_sliding(
         y, sigma, residual = solver.imitation(start, sigma0, instants, boundary_layer)
     at_deadline = np.flatnonzero((instants.left == 0) & (instants.t == float(protocol.T)))
     with np.errstate(divide="ignore"):
-        clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left), np.inf)
+        clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left) + 0.0, np.inf)
     return SlidingTrajectory(
         graph=graph,
         protocol=protocol,
@@ -97,7 +97,7 @@ def simulate_sliding(
         deadline_residual=residual,
         stats=solver.stats | {"seconds": time.perf_counter() - began},
         sigma=sigma,
-        disturbance=solver.disturbances(instants.t, y + sigma, sigma),
+        disturbance=solver.disturbances(instants.t, y + sigma, sigma, boundary_layer),
         sigma0=sigma0,
         reaching_remaining=instants.reaching_left,
         reaching_z=z,
@@ -247,10 +247,12 @@ class _Solver:
 
         Towards each pole the run stops at ``1 - t/T = 1e-13``; its state there stands for what follows.
         """
+        if isinstance(self.disturbance, StateDependent):
+            raise ParameterError("a boundary layer takes no disturbance that reads the states; give one of time")
         n, t, last = start.size, instants.t, float(instants.t[-1])
         out = np.empty((2 * n, t.size))
         motion = self._motion(start, sigma0, width)
-        before, after = t < self.T_r, instants.left == 0
+        before, after = instants.reaching_left > 0, instants.left == 0
         between = ~before & ~after
         settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, 0.0, self.mu2, 0.0)
         past = Phase(self.T, self.T, self.rho1, 0.0, 0.0, self.mu2, 0.0, past=True)
@@ -316,24 +318,28 @@ class _Solver:
         found = self.disturbance.linear(*times, np.arange(n), signs.astype(int))
         return (np.zeros(n), np.zeros(n)) if found is None else found
 
-    def _expression(self) -> Callable[[Any, Any], Any]:
-        """Return ``t, (a, b) -> d`` for the integrator."""
+    def _expression(self) -> Callable[[Any, Any, Any], Any]:
+        """Return ``t, (a, b), sign -> d`` for the integrator."""
         import casadi as ca
 
         n, disturbance = self.graph.n_nodes, self.disturbance
+        if isinstance(disturbance, Adversary):
+            return lambda t, p, sign: float(disturbance.delta) * sign
         if not isinstance(disturbance, ExpressionDisturbance):
-            return lambda t, p: p[:n] + p[n:] * t
+            return lambda t, p, sign: p[:n] + p[n:] * t
         instant = ca.SX.sym("t")
         values = ca.vertcat(*(disturbance.casadi(instant, k) for k in range(n)))  # type: ignore[arg-type]
         function = ca.Function("d", [instant], [values])
-        return lambda t, _: function(t)
+        return lambda t, p, sign: function(t)
 
-    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray, layer: float | None) -> np.ndarray:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
         disturbance, labels, delta = self.disturbance, self.graph.labels, self.protocol.delta
         if isinstance(disturbance, StateDependent):
             columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels) for i in range(t.size))
             return np.stack(list(columns), axis=1)
+        if isinstance(disturbance, Adversary) and layer is not None:
+            return float(disturbance.delta) * np.tanh(sigma / layer)
         agents = np.arange(x.shape[0])
         up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
         return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
