@@ -325,13 +325,24 @@ def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, gra
 
     if not isinstance(protocol, SlidingModeProtocol):
         return {}
-    sigma0 = "0" if options["sigma0"] is None else options["sigma0"]
     source = "adversary" if options["disturbance"] is None else options["disturbance"]
     horizon = 2 * float(protocol.T)
     return {
-        "sigma0": [Fraction(0)] * graph.n_nodes if sigma0 == "0" else _start(sigma0, [seed, 1], graph, "--sigma0: "),
+        "sigma0": _sigma0(options["sigma0"], seed, graph),
         "disturbance": as_disturbance(source, graph.n_nodes, protocol.delta, horizon, seed),
     }
+
+
+def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
+    from ptcc_certify.errors import NumberError
+    from ptcc_certify.rationals import parse_exact
+
+    try:
+        if text is None or parse_exact(text) == 0:
+            return [Fraction(0)] * graph.n_nodes
+    except NumberError:
+        pass
+    return _start(text or "", [seed, 1], graph, "--sigma0: ")
 
 
 def _reached(certificate: Certificate) -> str:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -296,7 +296,7 @@ class Disturbance(ABC):
         """Return ``d_k(t)`` for instants (M,) and agents (A,) with ``sign(sigma_k)`` (A,): floats (A, M)."""
 
     @abstractmethod
-    def check(self, delta: Fraction, labels: Sequence[str], until: float) -> str:
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Return how ``|d_k| <= delta`` was established on [0, until] for the agents of these labels.
 
         Raises
@@ -391,7 +391,7 @@ class ExpressionDisturbance(Disturbance):
         except RecursionError:
             raise ParameterError(f'disturbance "{shorten(self.text)}" is too long to be printed as LaTeX') from None
 
-    def check(self, delta: Fraction, labels: Sequence[str], until: float) -> str:
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Bisect boxes of time until intervals enclose ``d`` in ``[-delta, delta]``; where that fails, sample it.
 
         Returns
@@ -412,7 +412,7 @@ class ExpressionDisturbance(Disturbance):
                 agents = agents[:1]
             for start in range(0, agents.size, _CHUNK):
                 chunk = agents[start : start + _CHUNK]
-                budget, by_samples = self._check_boxes(text, chunk, delta, labels, until, budget)
+                budget, by_samples = self._check_boxes(text, chunk, _Limit(delta, slack), labels, until, budget)
                 sampled |= by_samples
         return f"sampling at {_INSTANTS:,} instants" if sampled else "interval arithmetic"
 
@@ -433,13 +433,13 @@ class ExpressionDisturbance(Disturbance):
         return _run(self._programs[self.texts[0 if self.common else agent]], algebra, atoms, type(atoms["t"]))
 
     def _check_boxes(
-        self, text: str, agents: np.ndarray, delta: Fraction, labels: Sequence[str], until: float, budget: int
+        self, text: str, agents: np.ndarray, limit: _Limit, labels: Sequence[str], until: float, budget: int
     ) -> tuple[int, bool]:
         """Return the number of boxes left to spend, and whether samples had to do."""
-        program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', _bound(delta)
+        program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', limit.bound
 
         def sample(k: np.ndarray, t: np.ndarray) -> None:
-            _refuse_beyond(_floats(program, k + 1.0, t), t, k, delta, labels, place)
+            _refuse_beyond(_floats(program, k + 1.0, t), t, k, limit, labels, place)
 
         sample(agents[:, None], np.linspace(0, until, 2 * _CELLS + 1)[None, :])
         edges, sampled = np.linspace(0, until, _CELLS + 1), False
@@ -463,7 +463,8 @@ class ExpressionDisturbance(Disturbance):
             k, lo, hi = np.tile(k, 2), np.concatenate([lo, middle]), np.concatenate([middle, hi])
             budget -= k.size
         if sampled:
-            sample(agents[:, None], np.linspace(0, until, _INSTANTS)[None, :])
+            # Not on a lattice, which a fast signal could hide between.
+            sample(agents[:, None], np.sort(np.random.default_rng(_INSTANTS).uniform(0, until, _INSTANTS))[None, :])
         return budget, sampled
 
 
@@ -546,10 +547,12 @@ class SampledDisturbance(Disturbance):
         i = int(self._index(middle))
         if self.hold or middle < self.times[0] or i == self.times.size - 1:
             return rows[:, i], np.zeros(len(rows))
-        slope = (rows[:, i + 1] - rows[:, i]) / (self.times[i + 1] - self.times[i])
+        with np.errstate(over="ignore"):
+            slope = (rows[:, i + 1] - rows[:, i]) / (self.times[i + 1] - self.times[i])
+        slope[~np.isfinite(slope)] = 0.0
         return rows[:, i] - slope * self.times[i], slope
 
-    def check(self, delta: Fraction, labels: Sequence[str], until: float) -> str:
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Compare all samples on [0, until], and the values at both ends, with ``delta``."""
         if len(self.samples) > 1:
             _refuse_other_count(len(self.samples), "signals", labels)
@@ -558,7 +561,8 @@ class SampledDisturbance(Disturbance):
         for start in range(0, agents.size, _CHUNK):
             chunk = agents[start : start + _CHUNK]
             values = self.values(instants, chunk)
-            _refuse_beyond(values, instants, chunk[:, None], delta, labels, f"disturbance ({shorten(self.text)})")
+            place = f"disturbance ({shorten(self.text)})"
+            _refuse_beyond(values, instants, chunk[:, None], _Limit(delta, slack), labels, place)
         return "exact at the samples"
 
     def _rows(self, agents: ArrayLike) -> np.ndarray:
@@ -648,7 +652,7 @@ class Adversary(Disturbance):
         level = nearest_float(self.delta) * np.asarray(signs, dtype=float)
         return level, np.zeros(level.size)
 
-    def check(self, delta: Fraction, labels: Sequence[str], until: float) -> str:
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Compare the adversary's ``delta`` with that of the protocol."""
         if self.delta > delta:
             value, limit = nearest_float(self.delta), nearest_float(delta)
@@ -680,7 +684,15 @@ class StateDependent(Disturbance):
     function: Callable[[float, np.ndarray, np.ndarray], ArrayLike]
     text: str = "state-dependent (Python)"
 
-    def at(self, t: float, x: np.ndarray, sigma: np.ndarray, delta: Fraction, labels: Sequence[str]) -> np.ndarray:
+    def at(
+        self,
+        t: float,
+        x: np.ndarray,
+        sigma: np.ndarray,
+        delta: Fraction,
+        labels: Sequence[str],
+        slack: float = TOLERANCE,
+    ) -> np.ndarray:
         """Return the disturbances (N,) at time ``t``, states ``x`` (N,) and sliding variables ``sigma`` (N,).
 
         Raises
@@ -697,14 +709,15 @@ class StateDependent(Disturbance):
             wanted = f"return a number or shape ({len(labels)},)"
             raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {wanted}")
         values = np.broadcast_to(values, (len(labels),))
-        _refuse_beyond(values, np.array(t), np.arange(len(labels)), delta, labels, f"disturbance ({self.text})")
+        limit, agents = _Limit(delta, slack), np.arange(len(labels))
+        _refuse_beyond(values, np.array(t), agents, limit, labels, f"disturbance ({self.text})")
         return values
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
         """Refuse: without the state there is no value; use :meth:`at`."""
         raise ParameterError(f"{self.text}: a disturbance that depends on the state has no values without it; use at")
 
-    def check(self, delta: Fraction, labels: Sequence[str], until: float) -> str:
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Leave the check to :meth:`at`."""
         return "at every evaluation of the run"
 
@@ -785,8 +798,15 @@ def _number(value: Any, name: str) -> float:
     return number
 
 
-def _bound(delta: Fraction) -> float:
-    return nearest_float(delta) * (1 + TOLERANCE)
+class _Limit(NamedTuple):
+    """The bound of a disturbance, and how far floats may exceed it, relatively."""
+
+    delta: Fraction
+    slack: float
+
+    @property
+    def bound(self) -> float:
+        return nearest_float(self.delta) * (1 + self.slack)
 
 
 def _refuse_other_count(count: int, what: str, labels: Sequence[str]) -> None:
@@ -795,16 +815,16 @@ def _refuse_other_count(count: int, what: str, labels: Sequence[str]) -> None:
 
 
 def _refuse_beyond(
-    values: np.ndarray, t: np.ndarray, agents: np.ndarray, delta: Fraction, labels: Sequence[str], place: str
+    values: np.ndarray, t: np.ndarray, agents: np.ndarray, limit: _Limit, labels: Sequence[str], place: str
 ) -> None:
     """Refuse values that are not finite or beyond ``delta``; the three arrays broadcast."""
     size = np.where(np.isfinite(values), np.abs(values), np.inf)
     worst = int(size.argmax())
-    if size.flat[worst] <= _bound(delta):
+    if size.flat[worst] <= limit.bound:
         return
     agent, instant = (np.broadcast_to(array, size.shape).flat[worst] for array in (agents, t))
-    value, limit = float(values.flat[worst]), nearest_float(delta)
+    value, delta = float(values.flat[worst]), nearest_float(limit.delta)
     where = f"{place} of agent {shorten(labels[agent])} at t = {float(instant):.9g}"
     if not math.isfinite(value):
         raise ParameterError(f"{where} is {value}, not finite; keep clear of poles and of the ends of domains")
-    raise ParameterError(f"{where} is {value!r}, beyond delta = {limit!r}; lower it or raise delta")
+    raise ParameterError(f"{where} is {value!r}, beyond delta = {delta!r}; lower it or raise delta")

@@ -115,7 +115,8 @@ def plot_sliding(
     for row in trajectory.sigma:
         ax.plot(trajectory.t[shown], row[shown], color="#0072B2", linewidth=0.9)
     reached = trajectory.reaching_times[trajectory.sigma0 != 0]
-    ax.plot(reached, np.zeros(reached.size), "o", color="#0072B2", markersize=3, label="$\\sigma_k$ reaches 0")
+    if np.isfinite(reached).any():
+        ax.plot(reached, np.zeros(reached.size), "o", color="#0072B2", markersize=3, label="$\\sigma_k$ reaches 0")
     if reaching is not None:
         proved = [r.time for r in reaching if r.z is None or r.z > 0]
         ax.plot(proved, [0.0] * len(proved), "|", color="#D55E00", markersize=12, label="proved at the latest")

@@ -67,7 +67,7 @@ class ReachingTime:
 
     @property
     def time(self) -> float:
-        """The instant, at most ``T_r``, rounded up."""
+        """The instant, rounded up, at most the float nearest to ``T_r``."""
         if self.z is None:
             return float(self.deadline)
         early = -float(self.deadline) * math.expm1(-float(min(self.z, Fraction(1000)))) * (1 + 1e-15)
@@ -274,7 +274,9 @@ class ReachingProblem:
         while a.size:
             count += min(a.size, batch)
             if count > most:
-                raise SimulationError("the disturbance varies too fast, or jumps too often, to be resolved before T_r")
+                raise SimulationError(
+                    "the disturbance varies too fast, or jumps too often, to be resolved before T_r; try a slower one"
+                )
             (low, a), (high, b), (before, previous) = (np.split(part, [batch]) for part in (a, b, previous))
             middle = (low + high) / 2
             whole, left, right = (self._integrals(p, q, rows) for p, q in ((low, high), (low, middle), (middle, high)))

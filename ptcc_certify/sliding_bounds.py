@@ -100,10 +100,12 @@ class SlidingEnvelope(Envelope):
         with np.errstate(divide="ignore"):
             z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
             clock = np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
-        bound = np.full(q.size, np.inf)
+        bound, start = np.full(q.size, np.inf), np.asarray(x0, dtype=float)
+        unit = self._unit(start)
         for member in self.members:
-            v, sliding = self._bounds(member, np.asarray(x0, dtype=float), z, clock)
-            bound = np.minimum(bound, (v + sliding) / np.sqrt(member.weights.min()))
+            v, sliding = self._bounds(member, start / unit, unit, z, clock)
+            with np.errstate(over="ignore"):
+                bound = np.minimum(bound, (v + sliding) / np.sqrt(member.weights.min()) * unit)
         return bound if np.ndim(remaining) else bound[0]
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
@@ -128,7 +130,12 @@ class SlidingEnvelope(Envelope):
         if trajectory.t[0] != 0 or (trajectory.sigma0 != sigma0).any():
             raise ParameterError("the run starts later than 0, or from another sigma(0) than the envelope")
         certain = np.array([np.inf if r.z is None else float(r.z) for r in self.reaching])
-        kept = bool((trajectory.reaching_z <= certain * (1 + 1e-9)).all())
+        late = certain * 1e-9
+        if trajectory.reads_states:  # sigma_k is known to the integrator's floor, its root to that over the slope
+            gap = float(self.protocol.mu1 - self.protocol.delta) * float(self.protocol.T_r) * np.exp(-certain)
+            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+                late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
+        kept = bool((trajectory.reaching_z <= certain + late).all())
         z = self._z(trajectory)
         bound, size = sliding_bound(self.protocol, self.sigma0, z), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
@@ -141,17 +148,20 @@ class SlidingEnvelope(Envelope):
         assert isinstance(trajectory, SlidingTrajectory)
         if self.direct:
             return super().histories(member, trajectory)
-        y = trajectory.states - trajectory.sigma
-        size = max(float(np.abs(part).max()) for part in (trajectory.states, y)) or 1.0
-        v, sliding = self._bounds(member, trajectory.states[:, 0], self._z(trajectory), trajectory.clock)
+        own = self._unit(trajectory.states[:, 0])
+        x, y = trajectory.states / own, (trajectory.states - trajectory.sigma) / own
+        size = max(float(np.abs(part).max()) for part in (x, y))
+        v, sliding = self._bounds(member, x[:, 0], own, self._z(trajectory), trajectory.clock)
         unit = float((v + sliding).max()) or 1.0
         floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
-        values = [
-            member.value(member.coordinates_of(state, self._laplacian) / unit) for state in (trajectory.states, y)
-        ]
         return [
-            History(np.sqrt(value), bound / unit, floor) for value, bound in zip(values, (v + sliding, v), strict=True)
+            History(np.sqrt(member.value(member.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
+            for part, bound in ((x, v + sliding), (y, v))
         ]
+
+    def _unit(self, x0: np.ndarray) -> float:
+        """Return the size of the start, in which squares neither overflow nor vanish."""
+        return max(float(np.abs(x0).max()), *(abs(float(x)) for x in self.sigma0)) or 1.0
 
     @staticmethod
     def _z(trajectory: SlidingTrajectory) -> np.ndarray:
@@ -159,15 +169,18 @@ class SlidingEnvelope(Envelope):
             return -np.log(trajectory.reaching_remaining)
 
     def _bounds(
-        self, member: Member, x0: np.ndarray, z: np.ndarray, clock: np.ndarray
+        self, member: Member, x0: np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks."""
-        sigma0 = np.array([float(x) for x in self.sigma0])
+        """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
+
+        ``x0`` and what is returned are in units of ``unit``.
+        """
+        sigma0 = np.array([float(x) for x in self.sigma0]) / unit
         start = float(np.sqrt(member.value(member.coordinates_of(x0 - sigma0, self._laplacian))))
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = sliding_bound(self.protocol, self.sigma0, knots)
+        size = sliding_bound(self.protocol, self.sigma0, knots) / unit
         forcing = np.sqrt(member.value(B @ size))
         s = self._clock_at(knots)
         decay = np.exp(-half * np.diff(s, append=self._clock_at(np.array([np.inf]))))

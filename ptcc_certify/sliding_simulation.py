@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.cvodes import NominalMotion, Phase, SlidingMotion
-from ptcc_certify.disturbance import Adversary, Disturbance, ExpressionDisturbance, StateDependent
+from ptcc_certify.disturbance import TOLERANCE, Adversary, Disturbance, ExpressionDisturbance, StateDependent
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.reaching import LAST_Z, ReachingProblem
 from ptcc_certify.trajectory import SlidingTrajectory
@@ -73,7 +73,8 @@ def simulate_sliding(
         As there.
     """
     began = time.perf_counter()
-    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]))
+    slack = _slack(protocol)
+    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), slack)
     unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
     solver = _Solver(graph, protocol, disturbance, unit, rtol, atol)
     if boundary_layer is None:
@@ -104,6 +105,7 @@ def simulate_sliding(
         source=disturbance.text,
         bounded_by=bounded_by,
         boundary_layer=boundary_layer,
+        reads_states=isinstance(disturbance, StateDependent),
     )
 
 
@@ -172,53 +174,52 @@ class _Solver:
         self, start: np.ndarray, sigma0: np.ndarray, z: np.ndarray, out: np.ndarray
     ) -> tuple[np.ndarray, float, np.ndarray]:
         """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
-        from scipy.integrate import solve_ivp
+        from scipy.integrate import LSODA
 
         n, end, now = start.size, self._last_z, 0.0
         phase, L = self.reaching, self.graph.laplacian()
         disturbance = self.disturbance
         assert isinstance(disturbance, StateDependent)
+        labels, delta, slack = self.graph.labels, self.protocol.delta, _slack(self.protocol)
         signs, reached = np.sign(sigma0), np.where(sigma0 == 0, 0.0, np.inf)
         state = np.concatenate([start - sigma0, sigma0]) / self.unit
+        # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
+        sizes = np.abs(state[n:])
+        atol = self.atol * np.concatenate([np.ones(n), np.where(sizes > 0, np.maximum(sizes, 1e-250), 1.0)])
 
         def motion(z: float, v: np.ndarray) -> np.ndarray:
             R, t = float(phase.rate(z, math.exp)), float(phase.time(z, math.exp))
-            y, sigma = v[:n], np.where(signs != 0, v[n:], 0.0)
-            d = disturbance.at(t, (y + sigma) * self.unit, sigma * self.unit, self.protocol.delta, self.graph.labels)
+            # A trial beyond the root must not show the disturbance a sign that never occurs.
+            y, sigma = v[:n], signs * np.maximum(signs * v[n:], np.finfo(float).tiny)
+            d = disturbance.at(t, (y + sigma) * self.unit, sigma * self.unit, delta, labels, slack)
             push = R * (self.mu1 * signs - np.abs(signs) * d) / self.unit
-            return np.concatenate(
-                [-phase.nominal(R) * (L @ (y + sigma)), -push - (phase.mu2 * R + phase.reaching_pole) * sigma]
-            )
-
-        def crossing(k: int) -> Any:
-            def event(_: float, v: np.ndarray) -> float:
-                return float(v[n + k])
-
-            event.terminal, event.direction = True, -signs[k]  # type: ignore[attr-defined]
-            return event
+            rate = -push - (phase.mu2 * R + phase.reaching_pole) * np.where(signs != 0, v[n:], 0.0)
+            return np.concatenate([-phase.nominal(R) * (L @ (y + sigma)), rate])
 
         while signs.any() and now < end:
+            solver = LSODA(motion, now, state, end, rtol=self.rtol, atol=atol)
             watched = np.flatnonzero(signs).tolist()
-            run = solve_ivp(
-                motion,
-                (now, end),
-                state,
-                method="LSODA",
-                events=[crossing(k) for k in watched],
-                dense_output=True,
-                rtol=self.rtol,
-                atol=self.atol,
-            )
-            if run.status < 0:
-                raise SimulationError(f"the reaching phase stopped: {run.message}")
-            self._count({"steps": run.t.size - 1, "rhs": run.nfev})
-            inside = (z >= now) & (z < run.t[-1])
-            if inside.any():
-                out[:, inside] = run.sol(z[inside])
-                out[n:, inside] *= np.abs(signs)[:, None]
-            now, state = float(run.t[-1]), run.y[:, -1].copy()
-            hit = [k for k, at in zip(watched, run.t_events, strict=True) if at.size or state[n + k] * signs[k] <= 0]
+            hit: list[int] = []
+            while not hit and solver.status == "running":
+                before = solver.t
+                if message := solver.step():
+                    raise SimulationError(f"the reaching phase stopped: {message}")
+                dense = solver.dense_output()
+                roots = {k: _root(dense, n + k, signs[k], before, solver.t) for k in watched}
+                last = min(roots.values())
+                hit = [k for k in watched if roots[k] <= min(last, solver.t)]
+                now = min(last, solver.t)
+                inside = (z >= before) & (z < now)
+                if inside.any():
+                    out[:, inside] = dense(z[inside])
+                    out[n:, inside] *= np.abs(signs)[:, None]
+                self._count({"steps": 1, "rhs": 0})
+            self._count({"steps": 0, "rhs": solver.nfev})
+            state = dense(now) if hit else solver.y.copy()
             reached[hit], signs[hit] = now, 0.0
+            # Who is past 0 by a rounding has arrived too.
+            late = np.flatnonzero(signs * state[n:] < 0)
+            reached[late], signs[late] = now, 0.0
             state[n:][signs == 0] = 0
         return reached, now, state[:n]
 
@@ -336,7 +337,8 @@ class _Solver:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
         disturbance, labels, delta = self.disturbance, self.graph.labels, self.protocol.delta
         if isinstance(disturbance, StateDependent):
-            columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels) for i in range(t.size))
+            slack = _slack(self.protocol)
+            columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels, slack) for i in range(t.size))
             return np.stack(list(columns), axis=1)
         if isinstance(disturbance, Adversary) and layer is not None:
             return float(disturbance.delta) * np.tanh(sigma / layer)
@@ -347,6 +349,24 @@ class _Solver:
     def _count(self, stats: dict[str, Any]) -> None:
         for key in ("steps", "rhs"):
             self.stats[key] += stats[key]
+
+
+def _slack(protocol: SlidingModeProtocol) -> float:
+    """Return by how much a float may exceed ``delta``, relatively: by rounding, and never so far as ``mu1``."""
+    gap = (protocol.mu1 - protocol.delta) / (2 * protocol.delta) if protocol.delta else 0
+    return min(TOLERANCE, float(gap))
+
+
+def _root(dense: Any, row: int, sign: float, low: float, high: float) -> float:
+    """Return where a sliding variable reaches 0 within a step, infinity if it does not."""
+    from scipy.optimize import brentq
+
+    def size(z: float) -> float:
+        return float(sign * dense(z)[row])
+
+    if size(high) > 0:
+        return math.inf
+    return low if size(low) <= 0 else float(brentq(size, low, high, xtol=1e-300, rtol=4e-16 * 4))
 
 
 def _minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     graph = structure.graph
     negative = int((graph.sign < 0).sum())
     names = [name for name in p.to_dict() if name != "kind"]
-    parameters = ", ".join(f"{name} {float(getattr(p, name)):g}" for name in names)
+    parameters = ", ".join(f"{name} {float(getattr(p, name)):.12g}" for name in names)
     lines = [
         _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
         _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
@@ -209,7 +209,9 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
             left = f"{_down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
             said.append(f"{'others' if late else 'all'} by t = {_up(last.time, 6)}, {left} (agent {agent})")
         if late:
-            said.append(f"only at T_r for {_listed(late, 40)}: mu3 kappa < 1 and sigma(0) is large")
+            large = certificate.protocol.reaching_gain.pole < 1  # type: ignore[union-attr]
+            why = "mu3 kappa < 1 and sigma(0) is large" if large else "0 is reached nearer to T_r than can be written"
+            said.append(f"only at T_r for {_listed(late, 40)}: {why}")
         lines.append(_line("sliding", f"sigma_k = 0 proved: {'; '.join(said)}"))
     if isinstance(run, SlidingTrajectory):
         lines.append(_line("disturbed", f"the run meets d = {run.source}; |d| <= delta: {run.bounded_by}"))

@@ -183,6 +183,9 @@ class SlidingTrajectory(Trajectory):
         How ``|d_k| <= delta`` was established.
     boundary_layer : float or None
         Width ``w`` of the imitation ``tanh(sigma/w)`` of the sign; None for the true solution.
+    reads_states : bool
+        Whether the disturbance depends on the states: then reaching times are as accurate as the integrator, otherwise
+        roots of scalar equations to near machine precision.
     """
 
     protocol: SlidingModeProtocol
@@ -194,6 +197,7 @@ class SlidingTrajectory(Trajectory):
     source: str
     bounded_by: str
     boundary_layer: float | None
+    reads_states: bool
 
     def __post_init__(self) -> None:
         super().__post_init__()
