@@ -204,15 +204,15 @@ class ReachingProblem:
 
     def __init__(self, protocol: SlidingModeProtocol, sigma0: np.ndarray, disturbance: Disturbance):
         self._protocol, self._disturbance = protocol, disturbance
-        self._unit = float(np.abs(sigma0).max(initial=0.0)) or 1.0
-        self._size, self._sign = np.abs(sigma0) / self._unit, np.sign(sigma0)
+        # Each sliding variable in units of its own start: the bracket begins at 1.
+        self._unit, self._sign = np.abs(sigma0), np.sign(sigma0)
         self._agents = np.flatnonzero(self._sign)
         # An adversary of the full size leaves mu1 - delta, which floats would cancel.
         self._gap = float(protocol.mu1 - protocol.delta)
         self._worst = isinstance(disturbance, Adversary) and disturbance.delta == protocol.delta
         self.z = np.zeros(len(sigma0))
         if self._agents.size:
-            largest = _bracket(protocol, Fraction(self._unit))
+            largest = _bracket(protocol, Fraction(float(self._unit.max())))
             self._end = LAST_Z if largest is None else float(min(largest, Fraction(LAST_Z)))
             self._edges, self._steps = self._panels()
             self._sums = np.concatenate([np.zeros((self._agents.size, 1)), np.cumsum(self._steps, axis=1)], axis=1)
@@ -220,7 +220,7 @@ class ReachingProblem:
 
     def sigma(self, z: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
-        values = np.zeros((self.z.size, z.size))
+        values, sigma0 = np.zeros((self.z.size, z.size)), self._sign * self._unit
         if not self._agents.size:
             return values
         for row, agent in enumerate(self._agents.tolist()):
@@ -229,32 +229,33 @@ class ReachingProblem:
             panel = np.clip(np.searchsorted(self._edges, z[near], side="right") - 1, 0, self._steps.shape[1] - 1)
             start = self._edges[panel]
             spent = self._sums[row, panel] + self._integrals(start, z[near], [row])[0]
-            left = np.maximum(self._size[agent] - spent, 0) * self._decay(z[near])
-            values[agent, near] = self._sign[agent] * self._unit * left
+            left = np.maximum(1 - spent, 0) * self._decay(z[near])
+            values[agent, near] = sigma0[agent] * left
             far = before[z[before] > self._end]
-            values[agent, far] = self._sign[agent] * self._unit * self._tail(row, z[far])
+            values[agent, far] = sigma0[agent] * self._tail(row, z[far])
         return values
 
     def _decay(self, z: np.ndarray) -> np.ndarray:
         return np.exp(-self._protocol.reaching_gain.clock_at_tau(z))
 
     def _push(self, z: np.ndarray, rows: Any) -> np.ndarray:
-        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of the largest start."""
-        if self._worst:
-            return np.full((len(rows), z.size), self._gap) / self._unit
+        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their starts."""
         agents = self._agents[rows]
+        unit = self._unit[agents, None]
+        if self._worst:
+            return np.broadcast_to(self._gap / unit, (len(rows), z.size))
         signs = self._sign[agents]
         t = self._protocol.reaching_gain.time_at_tau(z)
         d = self._disturbance.values(t, agents, signs.astype(int))
-        return (float(self._protocol.mu1) - signs[:, None] * d) / self._unit
+        return (float(self._protocol.mu1) - signs[:, None] * d) / unit
 
     def _integrals(self, a: np.ndarray, b: np.ndarray, rows: Any) -> np.ndarray:
         """Return the (A, P) integrals of ``(mu1 - s d)/psi dt`` over panels of ``z``."""
         half = (b - a) / 2
         z = (a + half)[:, None] + half[:, None] * _NODES
-        weight = np.exp(self._protocol.reaching_gain.clock_at_tau(z) - z) * float(self._protocol.T_r)
-        values = self._push(z.ravel(), rows).reshape(len(rows), *z.shape) * weight
-        return values @ _WEIGHTS * half
+        push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small start
+            return (push * self._weight(z)) @ _WEIGHTS * half
 
     def _panels(self) -> tuple[np.ndarray, np.ndarray]:
         """Return panel edges and the (A, P) integrals over them, refined until halving changes nothing."""
@@ -280,11 +281,12 @@ class ReachingProblem:
             (low, a), (high, b), (before, previous) = (np.split(part, [batch]) for part in (a, b, previous))
             middle = (low + high) / 2
             whole, left, right = (self._integrals(p, q, rows) for p, q in ((low, high), (low, middle), (middle, high)))
-            error = np.abs(whole - left - right).max(axis=0)
-            size = (np.abs(left) + np.abs(right)).max(axis=0)
+            size = np.abs(left) + np.abs(right)
+            with np.errstate(invalid="ignore"):
+                error = np.nan_to_num(np.abs(whole - left - right) / np.where(size > 0, size, 1)).max(axis=0)
             # Halving makes a smooth error vanish; one that only halves is rounding, if it is small, or else a jump.
-            rounding = (error <= 1e-12 * size) & (error > before / 8)
-            fits = (error <= 4e-15 * size) | rounding | (high - low <= 1e-13 * high) | ~np.isfinite(size)
+            rounding = (error <= 1e-12) & (error > before / 8)
+            fits = (error <= 4e-15) | rounding | (high - low <= 1e-13 * high)
             done.append((low[fits], (left + right)[:, fits]))
             split = ~fits
             a = np.concatenate([a, low[split], middle[split]])
@@ -297,17 +299,16 @@ class ReachingProblem:
 
     def _root(self, row: int) -> float:
         """Return where the bracket of one agent vanishes."""
-        size = self._size[self._agents[row]]
-        panel = int(np.searchsorted(self._sums[row, 1:], size))
+        panel = int(np.searchsorted(self._sums[row, 1:], 1.0))
         if panel == self._steps.shape[1]:
             return self._far_root(row)
         start, low, high = self._edges[panel], self._edges[panel], self._edges[panel + 1]
-        rest = size - self._sums[row, panel]
+        rest = 1 - self._sums[row, panel]
         z = low + (high - low) * rest / max(self._steps[row, panel], rest)
         for _ in range(100):
             excess = float(self._integrals(np.array([start]), np.array([z]), [row])[0, 0]) - rest
             low, high = (low, z) if excess > 0 else (z, high)
-            slope = float(self._push(np.array([z]), [row])[0, 0]) * self._weight(z)
+            slope = float(self._push(np.array([z]), [row])[0, 0] * self._weight(z))
             better = z - excess / slope if slope > 0 else math.nan
             if not low <= better <= high:
                 better = (low + high) / 2
@@ -316,16 +317,18 @@ class ReachingProblem:
             z = better
         return float(z)
 
-    def _weight(self, z: float) -> float:
-        return float(np.exp(self._protocol.reaching_gain.clock_at_tau(z) - z)) * float(self._protocol.T_r)
+    def _weight(self, z: np.ndarray | float) -> np.ndarray:
+        """Return ``dt/psi``, per unit of ``z``."""
+        with np.errstate(over="ignore"):
+            return np.exp(self._protocol.reaching_gain.clock_at_tau(z) - z) * float(self._protocol.T_r)
 
     def _far_push(self, row: int) -> float:
         """``(mu1 - s d)/psi dt/dz`` at the last instant that a float tells from ``T_r``."""
-        return float(self._push(np.array([self._end]), [row])[0, 0]) * self._weight(self._end)
+        return float(self._push(np.array([self._end]), [row])[0, 0] * self._weight(self._end))
 
     def _far_root(self, row: int) -> float:
         """Beyond the last panel time stands still, and the bracket is elementary."""
-        rest = self._size[self._agents[row]] - self._sums[row, -1]
+        rest = 1 - self._sums[row, -1]
         growth = float(self._protocol.mu3 * self._protocol.kappa - 1)
         with np.errstate(over="ignore", divide="ignore"):
             share = float(np.divide(rest, self._far_push(row)))
@@ -334,7 +337,7 @@ class ReachingProblem:
         return self._end + math.log1p(growth * share) / growth if growth * share > -1 else math.inf
 
     def _tail(self, row: int, z: np.ndarray) -> np.ndarray:
-        rest = self._size[self._agents[row]] - self._sums[row, -1]
+        rest = 1 - self._sums[row, -1]
         growth, beyond = float(self._protocol.mu3 * self._protocol.kappa - 1), z - self._end
         # psi first: what it multiplies may leave the range of floats.
         with np.errstate(over="ignore", invalid="ignore"):

@@ -339,3 +339,70 @@ def test_campaign_every_row_every_kind(figures: list[tuple[str, str, float, floa
             late = sum(r.z is None for r in cert.reaching)
             figures.append((name, kind, seen.worst_ratio, seen.sliding_ratio or 0.0, late))
     assert count >= 500
+
+
+# ---------------------------------------------------------------------- disturbances that read the states
+
+PATH = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1), ("c", "b", -1)])
+
+
+def path_protocol(**other: Any) -> SlidingModeProtocol:
+    given = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
+    return SlidingModeProtocol(**(given | other))
+
+
+@pytest.mark.parametrize("mu1", ["1.001", "1.1", 2])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_function_that_is_the_adversary_is_not_taken_for_a_violation(mu1: Any, seed: int):
+    """It attains every certified reaching time; the integrator's last digits must not break one."""
+    rng = np.random.default_rng(seed)
+    sigma0 = rng.uniform(-1, 1, 3) * 10.0 ** rng.uniform(-6, 1, 3)
+    x0 = rng.normal(size=3) * 10.0 ** rng.uniform(-2, 3)
+    cert = certify(PATH, path_protocol(mu1=mu1), x0, sigma0=sigma0, disturbance=lambda t, x, sigma: np.sign(sigma))
+    assert cert.comparison is not None and cert.comparison.reaching_kept and not cert.comparison.violated
+    assert cert.reaching is not None
+    certain = [float(r.z) for r in cert.reaching if r.z is not None]
+    np.testing.assert_allclose(sliding_run(cert).reaching_z, certain, rtol=1e-5)
+
+
+def test_two_agents_that_arrive_together_are_found_under_a_function_too():
+    x0, sigma0 = [5, 2, -4], [0.006, 0.006, 0.01]
+    run, own = (
+        simulate(PATH, path_protocol(), x0, sigma0=sigma0, disturbance=d)
+        for d in (lambda t, x, sigma: np.sign(sigma), "adversary")
+    )
+    assert isinstance(run, SlidingTrajectory) and isinstance(own, SlidingTrajectory)
+    np.testing.assert_allclose(run.reaching_z, own.reaching_z, rtol=1e-8)
+    assert own.reaching_z[0] == own.reaching_z[1]
+
+
+def test_a_trial_beyond_a_root_shows_the_function_no_sign_that_never_occurs():
+    """While sigma_k > 0 the disturbance is within delta; what it would be for sigma_k < 0 does not matter."""
+    run = simulate(
+        PATH, path_protocol(), [5, 2, -4], sigma0=[1, 2, 3], disturbance=lambda t, x, s: np.where(s >= 0, 0.5, 5.0)
+    )
+    own = simulate(PATH, path_protocol(), [5, 2, -4], sigma0=[1, 2, 3], disturbance=0.5)
+    np.testing.assert_allclose(run.states, own.states, atol=1e-8)
+
+
+def test_what_rounding_allows_beyond_delta_never_reaches_mu1():
+    tight = path_protocol(mu1="1.00000000000001", mu3="0.1")
+    with pytest.raises(ParameterError, match="beyond delta"):
+        simulate(PATH, tight, [5, 2, -4], sigma0=[1e-16, 2, 3], disturbance=1.0000000000005)
+    run = simulate(PATH, tight, [5, 2, -4], sigma0=[1e-16, 2, 3], disturbance="sin(9*t)")
+    assert isinstance(run, SlidingTrajectory) and (run.reaching_z > 0).all()
+
+
+def test_a_fast_signal_does_not_hide_between_the_samples():
+    for text in ("3*sin(pi*2**20*19999*t)", "1.9*abs(sin(pi*2**18*19999*t/1.25))"):
+        with pytest.raises(ParameterError, match="beyond delta"):
+            simulate(PATH, path_protocol(), [5, 2, -4], disturbance=text)
+
+
+@pytest.mark.parametrize("mu1", ["1e-5", "1e-290"])
+def test_starts_of_any_size_keep_their_bounds(mu1: str):
+    protocol = path_protocol(mu1=mu1, delta=0, mu3="0.5")
+    with np.errstate(all="raise", under="ignore"):
+        cert = certify(PATH, protocol, [5, 2, -4], sigma0=["1e300", 1, 2])
+    assert cert.comparison is not None and not cert.comparison.violated
+    assert math.isfinite(cert.comparison.worst_ratio)
