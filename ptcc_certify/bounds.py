@@ -121,7 +121,8 @@ class Comparison:
     deadline_resolved : bool
         Whether the run settled, so that samples from the deadline on were judged too.
     sliding_ratio : float or None
-        Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound`` with ``f = floor * tolerance * |sigma(0)|``.
+        Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound``, with the bound of each agent and with that of
+        Proposition 1 for the norm; ``f`` is the integrator's floor of the largest ``|sigma_k(0)|``.
     reaching_kept : bool or None
         Sliding mode: whether every sliding variable was 0 at its certified reaching time.
     """

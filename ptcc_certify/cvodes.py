@@ -56,6 +56,12 @@ class _Motion:
         if graph.n_nodes > _DIRECT_UP_TO:
             self._options |= {"newton_scheme": "gmres", "use_preconditioner": False}
 
+    def imbalance(self, states: np.ndarray) -> float:
+        """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
+        heard = self.in_weight > 0
+        pull = np.abs(self.laplacian @ states)[heard] / (2 * self.in_weight[heard, None])
+        return float(pull.max(initial=0.0))
+
     def _call(self, integrator: Any, state: np.ndarray, parameters: list[float], stiffness: float) -> np.ndarray:
         """Return the (entries, instants) states that an integrator reaches."""
         if not stiffness <= _MAX_STIFFNESS:
@@ -115,15 +121,9 @@ class NominalMotion(_Motion):
                     raise
                 return residual
             tau += span
-            residual = max(float(np.abs(self.state - previous).max()), self._imbalance())
+            residual = max(float(np.abs(self.state - previous).max()), self.imbalance(self.state))
             if residual <= goal or b * tau * largest > _MAX_CLOCK or tau > _MAX_TAU:
                 return residual
-
-    def _imbalance(self) -> float:
-        """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
-        heard = self.in_weight > 0
-        pull = np.abs(self.laplacian @ self.state)[heard] / (2 * self.in_weight[heard, None])
-        return float(pull.max(initial=0.0))
 
     def _integrator(self, z: np.ndarray) -> Any:
         import casadi as ca

@@ -14,6 +14,7 @@ where ``b_k`` bounds ``|sigma_k|`` whatever the disturbance. The coordinates of 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -110,7 +111,7 @@ class SlidingEnvelope(Envelope):
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
         """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``."""
-        size = float(np.linalg.norm([float(x) for x in self.sigma0]))
+        size = math.hypot(*(float(x) for x in self.sigma0))
         return size * np.exp(-self.protocol.reaching_gain.clock_at_tau(z))
 
     def compare(self, trajectory: Trajectory) -> Comparison:
@@ -141,6 +142,8 @@ class SlidingEnvelope(Envelope):
         excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(excess > 0, excess / bound, 0.0)
+            norm = np.linalg.norm(excess / (size or 1.0), axis=0)
+            ratio = np.append(ratio, np.where(norm > 0, norm / (self.sliding_norm(z) / size), 0.0))
         return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
 
     def histories(self, member: Member, trajectory: Trajectory) -> list[History]:

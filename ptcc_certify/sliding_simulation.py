@@ -266,8 +266,7 @@ class _Solver:
         residual = None
         for phase, here, clock, end in clocks:
             if phase is past and after.any():
-                x = motion.state[:n] + motion.state[n:]
-                residual = float(np.abs(self.graph.laplacian() @ x).max()) / float(2 * self.graph.in_weight().max())
+                residual = motion.imbalance((motion.state[:n] + motion.state[n:])[:, None])
             if (t >= phase.start).any():
                 z = np.where(here, clock, np.nan)
                 self._stretch(motion, phase, z, [0.0, end], lambda _: np.ones(n), out)

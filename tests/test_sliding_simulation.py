@@ -650,3 +650,10 @@ def test_the_nominal_protocol_has_no_sliding_variables(name, value):
     with pytest.raises(ParameterError, match=f"{name} belongs to the sliding-mode protocol") as caught:
         simulate(six(), protocol().nominal, X0, **{name: value})
     assert "\n" not in str(caught.value)
+
+
+def test_the_boundary_layer_serves_an_agent_that_listens_to_nobody():
+    lone = SignedDigraph.from_edges([], ["a"])
+    run = simulate(lone, protocol(), [5], sigma0=[1], boundary_layer=1e-3, disturbance="sin(9*t)")
+    assert run.deadline_residual == 0
+    assert run.final_state[0] == pytest.approx(4, abs=2e-3)
