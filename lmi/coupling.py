@@ -13,12 +13,14 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from lmi.errors import MatrixError
+from lmi.certificate import scaled
+from lmi.errors import MatrixError, NoCertificate
 
 
 def smallest_eigenvalue(S: np.ndarray) -> float:
@@ -195,3 +197,96 @@ def golden_section(function: Any, low: float, high: float, tolerance: float = 1e
             if value > f_best:
                 best, f_best = point, value
     return best
+
+
+def couple_blocks(
+    A: np.ndarray, parts: Sequence[np.ndarray], log_omega: np.ndarray, rate: float, basis: np.ndarray | None = None
+) -> np.ndarray:
+    """Scale the diagonal Lyapunov matrices of irreducible blocks so that the composite decays at ``rate``.
+
+    In the scaled rows ``B = Omega^1/2 A Omega^-1/2`` the composite decays at ``b`` iff ``M = B + B' - b I > 0``, and a
+    factor ``rho`` on the driven rows multiplies the coupling block ``C`` by ``rho^1/2``: ``M > 0`` iff
+    ``rho < 1 / ||M_F^-1/2 C M_L^-1/2||^2`` (Lemma 5). Blocks of the same depth are joined to those that drive them with
+    half of that factor. Only logarithms are kept, so that long chains do not overflow.
+
+    Parameters
+    ----------
+    A : (n, n) array
+    parts : sequence of int arrays
+        Irreducible blocks, those that drive first (:func:`lmi.irreducible_blocks`).
+    log_omega : (n,) array
+        Logarithms of the blocks' own diagonals.
+    rate : float
+        Below the rate of every block.
+    basis : (n, r) array, optional
+        Of an invariant subspace, block by block, to which the inequality is restricted.
+
+    Returns
+    -------
+    (n,) array
+        Logarithms, the largest 0.
+
+    Raises
+    ------
+    NoCertificate
+        Some block does not decay at that rate.
+
+    Examples
+    --------
+    >>> A = np.array([[1.0, 0.0], [-4.0, 1.0]])
+    >>> log_omega = couple_blocks(A, [np.array([0]), np.array([1])], np.zeros(2), 1.0)
+    >>> S = np.exp(log_omega)[:, None] * A
+    >>> bool((np.linalg.eigvalsh(S + S.T - np.diag(np.exp(log_omega))) > 0).all())
+    True
+    """
+    from scipy.linalg import solve_triangular
+
+    log_omega, n = np.array(log_omega, dtype=float), len(A)
+    depth = np.zeros(n, dtype=int)
+    for part in parts:
+        drives = np.abs(A[part]).sum(axis=0) > 0
+        drives[part] = False
+        depth[part] = depth[drives].max(initial=-1) + 1
+    above, used = np.zeros(0, dtype=int), 0
+    frame = np.zeros((n, n if basis is None else basis.shape[1]))  # orthonormal, in scaled rows
+    factor = np.zeros((frame.shape[1], frame.shape[1]))
+    try:
+        for level in range(int(depth.max(initial=0)) + 1):
+            own = np.flatnonzero(depth == level)
+            rows, columns = np.nonzero(A[np.ix_(own, above)])
+            if rows.size:  # into reach of the rows that drive, where no entry overflows
+                log_omega[own] += float((log_omega[above[columns]] - log_omega[own[rows]]).min())
+            Q = _frame(own, log_omega, basis)
+            B = scaled(A[np.ix_(own, own)], log_omega[own])
+            M = Q.T @ (B + B.T) @ Q - rate * np.eye(Q.shape[1])
+            reach = _scaled_block(A, own, above, log_omega) @ frame[above, :used]
+            lower = solve_triangular(factor[:used, :used], (Q.T @ reach).T, lower=True).T if used else Q.T @ reach
+            top = float(np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), lower), 2)) if lower.size else 0.0
+            share = -2 * math.log(top) - math.log(2) if top > 0 else 0.0
+            log_omega[own] += share
+            lower *= math.exp(share / 2)
+            end = used + Q.shape[1]
+            factor[used:end, :used] = lower
+            factor[used:end, used:end] = np.linalg.cholesky(M - lower @ lower.T)
+            frame[own, used:end] = Q
+            above, used = np.concatenate([above, own]), end
+    except (np.linalg.LinAlgError, ValueError):
+        raise NoCertificate(f"some block does not decay at the rate {rate:.6g} in floating point") from None
+    return log_omega - log_omega.max()
+
+
+def _frame(own: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> np.ndarray:
+    """Return an orthonormal basis of the subspace, in the scaled rows of one level."""
+    if basis is None:
+        return np.eye(len(own))
+    rows = basis[own]
+    rows = rows[:, np.abs(rows).max(axis=0, initial=0.0) > 0]
+    return np.linalg.qr(np.exp((log_omega[own] - log_omega[own].max()) / 2)[:, None] * rows)[0]
+
+
+def _scaled_block(A: np.ndarray, own: np.ndarray, above: np.ndarray, log_omega: np.ndarray) -> np.ndarray:
+    """Return the rows ``own`` and columns ``above`` of ``Omega^1/2 A Omega^-1/2``."""
+    block = A[np.ix_(own, above)]
+    rows, columns = np.nonzero(block)
+    block[rows, columns] *= np.exp((log_omega[own[rows]] - log_omega[above[columns]]) / 2)
+    return block

@@ -6,16 +6,21 @@ certificate is proved elsewhere (:mod:`lmi.exact`).
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.closed_form import h_matrix_diagonal
-from lmi.errors import MatrixError, NoCertificate
-from lmi.matrices import square
+from lmi.certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
+from lmi.closed_form import h_matrix_diagonal, perron_certificate
+from lmi.coupling import couple_blocks
+from lmi.errors import LMIError, MatrixError, NoCertificate
+from lmi.exact import no_diagonal_rate_above, round_to_bits
+from lmi.matrices import irreducible_blocks, square
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -23,73 +28,64 @@ if TYPE_CHECKING:
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
+#: Share of the smallest block rate that is given up when blocks are coupled.
+COUPLING_LOSS = 1e-6
 
 
-@dataclass(frozen=True)
-class DiagonalCertificate:
-    """A diagonal Lyapunov matrix ``Omega = diag(omega)`` of ``A``, scaled to ``max omega = 1``.
+def diagonal_lyapunov(
+    A: Any,
+    *,
+    objective: str = "margin",
+    max_condition: float | None = None,
+    basis: Any = None,
+    tolerance: float = 1e-9,
+) -> DiagonalCertificate:
+    """Find the diagonal ``Omega > 0`` of the best margin or of the best rate.
 
-    Attributes
-    ----------
-    omega : (n,) array
-        Positive.
-    margin : float
-        ``lmin(Omega A + A' Omega)``, from eigenvalues of the returned matrix.
-    rate : float
-        ``margin / max(omega)``: ``V = x' Omega x`` obeys ``V' <= -rate V`` along ``x' = -A x``.
-    condition : float
-        ``max(omega) / min(omega)``.
-    """
-
-    omega: np.ndarray
-    margin: float
-    rate: float
-    condition: float
-
-
-def diagonal_margin(A: Any, omega: np.ndarray) -> float:
-    """Return ``lmin(Omega A + A' Omega)`` with ``Omega = diag(omega)``.
-
-    Examples
-    --------
-    >>> diagonal_margin([[1.0, 0.0], [0.0, 2.0]], [1.0, 1.0])
-    2.0
-    """
-    S = np.asarray(omega)[:, None] * square(A)
-    return float(np.linalg.eigvalsh(S + S.T)[0])
-
-
-def diagonal_lyapunov(A: Any, *, objective: str = "margin", tolerance: float = 1e-9) -> DiagonalCertificate:
-    """Find the diagonal ``Omega > 0`` that decays fastest in the sense of the quotient ``lmin / lmax``.
-
-    Solves
+    ``objective="margin"``, the paper's quotient: solves
 
         maximise t   subject to   Omega A + A' Omega >= t I,   0 <= Omega <= I,
 
-    whose optimum is the largest ``lmin(Omega A + A' Omega) / lmax(Omega)``. Such an ``Omega`` exists for every
-    nonsingular H-matrix with positive diagonal (Lemma 4) and for the Laplacian of every strongly connected
-    structurally unbalanced signed digraph (Lemma 3.2), but the function takes any real square matrix.
+    whose optimum is the largest ``lmin(Omega A + A' Omega) / lmax(Omega)``. ``objective="rate"`` maximises
+
+        beta(Omega) = max { b : Omega A + A' Omega >= b Omega },
+
+    which is what ``V = x' Omega x`` really decays by; quasiconcave, so with ``b`` from the last ``Omega_0`` the program
+    ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0`` climbs superlinearly. The optimum over a reducible matrix
+    is the smallest of its irreducible blocks, reached in the limit of large condition: blocks are searched by
+    themselves and coupled at a loss of 1e-6.
+
+    A diagonal Lyapunov matrix exists for every nonsingular H-matrix with positive diagonal (Lemma 4) and for the
+    Laplacian of every strongly connected structurally unbalanced signed digraph (Lemma 3.2), but the function takes
+    any real square matrix.
 
     Parameters
     ----------
     A : (n, n) array or sparse matrix
         Any real matrix; a diagonal Lyapunov matrix exists only if all its eigenvalues have positive real part (not
         a sufficient condition).
-    objective : {"margin"}
+    objective : {"margin", "rate"}
         What to maximise.
+    max_condition : float, optional
+        Largest ``max(omega) / min(omega)``, at least 1.
+    basis : (n, r) array, optional
+        Rate only: of an invariant subspace of ``A``, block by block; the inequality is asked for there only.
     tolerance : float
         Relative gap asked of the solver.
 
     Returns
     -------
     DiagonalCertificate
+        Best rate: with ``upper``, an upper bound of all diagonal rates from a dual solution, and its ``witness``
+        (without ``max_condition``).
 
     Raises
     ------
     MatrixError
-        ``A`` is not square, not finite, or ``objective`` is unknown.
+        ``A`` is not square, not finite, or an option is outside its domain.
     NoCertificate
-        The margin of what the solver returned is not positive: no diagonal Lyapunov matrix exists, or precision ends.
+        Margin or rate of what the solver returned is not positive: no diagonal Lyapunov matrix exists
+        (:func:`refute_diagonal_lyapunov` may show it), or precision ends.
 
     References
     ----------
@@ -100,24 +96,357 @@ def diagonal_lyapunov(A: Any, *, objective: str = "margin", tolerance: float = 1
     >>> found = diagonal_lyapunov([[2.0, -1.0], [-1.0, 2.0]])
     >>> round(found.rate, 6), found.omega.round(6)
     (2.0, array([1., 1.]))
+    >>> fast = diagonal_lyapunov([[1.0, 2.0], [-1.0, 3.0]], objective="rate")
+    >>> slow = diagonal_lyapunov([[1.0, 2.0], [-1.0, 3.0]])
+    >>> round(fast.rate, 4), round(slow.rate, 4), fast.gap < 1e-4
+    (2.0, 1.7792, True)
     """
-    if objective != "margin":
-        raise MatrixError(f'objective "{objective}" is unknown; use "margin"')
     A = square(A)
     n = len(A)
+    if objective not in ("margin", "rate"):
+        raise MatrixError(f'objective "{objective}" is unknown; use "margin" or "rate"')
+    if max_condition is not None and not max_condition >= 1:
+        raise MatrixError(f"max_condition = {max_condition} is below 1")
     if n == 0:
         raise MatrixError("A has no rows")
+    if objective == "rate":
+        return _rate_optimum(A, max_condition, _basis(basis, n), tolerance)
+    if basis is not None:
+        raise MatrixError('basis belongs to objective="rate"')
     if n == 1:
-        return _certificate(A, np.ones(1))
-    scale = _scale(A)
+        return _margin_certificate(A, np.ones(1))
+    scale, least = _scale(A), 0.0 if max_condition is None else 1 / max_condition
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
         omega, t = cp.Variable(n), cp.Variable()
         S = _symmetric_product(cp, omega, A / scale)
-        return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= 0, omega <= 1]), omega
+        return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= least, omega <= 1]), omega
 
-    omega = _solve(problem, tolerance)
-    return _certificate(A, omega)
+    omega = _positive(_solve(problem, tolerance))
+    return _margin_certificate(A, np.maximum(omega, least * omega.max()))
+
+
+# ---------------------------------------------------------------------- best rate
+
+
+def _rate_optimum(
+    A: np.ndarray, max_condition: float | None, basis: np.ndarray | None, tolerance: float
+) -> DiagonalCertificate:
+    """Search block by block where the matrix is reducible, otherwise at once."""
+    if max_condition is not None:
+        _, found = _climb(A, max_condition, basis, tolerance)
+        if not found.rate > 0:
+            raise NoCertificate(f"the best rate found at condition {max_condition:.3g} is {found.rate:.3g}")
+        return found
+    parts = irreducible_blocks(A)
+    bases = [None if basis is None else _restricted(basis, part) for part in parts]
+    blocks = [
+        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance))
+        for part, b in zip(parts, bases, strict=True)
+        if b is None or b.shape[1]
+    ]
+    worst = min(blocks, key=lambda block: block[2].rate)
+    if not worst[2].rate > 0:
+        raise NoCertificate(f"the best rate found is {worst[2].rate:.3g}, which is not positive")
+    limit = min(blocks, key=lambda block: block[2].upper)
+    witness = None
+    if limit[2].witness is not None:
+        witness = (np.zeros((len(A), limit[2].witness[0].shape[1])),)
+        witness[0][limit[0]] = limit[2].witness[0]
+    if len(parts) == 1:
+        return worst[2]
+    log_omega = np.zeros(len(A))
+    for part, _, found in blocks:
+        log_omega[part] = found.log_omega
+    coupled = couple_blocks(A, parts, log_omega, worst[2].rate * (1 - COUPLING_LOSS), basis)
+    return DiagonalCertificate(coupled, diagonal_rate(A, coupled, basis), limit[2].upper, witness)
+
+
+def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> DiagonalCertificate:
+    """Return the optimum of an irreducible block with a dual bound on all diagonal rates."""
+    if len(A) == 1:
+        rate = 2 * float(A[0, 0])
+        return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
+    frame, found = _climb(A, None, basis, tolerance)
+    if not found.rate > 0:
+        return found
+    for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
+        for log_omega in (frame, found.log_omega):
+            Y = _dual_factor(A, log_omega, found.rate * (1 + excess), basis, tolerance)
+            if Y is not None and (upper := diagonal_rate_limit(A, Y)) < found.upper:
+                found = replace(found, upper=max(upper, found.rate), witness=(Y,))
+            if found.gap <= 1.5 * excess:
+                return found
+    return found
+
+
+def _climb(
+    A: np.ndarray, max_condition: float | None, basis: np.ndarray | None, tolerance: float, steps: int = 12
+) -> tuple[np.ndarray, DiagonalCertificate]:
+    """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative."""
+    frame, best = _start(A, basis, max_condition)
+    current = frame
+    for _ in range(steps):
+        try:
+            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance)
+            proposal = normalised(_positive(omega)) + frame
+        except NoCertificate:
+            break
+        proposal = proposal - proposal.max()
+        if max_condition is not None:
+            proposal = np.maximum(proposal, -math.log(max_condition))
+        rate = _rate_or_none(A, proposal, basis)
+        if rate is None or not rate > best:
+            break
+        gained, current, best = rate - best, proposal, rate
+        if gained <= 1e-7 * abs(best):
+            break
+    return frame, DiagonalCertificate(current, best)
+
+
+def _start(A: np.ndarray, basis: np.ndarray | None, max_condition: float | None) -> tuple[np.ndarray, float]:
+    """Return the better of the identity, a balanced scaling and the Perron vectors of ``M(A)``, with its rate."""
+    from scipy.linalg import matrix_balance
+
+    candidates = [np.zeros(len(A))]
+    with np.errstate(all="ignore"):
+        scale = matrix_balance(A, permute=False, separate=True)[1][0]
+        candidates.append(-2 * np.log(scale))
+    with contextlib.suppress(LMIError, np.linalg.LinAlgError):
+        candidates.append(perron_certificate(A).log_omega)
+    rated = []
+    for log_omega in candidates:
+        if not np.isfinite(log_omega).all():
+            continue
+        fitted = log_omega - log_omega.max()
+        if max_condition is not None:
+            fitted = np.maximum(fitted, -math.log(max_condition))
+        rate = _rate_or_none(A, fitted, basis)
+        if rate is not None:
+            rated.append((fitted, rate))
+    if not rated:
+        raise NoCertificate("the entries lie too far apart for floating point")
+    return max(rated, key=lambda pair: pair[1])
+
+
+def _step(
+    A: np.ndarray,
+    frame: np.ndarray,
+    current: np.ndarray,
+    b: float,
+    basis: np.ndarray | None,
+    max_condition: float | None,
+    tolerance: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0``, ``Omega_0`` the current matrix.
+
+    Rows and columns are scaled by the frame to the power -1/2, then to unit diagonal, where weights of many decades
+    meet. Returns ``Omega`` relative to the frame and a factor of the dual matrix in rows scaled by the frame.
+    """
+    n = len(A)
+    B = scaled(A, frame)
+    diagonal = np.diag(B)
+    unit = 1 / np.sqrt(diagonal if (diagonal > 0).all() else np.full(n, _scale(B)))
+    S = unit[:, None] * B * unit
+    square_unit = unit * unit
+    weight = square_unit * np.exp(current - frame - (current - frame).max())
+    weight /= weight.max()
+    tail = None
+    if basis is not None:
+        tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * basis)[0]
+
+    def problem(cp: Any) -> tuple[cp.Problem, cp.Expression]:
+        omega, t = cp.Variable(n), cp.Variable()
+        form = _symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
+        if tail is not None:
+            form = tail.T @ form @ tail
+            form = (form + form.T) / 2
+        constraints = [form >> 0, cp.sum(omega) == n, omega >= 0]
+        if max_condition is not None:
+            low = cp.Variable()
+            relative = np.exp(frame)
+            constraints += [cp.multiply(relative, omega) >= low, cp.multiply(relative, omega) <= max_condition * low]
+        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([omega, t])
+
+    solution = _solve(problem, tolerance, dual=True)
+    assert isinstance(solution, tuple)
+    # The dual is factored before it is scaled: afterwards its small rows would be lost.
+    values, vectors = np.linalg.eigh((solution[1] + solution[1].T) / 2)
+    factor = vectors * np.sqrt(np.maximum(values, 0.0))
+    return solution[0][:n], unit[:, None] * (factor if tail is None else tail @ factor)
+
+
+def _dual_factor(
+    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float
+) -> np.ndarray | None:
+    """Return ``Y`` such that ``X = Y Y'`` should show that no diagonal rate exceeds ``b``; in the original rows."""
+    try:
+        _, factor = _step(A, frame, frame, b, basis, None, tolerance)
+    except NoCertificate:
+        return None
+    Y = np.exp(-frame / 2)[:, None] * factor
+    top = np.abs(Y).max(initial=0.0)
+    return Y / top if top > 0 and math.isfinite(top) else None
+
+
+def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
+    """Return the least ``b`` with ``diag(A X) <= (b/2) diag(X)``, ``X = Y Y'``: no diagonal rate exceeds it.
+
+    If ``Omega A + A' Omega >= b' Omega`` then ``2 sum_i omega_i (A X)_ii >= b' sum_i omega_i X_ii``.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+    Y : (n, k) array
+        Not zero.
+
+    Returns
+    -------
+    float
+        In floating point; :func:`lmi.no_diagonal_rate_above` decides in rationals. Infinite if the rows where ``X`` is
+        zero forbid any bound.
+
+    References
+    ----------
+    Barker, Berman, Plemmons, Positive diagonal solutions to the Lyapunov equations, Linear Multilinear Algebra 5
+    (1978).
+
+    Examples
+    --------
+    >>> diagonal_rate_limit([[1.0, -1.0], [-1.0, 1.0]], [[1.0], [1.0]])
+    0.0
+    """
+    A, Y = square(A), np.asarray(Y, dtype=float)
+    moved, size = 2 * np.einsum("ij,ij->i", A @ Y, Y), np.einsum("ij,ij->i", Y, Y)
+    if (moved[size == 0] > 0).any() or not size.any():
+        return math.inf
+    return float((moved[size > 0] / size[size > 0]).max())
+
+
+def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e-9) -> list[list[Fraction]] | None:
+    """Search a proof that no diagonal matrix decays faster than ``rate``; 0: that there is no diagonal solution at all.
+
+    A nonzero ``X = Y Y'`` with ``diag(A X) <= (rate/2) diag(X)`` is that proof; the rounded ``Y`` is checked in
+    rationals before it is returned.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+        Read as the dyadic rationals that its floats are.
+    rate : float
+
+    Returns
+    -------
+    n rows of k Fractions, or None
+        ``Y``; None if no proof was found, as for every matrix that has a faster diagonal solution.
+
+    References
+    ----------
+    Barker, Berman, Plemmons, Positive diagonal solutions to the Lyapunov equations, Linear Multilinear Algebra 5
+    (1978).
+
+    Examples
+    --------
+    >>> refute_diagonal_lyapunov([[1.0, 3.0], [3.0, 1.0]]) is not None
+    True
+    >>> refute_diagonal_lyapunov([[1.0, 3.0], [-3.0, 1.0]]) is None
+    True
+    """
+    A = square(A)
+    exact = [[Fraction(float(x)) for x in row] for row in A]
+    if (low := np.flatnonzero(2 * np.diag(A) <= rate)).size:
+        return [[Fraction(int(i == low[0]))] for i in range(len(A))]
+    try:
+        log_omega, _ = _start(A, None, None)
+    except NoCertificate:
+        return None
+    for flat in (np.zeros(len(A)), log_omega):
+        Y = _dual_factor(A, flat, rate, None, tolerance)
+        if Y is None:
+            continue
+        # Columns by size: small ones carry the solver's noise, and the sum often passes without them.
+        order = np.argsort(-np.einsum("ij,ij->j", Y, Y))
+        for count in sorted({len(order), 1, 2}):
+            rows = [[round_to_bits(float(x), 40) for x in row] for row in Y[:, order[:count]]]
+            if no_diagonal_rate_above(exact, rows, Fraction(rate)):
+                return rows
+    return None
+
+
+def rate_frontier(
+    A: Any, *, conditions: Sequence[float] | None = None, basis: Any = None, tolerance: float = 1e-9
+) -> tuple[DiagonalCertificate, ...]:
+    """Return rate against prefactor: diagonal matrices, each the fastest at its condition number.
+
+    At clock value ``s`` a member bounds ``||x||^2`` by ``condition * exp(-rate s) ||x(0)||^2``; early the small
+    conditions are best, late the large rates, and the pointwise minimum of a few members is much better than either.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+    conditions : sequence of float, optional
+        By default 1 and six values up to the condition of the best rate, but at most 1e8.
+    basis : (n, r) array, optional
+        See :func:`diagonal_lyapunov`.
+
+    Returns
+    -------
+    tuple of DiagonalCertificate
+        Condition and rate strictly increasing. The rate of the first, the identity, may be negative.
+
+    Raises
+    ------
+    NoCertificate
+        No positive rate was found at any condition.
+
+    Examples
+    --------
+    >>> [(round(c.condition, 2), round(c.rate, 3)) for c in rate_frontier([[1.0, 2.0], [-1.0, 3.0]], conditions=[1, 2])]
+    [(1.0, 1.764), (2.0, 2.0)]
+    """
+    A = square(A)
+    basis = _basis(basis, len(A))
+    points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), basis))]
+    if conditions is None:
+        best = _rate_optimum(A, None, basis, tolerance)
+        top = min(best.log_condition, math.log(1e8))
+        conditions = [math.exp(top * share) for share in (0.1, 0.2, 0.35, 0.5, 0.7, 0.9)]
+        points.append(best)
+    for condition in conditions:
+        if condition > 1:
+            with contextlib.suppress(NoCertificate):
+                points.append(_climb(A, condition, basis, tolerance, steps=6)[1])
+    points.sort(key=lambda point: (point.log_condition, -point.rate))
+    frontier: list[DiagonalCertificate] = []
+    for point in points:
+        if not frontier or point.rate > frontier[-1].rate:
+            frontier.append(point)
+    if not frontier[-1].rate > 0:
+        raise NoCertificate(f"the best rate found is {frontier[-1].rate:.3g}, which is not positive")
+    return tuple(frontier)
+
+
+def _basis(basis: Any, n: int) -> np.ndarray | None:
+    if basis is None:
+        return None
+    basis = np.asarray(basis, dtype=float)
+    if basis.ndim != 2 or len(basis) != n or not np.isfinite(basis).all():
+        raise MatrixError(f"basis is not a finite matrix of {n} rows")
+    return basis
+
+
+def _restricted(basis: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Return the columns of the basis that live on one block."""
+    rows = basis[part]
+    return rows[:, np.abs(rows).max(axis=0) > 0]
+
+
+def _rate_or_none(A: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> float | None:
+    try:
+        rate = diagonal_rate(A, log_omega, basis)
+    except (NoCertificate, np.linalg.LinAlgError):
+        return None
+    return rate if math.isfinite(rate) else None
 
 
 def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate:
@@ -149,7 +478,7 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
         return diagonal_lyapunov(A, tolerance=tolerance)
     except NoCertificate:
         # The best margin can lie below what the solver resolves; the closed form exists all the same.
-        return _certificate(A, closed_form)
+        return _margin_certificate(A, closed_form)
 
 
 @dataclass(frozen=True)
@@ -294,13 +623,12 @@ def _block_by_block(
     return CoupledCertificate(found, followers)
 
 
-def _certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
-    omega = _positive(omega)
-    omega = omega / omega.max()
-    margin = diagonal_margin(A, omega)
+def _margin_certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
+    log_omega = normalised(_positive(omega))
+    margin = diagonal_margin(A, np.exp(log_omega))
     if not margin > 0:
         raise NoCertificate(f"the best margin found is {margin:.3g}, which is not positive")
-    return DiagonalCertificate(omega, margin, margin, float(1 / omega.min()))
+    return DiagonalCertificate(log_omega, margin)
 
 
 def _positive(omega: np.ndarray) -> np.ndarray:
@@ -324,8 +652,11 @@ def _symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
     return product + product.T
 
 
-def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance: float) -> np.ndarray:
-    """Solve with Clarabel and return the value of the expression; its status is not trusted, only its absence."""
+def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance: float, dual: bool = False) -> Any:
+    """Solve with Clarabel and return the value of the expression; its status is not trusted, only its absence.
+
+    With ``dual`` the dual matrix of the first constraint comes with it.
+    """
     import warnings
 
     import cvxpy as cp
@@ -340,4 +671,10 @@ def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance
             raise NoCertificate(f"the solver failed: {str(error).splitlines()[0]}") from None
     if expression.value is None or not np.isfinite(expression.value).all():
         raise NoCertificate(f"the solver answered {built.status}")
-    return np.atleast_1d(np.asarray(expression.value, dtype=np.float64))
+    value = np.atleast_1d(np.asarray(expression.value, dtype=np.float64))
+    if not dual:
+        return value
+    matrix = built.constraints[0].dual_value
+    if matrix is None or not np.isfinite(matrix).all():
+        raise NoCertificate("the solver returned no dual solution")
+    return value, np.atleast_2d(matrix)

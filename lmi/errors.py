@@ -15,3 +15,7 @@ class NoCertificate(LMIError, RuntimeError):
 
 class NotAnHMatrix(LMIError, ValueError):
     """A matrix is not a nonsingular H-matrix with positive diagonal; the message says what fails."""
+
+
+class NotAnMMatrix(LMIError, ValueError):
+    """A matrix is not a nonsingular M-matrix, or a witness does not show it; the message names what fails."""

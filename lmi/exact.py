@@ -191,24 +191,26 @@ def prove_margin(S: Rows, guess: float) -> Fraction | None:
     >>> m < 2, float(m) > 2 - 1e-9
     (True, True)
     """
+    if not guess > 0:
+        return None
     identity = [[Fraction(int(i == j)) for j in range(len(S))] for i in range(len(S))]
     return prove_generalized_margin(S, identity, guess)
 
 
 def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
-    """Find a rational ``b > 0``, as near to ``guess`` as proves, with ``S - b Z`` positive definite.
+    """Find a rational ``b``, as near to ``guess`` as proves, with ``S - b Z`` positive definite.
 
     Parameters
     ----------
     S, Z : n rows of n Fractions
         Symmetric.
     guess : float
-        What floating point takes for the largest such ``b``.
+        What floating point takes for the largest such ``b``; not 0.
 
     Returns
     -------
     Fraction or None
-        None if none was found above ``guess / 2``.
+        Of the sign of ``guess``; None if none was found above ``guess - |guess| / 2``.
 
     Examples
     --------
@@ -216,14 +218,14 @@ def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
     >>> b < 3, float(b) > 3 - 1e-9
     (True, True)
     """
-    if not (math.isfinite(guess) and guess > 0):
+    if not math.isfinite(guess) or guess == 0:
         return None
     n = len(S)
 
     def lowered(b: Fraction) -> list[list[Fraction]]:
         return [[S[i][j] - b * Z[i][j] for j in range(n)] for i in range(n)]
 
-    candidates = [b for loss in LOSSES if (b := Fraction(guess * (1 - loss))) > 0]
+    candidates = [b for loss in LOSSES if (b := Fraction(guess - abs(guess) * loss)) * Fraction(guess) > 0]
     if n > RESIDUAL_ROWS:
         # Elimination takes seconds to minutes here: it comes last, after all that the residual test can give.
         quick = candidates if n > ELIMINATION_ROWS else candidates[:4]
@@ -249,3 +251,54 @@ def round_to_bits(value: float, bits: int) -> Fraction:
         return Fraction(0)
     mantissa, exponent = math.frexp(value)
     return Fraction(round(math.ldexp(mantissa, bits))) * Fraction(2) ** (exponent - bits)
+
+
+def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
+    """Check in rationals that ``Y`` proves: no diagonal ``Omega > 0`` decays faster than ``rate``.
+
+    That is, ``Omega A + A' Omega >= b Omega`` needs ``b <= rate``.
+
+    ``X = Y Y'`` is positive semidefinite; if it is not zero and ``diag(A X) <= (rate/2) diag(X)``, then such an
+    ``Omega`` would give ``b sum_i omega_i X_ii <= 2 sum_i omega_i (A X)_ii <= rate sum_i omega_i X_ii``. With
+    ``rate = 0``: no diagonal Lyapunov matrix exists.
+
+    Parameters
+    ----------
+    A : n rows of n Fractions
+    Y : n rows of k Fractions
+    rate : Fraction
+
+    Returns
+    -------
+    bool
+        False: this ``Y`` proves nothing.
+
+    References
+    ----------
+    Barker, Berman, Plemmons, Positive diagonal solutions to the Lyapunov equations, Linear Multilinear Algebra 5
+    (1978).
+
+    Examples
+    --------
+    >>> no_diagonal_rate_above([[1, -1], [-1, 1]], [[1], [1]], Fraction(0))
+    True
+    >>> no_diagonal_rate_above([[1, -1], [-1, 2]], [[1], [1]], Fraction(0))
+    False
+    """
+    n = len(A)
+    if len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
+        raise MatrixError("A is not square or Y has not as many rows")
+    A, Y = ([[x if type(x) is Fraction else _rational(x) for x in row] for row in M] for M in (A, Y))
+    a, y = _integers(A), _integers(Y)
+    sizes = [sum(x * x for x in row) for row in y[0].tolist()]
+    moved = [
+        sum(x * z for x, z in zip(image, row, strict=True))
+        for image, row in zip((a[0] @ y[0]).tolist(), y[0].tolist(), strict=True)
+    ]
+    return any(sizes) and all(2 * m <= rate * a[1] * size for m, size in zip(moved, sizes, strict=True))
+
+
+def _integers(M: Rows) -> tuple[np.ndarray, int]:
+    """Return a rational matrix as integers over one denominator."""
+    scale = math.lcm(*(x.denominator for row in M for x in row))
+    return np.array([[x.numerator * (scale // x.denominator) for x in row] for row in M], dtype=object), scale

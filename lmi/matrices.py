@@ -135,3 +135,47 @@ def is_h_matrix(A: Any) -> bool:
     True
     """
     return is_m_matrix(comparison_matrix(A))
+
+
+def irreducible_blocks(A: Any) -> list[np.ndarray]:
+    """Return the index sets of the irreducible diagonal blocks, those that drive before those that are driven.
+
+    Row ``i`` is driven by ``j`` where ``a_ij != 0``. With the rows in this order the matrix is block lower triangular.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    list of int arrays
+
+    Examples
+    --------
+    >>> irreducible_blocks([[1, 0, 2], [0, 1, 0], [3, 1, 1]])
+    [array([1]), array([0, 2])]
+    """
+    from scipy import sparse
+    from scipy.sparse.csgraph import connected_components
+
+    pattern = sparse.csr_array(A)
+    count, part = connected_components(pattern, directed=True, connection="strong")
+    edges = pattern.tocoo()
+    driven, drives = part[edges.row], part[edges.col]
+    between = driven != drives
+    waits = sparse.csr_array(
+        (np.ones(int(between.sum())), (drives[between], driven[between])), shape=(count, count)
+    )  # summed: one entry for each pair
+    waits.data[:] = 1
+    missing = np.bincount(waits.indices, minlength=count)
+    order = np.argsort(part, kind="stable")
+    members = np.split(order, np.cumsum(np.bincount(part, minlength=count))[:-1])
+    ready = sorted(np.flatnonzero(missing == 0).tolist(), key=lambda k: int(members[k][0]))
+    blocks: list[np.ndarray] = []
+    for k in ready:  # grows while it is read
+        blocks.append(members[k])
+        for driven_part in waits.indices[waits.indptr[k] : waits.indptr[k + 1]].tolist():
+            missing[driven_part] -= 1
+            if missing[driven_part] == 0:
+                ready.append(driven_part)
+    return blocks

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ptcc_certify.distance import DistanceBound
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain import Gain
+from ptcc_certify.outcomes import influence
+from ptcc_certify.sharpen import SharpMember
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import LyapunovFunction
 
@@ -40,24 +44,40 @@ def float_above(value: Fraction) -> float:
         return math.inf
 
 
-@dataclass(frozen=True)
+def float_below(value: Fraction | float) -> float:
+    """Return a float that is not above ``value``.
+
+    Examples
+    --------
+    >>> float_below(Fraction(1, 3)) <= Fraction(1, 3), float_below(Fraction(-1, 3)) <= Fraction(-1, 3)
+    (True, True)
+    """
+    return math.nextafter(float(value), -math.inf)
+
+
+@dataclass(frozen=True, eq=False)
 class Member:
-    """One bound of an envelope: ``V <= e^(-rate s) V(0)`` for ``V = z' diag(weights) z``.
+    """One bound of an envelope: ``V <= e^(-rate s) V(0)`` for ``V = z' P z``.
 
     Attributes
     ----------
     kind : str
-        Class of the certificate, e.g. ``paper``.
+        Class of the certificate: ``paper``, ``perron``, ``lmi``, ``full``.
     coordinates : {"E", "eps"}
         See :class:`ptcc_certify.theorems.LyapunovFunction`.
     nodes : (n,) int array
-    weights : (n,) array
+    weights : (n,) array or (n, n) array
+        ``P``, its diagonal if it is diagonal.
     gauge : (N,) array or None
         Camps, for the coordinates ``eps``.
     rate : float
         Not above the proved rate.
     prefactor : float
         Not below the proved prefactor; it multiplies the squared norm.
+    lowest : float
+        Not above the smallest eigenvalue of ``P``.
+    distance : DistanceBound or None
+        Constants from ``V`` to the distance of each agent to its outcome.
     """
 
     kind: str
@@ -67,19 +87,48 @@ class Member:
     gauge: np.ndarray | None
     rate: float
     prefactor: float
+    lowest: float
+    distance: DistanceBound | None = None
 
     @classmethod
-    def of(cls, kind: str, structure: Structure, V: LyapunovFunction, rate: float) -> Member:
-        """Build the member of a Lyapunov function with a given rate, rounded to the safe side."""
+    def of(cls, structure: Structure, V: LyapunovFunction, rate: Fraction | float, **more: Any) -> Member:
+        """Build the member of a paper row with a given rate, rounded to the safe side."""
+        weights = np.array([float(w) for w in V.weights])
         return cls(
-            kind,
+            "paper",
             V.coordinates,
             np.array(V.nodes, dtype=np.int64),
-            np.array([float(w) for w in V.weights]),
+            weights,
             structure.gauge,
-            math.nextafter(rate, 0.0),
+            float_below(rate),
             float_above(V.prefactor),
+            math.nextafter(float(weights.min(initial=np.inf)), 0.0),
+            **more,
         )
+
+    @classmethod
+    def of_sharp(cls, member: SharpMember, **more: Any) -> Member:
+        """Build the member of a sharper Lyapunov function, rounded to the safe side."""
+        if member.diagonal is not None:
+            weights = np.array([float(w) for w in member.diagonal])
+        else:
+            weights = np.array([[float(x) for x in row] for row in member.matrix or ()])
+        return cls(
+            member.kind,
+            "E",
+            np.array(member.nodes, dtype=np.int64),
+            weights,
+            None,
+            float_below(member.rate),
+            float_above(member.prefactor),
+            float_below(member.lowest),
+            **more,
+        )
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """``R`` with ``P = R'R``: the square root of the weights, or the Cholesky factor of a full ``P``."""
+        return np.sqrt(self.weights) if self.weights.ndim == 1 else np.linalg.cholesky(self.weights).T
 
     def coordinates_of(self, states: np.ndarray, L: object) -> np.ndarray:
         """Return ``z`` for states of shape (N, ...): rows of ``-L X``, or the weighted deviation of ``X``."""
@@ -92,9 +141,15 @@ class Member:
         mean = np.tensordot(share * g, X, axes=1)
         return X - np.multiply.outer(g, mean)
 
+    def scaled(self, z: np.ndarray) -> np.ndarray:
+        """Return ``R z``, whose Euclidean norm is ``sqrt(V)``, for coordinates of shape (n, ...)."""
+        if self.root.ndim == 1:
+            return self.root.reshape(-1, *([1] * (z.ndim - 1))) * z
+        return np.tensordot(self.root, z, axes=1)
+
     def value(self, z: np.ndarray) -> np.ndarray:
         """Return ``V`` for coordinates of shape (n, ...)."""
-        return np.tensordot(self.weights, z**2, axes=1)
+        return (self.scaled(z) ** 2).sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -123,6 +178,9 @@ class Comparison:
     sliding_ratio : float or None
         Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound``, with the bound of each agent and with that of
         Proposition 1 for the norm; ``f`` is the integrator's floor of the largest ``|sigma_k(0)|``.
+    distance_ratio : float or None
+        ``max over k, t > 0 of max(|x_k - outcome_k| - f, 0) / bound`` with the bound of each agent and of the norm, and
+        the integrator's floor of the largest state; None without constants.
     reaching_kept : bool or None
         Sliding mode: whether every sliding variable was 0 at its certified reaching time.
     """
@@ -136,12 +194,14 @@ class Comparison:
     stop: float
     deadline_resolved: bool
     sliding_ratio: float | None = None
+    distance_ratio: float | None = None
     reaching_kept: bool | None = None
 
     @property
     def violated(self) -> bool:
         """Whether a bound was exceeded by more than rounding."""
-        return max(self.worst_ratio, self.sliding_ratio or 0.0) > 1 + 1e-6 or self.reaching_kept is False
+        worst = max(self.worst_ratio, self.sliding_ratio or 0.0, self.distance_ratio or 0.0)
+        return worst > 1 + 1e-6 or self.reaching_kept is False
 
 
 class History(NamedTuple):
@@ -171,6 +231,15 @@ class Envelope:
     def _laplacian(self) -> object:
         return self.structure.graph.laplacian()
 
+    @property
+    def coordinates(self) -> str:
+        """The coordinates ``z`` of the bounds in norm: ``E`` if some member is in ``E``, otherwise ``eps``."""
+        return "eps" if all(m.coordinates == "eps" for m in self.members) and self.members else "E"
+
+    @property
+    def _in_norm(self) -> list[Member]:
+        return [m for m in self.members if m.coordinates == self.coordinates]
+
     def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
         """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(prefactor_i) e^(-rate_i s / 2)``.
 
@@ -185,7 +254,7 @@ class Envelope:
             Infinite where nothing was proved: an envelope without members bounds nothing.
         """
         clock = np.asarray(clock, dtype=float)
-        factors = [math.sqrt(m.prefactor) * np.exp(-m.rate * clock / 2) for m in self.members]
+        factors = [math.sqrt(m.prefactor) * _decay(m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
@@ -193,14 +262,46 @@ class Envelope:
         return float(self.norm_factor(self.gain.clock_at_remaining(remaining)))
 
     def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
-        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / min weight)``."""
+        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``."""
         clock = np.asarray(clock, dtype=float)
         x0 = np.asarray(x0, dtype=float)
         bounds = [
-            np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)) / m.weights.min()) * np.exp(-m.rate * clock / 2)
-            for m in self.members
+            np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)) / m.lowest) * _decay(m.rate, clock)
+            for m in self._in_norm
         ]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
+
+    def distance(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
+
+        Parameters
+        ----------
+        clock : (M,) array or float
+        x0 : (N,) array
+
+        Returns
+        -------
+        (N, M) array or (N,) array
+            Infinite where nothing was proved.
+        """
+        return self._distances(clock, x0, lambda d: np.array([float_above(c) for c in d.agents]))
+
+    def distance_norm(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``||x - Q x0||`` at clock values ``s`` from ``x0``; see :meth:`distance`."""
+        return self._distances(clock, x0, lambda d: np.array([float_above(d.norm)]))[0]
+
+    def _distances(
+        self, clock: np.ndarray | float, x0: np.ndarray, constants: Callable[[DistanceBound], np.ndarray]
+    ) -> np.ndarray:
+        clock, x0 = np.asarray(clock, dtype=float), np.asarray(x0, dtype=float)
+        bounds = []
+        for m in self.members:
+            if m.distance is not None:
+                start = float(np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)))) * (1 + 1e-12)
+                bounds.append(np.multiply.outer(np.sqrt(constants(m.distance)) * start, _decay(m.rate, clock)))
+        if bounds:
+            return np.minimum.reduce(bounds)
+        return np.full((len(x0), *clock.shape), np.inf)
 
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every member; see :class:`Comparison`.
@@ -243,7 +344,42 @@ class Envelope:
                     ratios[fraction] = max(ratios.get(fraction, 0.0), float(plain[at]))
         before = trajectory.remaining[trajectory.remaining > 0]
         return Comparison(
-            worst, floor, trajectory.rtol, resolved, count, ratios, float(before.min()), trajectory.deadline_resolved
+            worst,
+            floor,
+            trajectory.rtol,
+            resolved,
+            count,
+            ratios,
+            float(before.min()),
+            trajectory.deadline_resolved,
+            distance_ratio=self._distance_ratio(trajectory, judged),
+        )
+
+    def _distance_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
+        """Compare every agent's distance to its outcome with its bound, column by column."""
+        if not any(m.distance is not None for m in self.members) or trajectory.t[0] != 0:
+            return None
+        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        worst, matrix = 0.0, influence(self.structure)
+        for column in range(states.shape[1]):
+            x = states[:, column]
+            size = float(np.abs(x[:, 0]).max()) or 1.0
+            bounds, start = self._distance_bounds(trajectory, x / size, size)
+            final, _ = matrix.apply([Fraction(float(v)) for v in start])
+            gap = np.abs(x / size - np.array([float(v) for v in final])[:, None])
+            excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
+            norm = np.linalg.norm(excess, axis=0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                both = np.vstack([excess, norm]) / bounds
+            worst = max(worst, float(np.where(np.vstack([excess, norm]) > 0, both, 0.0)[:, judged].max(initial=0.0)))
+        return worst
+
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of every agent and of the norm (N + 1, M) in that unit, and what ``Q`` is applied to."""
+        start = x[:, 0]
+        return (
+            np.vstack([self.distance(trajectory.clock, start), self.distance_norm(trajectory.clock, start)]),
+            start,
         )
 
     def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
@@ -253,7 +389,7 @@ class Envelope:
         z = member.coordinates_of(states, self._laplacian)
         unit = _sizes(z)
         root = np.sqrt(member.value(z / unit))
-        decay = np.exp(-member.rate * (trajectory.clock - trajectory.clock[0]) / 2)
+        decay = _decay(member.rate, trajectory.clock - trajectory.clock[0])
         return [
             History(
                 root[column],
@@ -264,13 +400,23 @@ class Envelope:
         ]
 
     def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:
-        """Return ``||dz||_weights / unit`` for an error ``|dx_k| = max |x_k|`` in every entry, the worst case."""
+        """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
         size = np.abs(states).max(axis=1)
         if member.coordinates == "E":
             size = np.asarray(abs(self._laplacian) @ size)[member.nodes]  # type: ignore[arg-type, operator]
         else:
             size = 2 * size[member.nodes]
-        return float(np.sqrt(member.weights @ (size / unit) ** 2))
+        if member.root.ndim == 1:
+            return float(np.linalg.norm(member.root * (size / unit)))
+        return float(np.linalg.norm(np.abs(member.root) @ (size / unit)))
+
+
+def _decay(rate: float, clock: np.ndarray) -> np.ndarray:
+    """Return ``e^(-rate s / 2)``; where only the growth is bounded, at most the largest float, so that 0 stays 0."""
+    if rate == 0:
+        return np.ones_like(clock)
+    with np.errstate(over="ignore"):
+        return np.minimum(np.exp(-rate * clock / 2), np.finfo(float).max)
 
 
 def _sizes(values: np.ndarray) -> np.ndarray:

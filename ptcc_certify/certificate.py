@@ -21,14 +21,17 @@ import numpy as np
 
 from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS, Comparison, Envelope, Member
-from ptcc_certify.errors import FormatError, HypothesisError, ParameterError, SimulationError
+from ptcc_certify.distance import DistanceBound, OutcomeGeometry
+from ptcc_certify.error_system import ErrorSystem
+from ptcc_certify.errors import FormatError, HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import format_exact, shorten, writable
+from ptcc_certify.rationals import as_fraction, format_exact, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
+from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen
 from ptcc_certify.simulation import simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.structure import Claim, Structure, analyse
@@ -80,6 +83,11 @@ class Certificate:
         ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without a start.
     trajectory : Trajectory or None
     comparison : Comparison or None
+    sharpening : Sharpening
+        Sharper Lyapunov functions of the classes that ``method`` names, proved.
+    method : str
+    at : Fraction or None
+        Instant for which the bound was optimised.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
     """
@@ -100,6 +108,9 @@ class Certificate:
     sliding_proof: tuple[Obligation, ...]
     trajectory: Trajectory | None
     comparison: Comparison | None
+    sharpening: Sharpening
+    method: str
+    at: Fraction | None
     notes: tuple[str, ...]
 
     @property
@@ -120,8 +131,28 @@ class Certificate:
 
     @property
     def rate(self) -> Fraction | None:
-        """The largest proved rate; None if nothing decays or nothing was proved."""
-        return self.proof.rate
+        """The largest proved rate of all members; None if nothing decays or nothing was proved."""
+        proved = [rate for rate, _, _ in self._rated if rate > 0]
+        return max(proved) if proved else None
+
+    @property
+    def diagonal_rate(self) -> Fraction | None:
+        """The largest proved rate of a diagonal Lyapunov matrix of the sharper classes; None if there is none."""
+        proved = [m.rate for m in self.sharpening.members if m.kind in DIAGONAL and m.rate > 0]
+        return max(proved) if proved else None
+
+    @property
+    def prefactor(self) -> Fraction | None:
+        """What multiplies the squared norm at the largest proved rate."""
+        return max(self._rated, key=lambda member: member[0])[1] if self.rate is not None else None
+
+    @property
+    def _rated(self) -> list[tuple[Fraction, Fraction, str]]:
+        """Rate, prefactor and class of every proved member, the paper's first."""
+        paper = []
+        if self.lyapunov is not None and self.proof.rate is not None:
+            paper = [(self.proof.rate, self.lyapunov.prefactor, "paper")]
+        return paper + [(m.rate, m.prefactor, m.kind) for m in self.sharpening.members]
 
     @property
     def constant(self) -> bool:
@@ -131,20 +162,21 @@ class Certificate:
     @property
     def obligations(self) -> tuple[Obligation, ...]:
         """Everything that was proved."""
-        return (*self.proof.obligations, *self.sliding_proof, *self.outcome_proof)
+        sharper = (o for member in self.sharpening.members for o in member.obligations)
+        return (*self.proof.obligations, *sharper, *self.sliding_proof, *self.outcome_proof)
 
     @property
     def verdict(self) -> str:
         """``certified`` if rate and outcome were proved in exact arithmetic, otherwise ``undecided``."""
-        proved = self.constant or self.proof.rate is not None
+        proved = self.constant or self.rate is not None
         return CERTIFIED if proved and self.influence.exact else UNDECIDED
 
     @property
     def tightness(self) -> float | None:
         """Proved rate over spectral rate, at most 1."""
-        if self.proof.rate is None or not self.spectral_rate:
+        if self.rate is None or not self.spectral_rate:
             return None
-        return float(self.proof.rate) / self.spectral_rate
+        return float(self.rate) / self.spectral_rate
 
     @property
     def direct(self) -> bool:
@@ -161,13 +193,52 @@ class Certificate:
     @cached_property
     def envelope(self) -> Envelope:
         """The proved bounds over time; without members if nothing was proved."""
-        members: tuple[Member, ...] = ()
-        if self.lyapunov is not None and self.proof.rate is not None:
-            members = (Member.of("paper", self.structure, self.lyapunov, float(self.proof.rate)),)
+        members: list[Member] = []
+        V = self.lyapunov
+        if V is not None and V.blocks and self.proof.rate is not None:
+            distance = self._distance(V.coordinates, V.nodes, V.weights, None)
+            members.append(Member.of(self.structure, V, self.proof.rate, distance=distance))
+        for sharp in self.sharpening.members:
+            distance = self._distance("E", sharp.nodes, sharp.diagonal, sharp.matrix)
+            members.append(Member.of_sharp(sharp, distance=distance))
         if isinstance(self.protocol, SlidingModeProtocol):
             sigma0, reaching = self.sigma0 or (), self.reaching or ()
-            return SlidingEnvelope(self.structure, self.protocol.gain, members, self.protocol, sigma0, reaching)
-        return Envelope(self.structure, self.protocol.gain, members)
+            return SlidingEnvelope(self.structure, self.protocol.gain, tuple(members), self.protocol, sigma0, reaching)
+        return Envelope(self.structure, self.protocol.gain, tuple(members))
+
+    @cached_property
+    def _geometry(self) -> OutcomeGeometry | None:
+        return OutcomeGeometry(self.structure, self.influence) if self.influence.exact else None
+
+    def _distance(
+        self,
+        coordinates: str,
+        nodes: Sequence[int],
+        diagonal: Sequence[Fraction] | None,
+        matrix: Sequence[Sequence[Fraction]] | None,
+    ) -> DistanceBound | None:
+        """Return the constants from ``V`` to the distances, or None without an exact outcome."""
+        if self._geometry is None:
+            return None
+        return self._geometry.bound(coordinates, nodes, diagonal, matrix)
+
+    def outcome_distance(self, remaining: Sequence[float]) -> np.ndarray:
+        """Bound of ``|x_k(t) - x_k(T)|`` from the start, (N, M), at the instants where ``1 - t/T`` is ``remaining``.
+
+        Under the sliding-mode protocol whatever the disturbance.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        """
+        if self.start is None:
+            raise ParameterError("the certificate has no start; give x0")
+        envelope, start = self.envelope, np.array([float(x) for x in self.start])
+        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
+            return envelope.outcome_distance(np.array(remaining, dtype=float), start)
+        clock = np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
+        return envelope.distance(clock, start)
 
     def best_possible_residual(self, remaining: float) -> float | None:
         """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""
@@ -188,7 +259,11 @@ class Certificate:
             "protocol": self._protocol_section(),
             "paper": self._paper_section(),
             "lyapunov": {"members": self._members_section()},
-            "rates": {"paper": _text(self.proof.rate), "diagonal": None, "certified": _text(self.proof.rate)},
+            "rates": {
+                "paper": _text(self.proof.rate),
+                "diagonal": _text(self.diagonal_rate),
+                "certified": _text(self.rate),
+            },
             "prefactor": self._prefactor_section(),
             "initial_state": self.start and dict(zip(labels, map(format_exact, self.start), strict=True)),
             "sigma0": self.sigma0 and dict(zip(labels, map(format_exact, self.sigma0), strict=True)),
@@ -250,16 +325,40 @@ class Certificate:
         }
 
     def _members_section(self) -> list[dict[str, Any]]:
-        if self.lyapunov is None or self.proof.rate is None:
-            return []
-        paper = self._paper_section() or {}
-        keys = ("coordinates", "blocks", "rho", "rate", "prefactor")
-        return [{"class": "paper", **{key: paper[key] for key in keys}}]
+        labels, sections = self.graph.labels, []
+        if self.lyapunov is not None and self.proof.rate is not None:
+            paper = self._paper_section() or {}
+            keys = ("coordinates", "blocks", "rho", "rate", "prefactor")
+            sections.append({"class": "paper", **{key: paper[key] for key in keys}})
+        for member in self.sharpening.members:
+            block: dict[str, Any] = {"name": "P", "nodes": [labels[v] for v in member.nodes]}
+            if member.diagonal is not None:
+                block["diagonal"] = [format_exact(w) for w in member.diagonal]
+            else:
+                rows = member.matrix or []
+                block["lower_triangle"] = [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(rows)]
+            sections.append(
+                {
+                    "class": member.kind,
+                    "coordinates": "E",
+                    "blocks": [{**block, "times_rho": False}],
+                    "rho": None,
+                    "rate": format_exact(member.rate),
+                    "prefactor": format_exact(member.prefactor),
+                }
+            )
+        for section, bound in zip(sections, self.envelope.members, strict=False):
+            if (distance := bound.distance) is not None:
+                agents = dict(zip(labels, map(format_exact, distance.agents), strict=True))
+                section["distance"] = {"agents": agents, "norm": format_exact(distance.norm)}
+        return sections
 
     def _prefactor_section(self) -> dict[str, Any] | None:
-        if self.lyapunov is None or self.proof.rate is None:
+        if self.prefactor is None:
             return None
-        return {"value": format_exact(self.lyapunov.prefactor), "of": f"||{self.lyapunov.coordinates}||^2"}
+        kind = max(self._rated, key=lambda member: member[0])[2]
+        coordinates = self.lyapunov.coordinates if kind == "paper" and self.lyapunov else "E"
+        return {"value": format_exact(self.prefactor), "of": f"||{coordinates}||^2"}
 
     def _outcome_section(self) -> dict[str, Any] | None:
         if not self.influence.exact:
@@ -292,6 +391,7 @@ class Certificate:
             "ratios": {str(k): _finite(v) for k, v in comparison.ratios.items()},
             "stop": comparison.stop,
             "tolerances": {"relative": comparison.tolerance},
+            "distance_ratio": _finite(comparison.distance_ratio),
             "deadline_resolved": comparison.deadline_resolved,
             **self._sliding_run_section(),
         }
@@ -302,6 +402,12 @@ class Certificate:
             "spectral": _finite(self.spectral_rate),
             "tightness": _finite(self.tightness),
             "paper_rate": _finite(self.numerical_rate),
+            "search": {
+                "method": self.method,
+                "at": None if self.at is None else float(self.at),
+                "tried": {kind: _finite(rate) for kind, rate in self.sharpening.tried.items()},
+                "diagonal_limit": _finite(self.sharpening.diagonal_limit),
+            },
             "residual": {
                 str(1 - q if q > 1e-3 else f"1-{q:g}"): _finite(self.envelope.residual(q))
                 for q in (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
@@ -330,7 +436,7 @@ class Certificate:
         return f"<pre>{html.escape(chr(10).join(certificate_lines(self, 'graph')))}</pre>"
 
     def __repr__(self) -> str:
-        rate = "none" if self.proof.rate is None else f"{float(self.proof.rate):.6g}"
+        rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
         said = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
         return f"Certificate({said}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
@@ -343,6 +449,8 @@ def certify(
     sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
     disturbance: Any = None,
     simulation: bool = True,
+    method: str = "best",
+    at: Any = None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
 
@@ -360,6 +468,10 @@ def certify(
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
     simulation : bool
         Whether to compare the proved bound with a CVODES run.
+    method : {"best", "paper", "perron", "lmi", "full"}
+        Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.sharpen`.
+    at : number, optional
+        An instant before the deadline at which the bound should be smallest.
 
     Returns
     -------
@@ -399,6 +511,9 @@ ReachingTime(0, 1 before T_r)))
     for name, value in (("sigma0", sigma0), ("disturbance", disturbance)):
         if value is not None and not sliding:
             raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+    if method not in METHODS:
+        raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
+    instant = None if at is None else _instant(at, protocol)
     structure = analyse(graph)
     start = None if x0 is None else _start(structure, x0, "x0")
     manifold, reaching, sliding_proof = _reaching(structure, protocol, sigma0)
@@ -412,6 +527,7 @@ ReachingTime(0, 1 before T_r)))
             notes.append(f"simulation: {error}")
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical = _search_and_prove(structure, theorem, notes)
+    sharpening = _sharpen(structure, protocol, method, instant, notes)
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
     result = None if start is None else outcome(structure, [x - s for x, s in zip(start, gone, strict=True)])
@@ -431,7 +547,7 @@ ReachingTime(0, 1 before T_r)))
         lyapunov=V,
         proof=proof,
         numerical_rate=numerical,
-        spectral_rate=_spectral_rate(structure, proof.rate, notes),
+        spectral_rate=_spectral_rate(structure, [proof.rate, *(m.rate for m in sharpening.members)], notes),
         start=start,
         sigma0=manifold,
         reaching=reaching,
@@ -441,6 +557,9 @@ ReachingTime(0, 1 before T_r)))
         sliding_proof=sliding_proof,
         trajectory=trajectory,
         comparison=comparison,
+        sharpening=sharpening,
+        method=method,
+        at=instant,
         notes=tuple(notes),
     )
     if trajectory is None or not (certificate.envelope.members or sliding):
@@ -507,6 +626,33 @@ def _search_and_prove(
     return V, proof, numerical
 
 
+def _instant(at: Any, protocol: Protocol) -> Fraction:
+    """Read an instant before the deadline."""
+    try:
+        instant = as_fraction(at, "at")
+    except NumberError as error:
+        raise ParameterError(str(error)) from None
+    if not 0 <= instant < protocol.T:
+        raise ParameterError(f"at = {float(instant):g} is not an instant before the deadline {float(protocol.T):g}")
+    return instant
+
+
+def _sharpen(
+    structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
+) -> Sharpening:
+    """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
+    n, gain = structure.graph.n_nodes, protocol.gain
+    if n > EXACT_NODES:
+        if method != "paper":
+            notes.append(f"sharper Lyapunov functions are searched up to {EXACT_NODES} nodes; the graph has {n}")
+        return Sharpening()
+    clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
+    own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
+    found = sharpen(ErrorSystem(structure), method, clocks, own)
+    notes.extend(found.notes)
+    return found
+
+
 def _prove_outcome(structure: Structure, matrix: Influence, sliding: bool) -> tuple[Obligation, ...]:
     """Check in rationals that ``Q`` maps into the kernel of ``L`` and keeps what the motion keeps.
 
@@ -535,7 +681,7 @@ def _prove_outcome(structure: Structure, matrix: Influence, sliding: bool) -> tu
     return (Obligation("outcome", statement, "Lemmas 2, 8 and 9"),)
 
 
-def _spectral_rate(structure: Structure, proved: Fraction | None, notes: list[str]) -> float | None:
+def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], notes: list[str]) -> float | None:
     if int(np.bincount(structure.strong_component).max()) > SPECTRUM_NODES:
         notes.append(f"the spectral rate is not computed for strong components above {SPECTRUM_NODES} nodes")
         return None
@@ -543,7 +689,7 @@ def _spectral_rate(structure: Structure, proved: Fraction | None, notes: list[st
         rate = laplacian_spectrum(structure).spectral_rate
     except np.linalg.LinAlgError:
         rate = math.nan
-    if rate is not None and not (rate > 0 and math.isfinite(rate) and (proved or 0) <= rate * (1 + 1e-6)):
+    if rate is not None and not (rate > 0 and math.isfinite(rate) and max(x or 0 for x in proved) <= rate * (1 + 1e-6)):
         notes.append("the spectral rate is lost in the rounding of float64")
         return None
     return rate

@@ -111,6 +111,14 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 @_protocol_options
 @click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock.")
+@click.option(
+    "--method",
+    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
+    default="best",
+    show_default=True,
+    help="Lyapunov functions searched beside the paper's.",
+)
+@click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @_json_option
 def certify(
@@ -120,6 +128,8 @@ def certify(
     seed: int,
     expect: str | None,
     min_rate: str | None,
+    method: str,
+    at: str | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -128,14 +138,15 @@ def certify(
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.summary import certificate_lines
 
-    expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
+    expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
     start = _start(x0, seed, signed)
     if signed.n_nodes > SLOW_NODES and sys.stderr.isatty():
         click.echo(f"searching a Lyapunov matrix of {signed.n_nodes} rows ...", err=True)
-    certificate = run(signed, protocol, start, **_sliding_options(protocol, options, seed, signed))
+    sliding = _sliding_options(protocol, options, seed, signed)
+    certificate = run(signed, protocol, start, method=method, at=instant, **sliding)
     if output:
         certificate.save(output)
     if as_json:

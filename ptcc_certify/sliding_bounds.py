@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member
+from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member, float_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.reaching import LAST_Z, ReachingTime, sliding_bound
@@ -97,16 +97,13 @@ class SlidingEnvelope(Envelope):
             Of the shape of ``remaining``; infinite where nothing was proved.
         """
         q = np.atleast_1d(np.asarray(remaining, dtype=float))
-        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
-        with np.errstate(divide="ignore"):
-            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
-            clock = np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
+        z, clock = self._instants(q)
         bound, start = np.full(q.size, np.inf), np.asarray(x0, dtype=float)
         unit = self._unit(start)
-        for member in self.members:
+        for member in self._in_norm:
             v, sliding = self._bounds(member, start / unit, unit, z, clock)
             with np.errstate(over="ignore"):
-                bound = np.minimum(bound, (v + sliding) / np.sqrt(member.weights.min()) * unit)
+                bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit)
         return bound if np.ndim(remaining) else bound[0]
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
@@ -184,7 +181,7 @@ class SlidingEnvelope(Envelope):
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
         size = sliding_bound(self.protocol, self.sigma0, knots) / unit
-        forcing = np.sqrt(member.value(B @ size))
+        forcing = np.linalg.norm(B @ size, axis=0)
         s = self._clock_at(knots)
         decay = np.exp(-half * np.diff(s, append=self._clock_at(np.array([np.inf]))))
         v = np.empty(knots.size + 1)
@@ -193,8 +190,9 @@ class SlidingEnvelope(Envelope):
             v[i + 1] = decay[i] * v[i] + forcing[i] * (1 - decay[i]) / half
         at = np.searchsorted(knots, z)
         last = self._clock_at(np.array([np.inf]))[0]
-        later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
-        sliding = np.append(np.sqrt(member.value(C @ size)), 0.0)
+        with np.errstate(over="ignore"):
+            later = v[-1] * np.minimum(np.exp(-half * np.maximum(clock - last, 0.0)), np.finfo(float).max)
+        sliding = np.append(np.linalg.norm(C @ size, axis=0), 0.0)
         return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
 
     @cached_property
@@ -211,10 +209,60 @@ class SlidingEnvelope(Envelope):
         return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
     def _drive(self, member: Member) -> tuple[np.ndarray, np.ndarray]:
-        """Return ``|C|`` and ``|B|``: how the sliding variables enter the coordinates, and how they drive them."""
+        """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
         L = self.structure.graph.laplacian()
         if member.coordinates == "E":
             rows = L[member.nodes]
-            return abs(rows).toarray(), abs(rows @ L).toarray()
+            return np.abs(member.scaled(rows.toarray())), np.abs(member.scaled((rows @ L).toarray()))
         deviation = member.coordinates_of(np.eye(L.shape[0]), L)
-        return np.abs(deviation), np.abs(deviation @ L)
+        return np.abs(member.scaled(deviation)), np.abs(member.scaled(deviation @ L))
+
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
+        if self.direct:
+            return super()._distance_bounds(trajectory, x, unit)
+        assert isinstance(trajectory, SlidingTrajectory)
+        sigma0 = np.array([float(s) for s in self.sigma0]) / unit
+        bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(trajectory), trajectory.clock)
+        return np.vstack([bounds, norm]), x[:, 0] - sigma0
+
+    def _outcome_bounds(
+        self, x0: np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of ``|x_k - outcome_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
+        bounds = np.full((len(x0), z.size), np.inf)
+        norm = np.full(z.size, np.inf)
+        for member in self.members:
+            if member.distance is None:
+                continue
+            v = self._bounds(member, x0, unit, z, clock)[0]
+            agents = np.sqrt([float_above(c) for c in member.distance.agents])
+            bounds = np.minimum(bounds, np.multiply.outer(agents, v))
+            norm = np.minimum(norm, math.sqrt(float_above(member.distance.norm)) * v)
+        size = sliding_bound(self.protocol, self.sigma0, z) / unit
+        return bounds + size, norm + np.linalg.norm(size, axis=0)
+
+    def outcome_distance(self, remaining: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+        x0 : (N,) array
+
+        Returns
+        -------
+        (N, M) or (N,) array
+        """
+        q, start = np.atleast_1d(np.asarray(remaining, dtype=float)), np.asarray(x0, dtype=float)
+        unit = self._unit(start)
+        z, clock = self._instants(q)
+        bounds = self._outcome_bounds(start / unit, unit, z, clock)[0] * unit
+        return bounds if np.ndim(remaining) else bounds[:, 0]
+
+    def _instants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``z`` and ``s`` where ``1 - t/(T_r + T_s)`` equals ``q``."""
+        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        with np.errstate(divide="ignore"):
+            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
+            return z, np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)

@@ -88,32 +88,72 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
 
 
 def _rate_lines(certificate: Certificate) -> list[str]:
-    lines = []
-    V, rate, spectral = certificate.lyapunov, certificate.proof.rate, certificate.spectral_rate
+    rate, spectral = certificate.rate, certificate.spectral_rate
     best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
     if certificate.constant:
         kept = "its state" if certificate.direct else "x - sigma"
         return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
-    if rate is not None and V is not None:
-        near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
-        lines.append(_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}"))
-        rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
-        lines.append(
-            _line("", f"{V.objective}{rho}; ||{V.coordinates}||^2 carries the prefactor {_up(V.prefactor, 4)}")
-        )
-        lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
-        arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
-        lines.append(_line("proof", f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"))
-    elif certificate.numerical_rate is not None:
-        lines.append(_line("rate", f"not proved; numerically {certificate.numerical_rate:.6g}{best}"))
-    else:
-        lines.append(_line("rate", f"not proved{best}"))
+    if rate is None:
+        numerical = certificate.numerical_rate
+        return [_line("rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}")]
+    near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
+    lines = [_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}")]
+    lines += _class_lines(certificate)
+    lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
+    lines += _distance_lines(certificate)
+    arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
+    lines.append(_line("proof", f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"))
     return lines
 
 
+def _class_lines(certificate: Certificate) -> list[str]:
+    """Tell the members of the envelope: class, rate and prefactor; what else was tried; the paper's own formula."""
+    V, lines = certificate.lyapunov, []
+    if V is not None and certificate.proof.rate is not None:
+        rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
+        prefactor = f"||{V.coordinates}||^2 prefactor {_up(V.prefactor, 4)}"
+        lines.append(_line("", f"paper {_down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"))
+    found = certificate.sharpening
+    if found.tried:
+        members = ", ".join(f"{m.kind} {_signed(m.rate, 6)} ({_up(m.prefactor, 3)})" for m in found.members)
+        lines.append(_line("", f"{certificate.method}: rate (||E||^2 prefactor) {members or 'none proved'}"))
+    if found.diagonal_limit is not None and certificate.diagonal_rate is not None:
+        reached = float(certificate.diagonal_rate) / found.diagonal_limit
+        lines.append(
+            _line("", f"no diagonal matrix exceeds {found.diagonal_limit:.6g} (numerical); proved {reached:.1%}")
+        )
+    return lines
+
+
+def _distance_lines(certificate: Certificate) -> list[str]:
+    """Tell how far from its outcome the farthest agent may be, and every agent at the instant asked for."""
+    if certificate.start is None or not any(m.distance for m in certificate.envelope.members):
+        return []
+    labels = certificate.graph.labels
+    instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
+    worst = certificate.outcome_distance([q for q, _ in instants]).max(axis=0, initial=0.0)
+    said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, instants, strict=True))
+    lines = [_line("distance", f"of every agent to its outcome at most {said}")] if instants else []
+    if certificate.at is not None:
+        q = float(1 - certificate.at / certificate.protocol.T)
+        each = certificate.outcome_distance([q])[:, 0]
+        listed = _listed([f"{label} {_up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
+        lines.append(_line("", f"at t = {float(certificate.at):g}: {listed}"))
+    return lines
+
+
+def _sliding_share(certificate: Certificate) -> float:
+    """Return ``1 - t/T`` at ``T_r``."""
+    p = certificate.protocol
+    return float(p.T_s / p.T)  # type: ignore[union-attr]
+
+
 def _residual_lines(certificate: Certificate) -> list[str]:
-    coordinates = certificate.lyapunov.coordinates if certificate.lyapunov else "E"
+    coordinates, at = certificate.envelope.coordinates, certificate.at
     proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
+    if at is not None:
+        own = certificate.envelope.residual(float(1 - at / certificate.protocol.T))
+        proved.insert(0, f"{_up(own, 3)} at t = {float(at):g}")
     lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
@@ -129,11 +169,10 @@ def _reaching_lines(certificate: Certificate) -> list[str]:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
     from ptcc_certify.sliding_bounds import SlidingEnvelope
 
-    envelope, coordinates = certificate.envelope, certificate.lyapunov.coordinates if certificate.lyapunov else "E"
+    envelope, coordinates = certificate.envelope, certificate.envelope.coordinates
     if certificate.start is None or not isinstance(envelope, SlidingEnvelope):
         return []
-    p = envelope.protocol
-    share = float(p.T_s / p.T)
+    share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
     bounds = envelope.state_bound(np.array([q for q, _ in chosen]), np.array([float(x) for x in certificate.start]))
     said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
@@ -256,6 +295,11 @@ def _remarks(structure: Structure) -> list[str]:
 
 def _down(x: Fraction | float, digits: int = 6) -> str:
     return _rounded(x, digits, ROUND_FLOOR)
+
+
+def _signed(x: Fraction | float, digits: int) -> str:
+    """Write a proved rate, rounded down; a negative one bounds the growth."""
+    return _down(x, digits) if x > 0 else f"-{_up(-x, digits)}" if x < 0 else "0"
 
 
 def _up(x: Fraction | float, digits: int) -> str:

@@ -142,7 +142,7 @@ def pair_envelope(rate: float) -> tuple[Envelope, NominalProtocol, SignedDigraph
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol, [3, 1], simulation=False)
     assert cert.lyapunov is not None
-    member = Member.of("paper", cert.structure, cert.lyapunov, rate)
+    member = Member.of(cert.structure, cert.lyapunov, rate)
     return Envelope(cert.structure, protocol.gain, (member,)), protocol, graph
 
 

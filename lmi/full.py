@@ -1,0 +1,186 @@
+"""Full (non-diagonal) Lyapunov matrices: every rate below the spectral one, at the smallest prefactor found.
+
+Two steps, both without a solver. The slow and the fast modes are split by a basis ``X`` of invariant subspaces, so that
+``X^-1 A X = diag(A_1 .. A_m)``; on each block the identity is corrected until it decays at the wanted rate:
+
+    P = I + Delta,    (A - a I)' Delta + Delta (A - a I) = N,    N = negative part of A + A' - 2 a I,
+
+whence ``P A + A' P - 2 a P = (A + A' - 2 a I) + N >= 0`` and ``P >= I``. If ``A`` is normal nothing is corrected and
+nothing is lost; if it is not, the correction is what the transients need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lmi.errors import MatrixError, NoCertificate
+from lmi.matrices import square
+
+#: Relative distances of the wanted rate from the spectral one.
+LOSSES = (1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
+#: Modes whose decay rates differ by more than this factor are split; 1 splits all that are distinct.
+SPLITS = (np.inf, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.05, 1.0)
+#: A basis of invariant subspaces with a larger condition number is not used.
+_LARGEST_BASIS = 1e7
+
+
+@dataclass(frozen=True, eq=False)
+class FullCertificate:
+    """A Lyapunov matrix ``P`` of ``A``: ``P A + A' P >= rate P``, as far as floating point tells.
+
+    Attributes
+    ----------
+    matrix : (n, n) array
+        Symmetric; smallest eigenvalue 1.
+    rate : float
+        Smallest eigenvalue of ``(P A + A' P, P)``.
+    condition : float
+        ``lmax(P) / lmin(P)``, the prefactor of the squared norm.
+    """
+
+    matrix: np.ndarray
+    rate: float
+    condition: float
+
+
+def full_frontier(
+    A: Any, *, decay: float | None = None, losses: Sequence[float] = LOSSES
+) -> tuple[FullCertificate, ...]:
+    """Return rate against prefactor over full Lyapunov matrices; see the module for how they are made.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+        All eigenvalues with positive real part.
+    decay : float, optional
+        ``min Re lambda``, if it is known better than from the eigenvalues of ``A`` (block by block of a reducible
+        matrix, whose Jordan chains cost digits).
+    losses : sequence of float
+        Wanted distances ``1 - a / decay``.
+
+    Returns
+    -------
+    tuple of FullCertificate
+        Rate and condition strictly increasing; the first may be the identity, with a negative rate.
+
+    Raises
+    ------
+    NoCertificate
+        ``A`` has an eigenvalue without positive real part, or no matrix with a positive rate was found.
+
+    Examples
+    --------
+    >>> best = full_frontier([[1.0, 9.0], [0.0, 2.0]])[-1]
+    >>> round(best.rate, 3), best.condition < 500
+    (2.0, True)
+    """
+    A = square(A)
+    if len(A) == 0:
+        raise MatrixError("A has no rows")
+    values, vectors = np.linalg.eig(A)
+    decay = float(values.real.min()) if decay is None else decay
+    if not decay > 0:
+        raise NoCertificate(f"an eigenvalue has real part {decay:.3g}: nothing decays")
+    found = [_certificate(A, np.eye(len(A)))]
+    tried = set()
+    for split in SPLITS:
+        groups = _groups(values.real, split)
+        if len(groups) in tried:
+            continue
+        tried.add(len(groups))
+        blocks = _Blocks.of(A, vectors, groups)
+        if blocks is not None:
+            found += [_certificate(A, blocks.lyapunov(decay * (1 - loss))) for loss in losses]
+    points = sorted((c for c in found if c is not None), key=lambda c: (c.condition, -c.rate))
+    frontier: list[FullCertificate] = []
+    for point in points:
+        if not frontier or point.rate > frontier[-1].rate:
+            frontier.append(point)
+    if not frontier or not frontier[-1].rate > 0:
+        raise NoCertificate("no full Lyapunov matrix with a positive rate was found in floating point")
+    return tuple(frontier)
+
+
+def _groups(decay: np.ndarray, split: float) -> list[np.ndarray]:
+    """Cut the modes, sorted by decay, where the next one is faster by more than the factor ``split``."""
+    order = np.argsort(decay, kind="stable")
+    sorted_decay = decay[order]
+    # Conjugate pairs share their real part up to rounding and stay together.
+    faster = sorted_decay[1:] > np.abs(sorted_decay[:-1]) * split * (1 + 1e-9)
+    return np.split(order, np.flatnonzero(faster) + 1)
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """``A`` in a basis of invariant subspaces, each with its real Schur form."""
+
+    inverse: np.ndarray
+    forms: tuple[tuple[np.ndarray, np.ndarray], ...]  # (T, U) with A_i = U T U'
+
+    @classmethod
+    def of(cls, A: np.ndarray, vectors: np.ndarray, groups: list[np.ndarray]) -> _Blocks | None:
+        from scipy.linalg import schur
+
+        if len(groups) == 1:
+            return cls(np.eye(len(A)), (schur(A, output="real"),))
+        parts = []
+        for group in groups:
+            span = np.hstack([vectors[:, group].real, vectors[:, group].imag])
+            parts.append(np.linalg.svd(span, full_matrices=False)[0][:, : len(group)])
+        X = np.hstack(parts)
+        size = np.linalg.svd(X, compute_uv=False)
+        if not size[-1] * _LARGEST_BASIS > size[0]:
+            return None
+        inverse, used, forms = np.linalg.inv(X), 0, []
+        for part in parts:
+            rows = inverse[used : used + part.shape[1]]
+            forms.append(schur(rows @ A @ part, output="real"))
+            used += part.shape[1]
+        return cls(inverse, tuple(forms))
+
+    def lyapunov(self, a: float) -> np.ndarray | None:
+        """Return ``P`` that decays at ``2 a``; None where floating point ends."""
+        P, used = np.zeros_like(self.inverse), 0
+        for T, U in self.forms:
+            block = _corrected_identity(T, a)
+            if block is None:
+                return None
+            rows = U.T @ self.inverse[used : used + len(T)]
+            P += rows.T @ block @ rows
+            used += len(T)
+        return (P + P.T) / 2
+
+
+def _corrected_identity(T: np.ndarray, a: float) -> np.ndarray | None:
+    """Return ``I + Delta`` of a block in Schur form; see the module."""
+    from scipy.linalg.lapack import dtrsyl
+
+    shifted = T - a * np.eye(len(T))
+    values, vectors = np.linalg.eigh(shifted + shifted.T)
+    if values[0] >= 0:
+        return np.eye(len(T))
+    negative = (vectors * np.maximum(-values, 0.0)) @ vectors.T
+    delta, scale, info = dtrsyl(shifted, shifted, negative, trana="T")
+    if info < 0 or not scale > 0 or not np.isfinite(delta).all():
+        return None
+    return np.eye(len(T)) + delta / scale
+
+
+def _certificate(A: np.ndarray, P: np.ndarray | None) -> FullCertificate | None:
+    """Rate and condition from eigenvalues of the matrix itself; None if it is not positive definite in floats."""
+    if P is None or not np.isfinite(P).all():
+        return None
+    try:
+        size = np.linalg.eigvalsh(P)
+        if not size[0] > 1e-15 * size[-1]:
+            return None
+        factor = np.linalg.cholesky(P / size[0])
+        B = np.linalg.solve(factor, (factor.T @ A).T).T  # R A R^-1 with R = factor'
+        rate = float(np.linalg.eigvalsh(B + B.T)[0])
+    except np.linalg.LinAlgError:
+        return None
+    return FullCertificate(P / size[0], rate, float(size[-1] / size[0]))

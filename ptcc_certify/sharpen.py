@@ -1,0 +1,307 @@
+"""Sharper Lyapunov functions than the paper's: searched in several classes, chosen for the bound over time, proved.
+
+All are quadratic in the error: ``V = E' P E`` with ``V <= e^(-b s) V(0)``, hence
+``||E||^2 <= prefactor e^(-b s) ||E(0)||^2``. The classes:
+
+* ``perron``: diagonal, from the Perron vectors of leaders and followers, in closed form;
+* ``lmi``: the best diagonal matrix, searched by semidefinite programs;
+* ``full``: not diagonal, from Lyapunov equations on invariant subspaces; its rates come as near as wanted to the
+  spectral rate, which nothing exceeds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+import lmi
+from lmi.errors import LMIError
+from lmi.exact import prove_generalized_margin
+from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.lemmas import laplacian_spectrum, left_vector
+from ptcc_certify.theorems.base import BITS, Matrix, Obligation, diagonal_matrix
+
+METHODS = ("paper", "perron", "lmi", "full", "best")
+DIAGONAL = ("perron", "lmi")
+#: The member with the largest rate is chosen among those with at most this prefactor.
+LARGEST_PREFACTOR = 1e6
+#: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
+_COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
+#: Above this prefactor a diagonal matrix of a smaller one is searched too; beyond the second none is of use.
+_LARGE, _HOPELESS = 1e8, 1e15
+_MATRIX_BITS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n)."""
+
+    kind: str
+    rate: float
+    condition: float
+    log_weights: np.ndarray | None = None
+    matrix: np.ndarray | None = None
+
+    def log_bound(self, clock: float) -> float:
+        """Return the logarithm of the bound of ``||E|| / ||E(0)||`` at a value of the clock."""
+        return (math.log(self.condition) - self.rate * clock) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class SharpMember:
+    """A proved Lyapunov function ``V = E' P E`` on the rows ``nodes`` of ``E``.
+
+    Attributes
+    ----------
+    kind : str
+        Class: ``perron``, ``lmi`` or ``full``.
+    nodes : tuple of int
+    diagonal : tuple of Fraction or None
+        Of a diagonal ``P``.
+    matrix : rows of Fractions or None
+        Of a full ``P``.
+    rate : Fraction
+        ``P A + A' P > rate P`` on the error's subspace; negative rates, which bound the growth, occur too.
+    lowest, highest : Fraction
+        ``lowest I <= P <= highest I``.
+    obligations : tuple of Obligation
+    """
+
+    kind: str
+    nodes: tuple[int, ...]
+    diagonal: tuple[Fraction, ...] | None
+    matrix: Matrix | None
+    rate: Fraction
+    lowest: Fraction
+    highest: Fraction
+    obligations: tuple[Obligation, ...]
+
+    @property
+    def prefactor(self) -> Fraction:
+        """``highest / lowest``, which multiplies the squared norm."""
+        return self.highest / self.lowest
+
+
+@dataclass(frozen=True)
+class Sharpening:
+    """What was tried, what was taken, and how far the diagonal class reaches.
+
+    Attributes
+    ----------
+    members : tuple of SharpMember
+        Proved.
+    tried : dict of str to float
+        Largest rate found of each class, in floating point.
+    diagonal_limit : float or None
+        No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
+    notes : tuple of str
+        What failed.
+    """
+
+    members: tuple[SharpMember, ...] = ()
+    tried: dict[str, float] = field(default_factory=dict)
+    diagonal_limit: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Sharpening:
+    """Search the classes of a method, choose the members that bound best, and prove them.
+
+    Parameters
+    ----------
+    system : ErrorSystem
+    method : {"paper", "perron", "lmi", "full", "best"}
+        ``paper`` searches nothing; ``best`` everything.
+    clocks : sequence of float
+        Values of the stretched clock at which the bound should be small; the largest useful rate is taken besides.
+    at : float, optional
+        One more such value.
+
+    Returns
+    -------
+    Sharpening
+    """
+    if method == "paper" or not system.nodes:
+        return Sharpening()
+    candidates: list[Candidate] = []
+    notes: list[str] = []
+    limit = None
+    wanted = [*clocks] if at is None else [*clocks, at]
+    with np.errstate(all="ignore"):
+        for kind in ("perron", "lmi", "full"):
+            if method not in (kind, "best"):
+                continue
+            try:
+                if kind == "lmi":
+                    found, limit = _lmi_candidates(system, method == "lmi")
+                else:
+                    found = _perron_candidates(system) if kind == "perron" else _full_candidates(system)
+            except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+                notes.append(f"class {kind}: {error}")
+                continue
+            candidates += [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+        proved = []
+        for candidate in choose(candidates, wanted):
+            member = prove_member(system, candidate)
+            if member is None:
+                notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
+            else:
+                proved.append(member)
+    tried: dict[str, float] = {}
+    for c in candidates:
+        tried[c.kind] = max(tried.get(c.kind, -math.inf), c.rate)
+    return Sharpening(tuple(proved), tried, limit, tuple(notes))
+
+
+def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
+    """Return the best candidate at each clock value, the fastest of a useful prefactor, and the fastest diagonal one.
+
+    Examples
+    --------
+    >>> slow, fast = Candidate("perron", 1.0, 1.0), Candidate("full", 2.0, 100.0)
+    >>> [c.kind for c in choose([slow, fast], [1.0])]
+    ['perron', 'full']
+    """
+    if not candidates:
+        return []
+    chosen = [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
+    useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
+    chosen.append(max(useful, key=lambda c: c.rate) if useful else min(candidates, key=lambda c: c.condition))
+    diagonal = [c for c in candidates if c.kind in DIAGONAL]
+    if diagonal:
+        chosen.append(max(diagonal, key=lambda c: c.rate))
+    distinct: list[Candidate] = []
+    for candidate in chosen:
+        if not any(candidate is other for other in distinct):
+            distinct.append(candidate)
+    return sorted(distinct, key=lambda c: c.rate)
+
+
+def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
+    """Round a candidate to rationals and prove its rate and prefactor in exact arithmetic; None if a step fails."""
+    n = len(system.nodes)
+    kernel = "" if system.basis is None else " on the range of L"
+    if candidate.log_weights is not None:
+        weights = rounded_diagonal(candidate.log_weights, BITS)
+        if min(weights) <= 0:
+            return None
+        rate = system.prove_rate(diagonal_matrix(weights), candidate.rate)
+        if rate is None:
+            return None
+        statement = f"P L + L' P - b P > 0{kernel}, P diagonal on the rows of E that move"
+        proved = Obligation("rate", statement, "Lyapunov decrease", {"b": rate})
+        return SharpMember(candidate.kind, system.nodes, weights, None, rate, min(weights), max(weights), (proved,))
+    assert candidate.matrix is not None
+    P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
+    rate = system.prove_rate(P, candidate.rate)
+    if rate is None:
+        return None
+    size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
+    identity = diagonal_matrix([Fraction(1)] * n)
+    lowest = prove_generalized_margin(P, identity, float(size[0]))
+    negated = prove_generalized_margin([[-x for x in row] for row in P], identity, -float(size[-1]))
+    if lowest is None or lowest <= 0 or negated is None:
+        return None
+    obligations = (
+        Obligation(
+            "rate", f"P L + L' P - b P > 0{kernel}, P on the rows of E that move", "Lyapunov decrease", {"b": rate}
+        ),
+        Obligation(
+            "prefactor", "lowest I < P < highest I", "Rayleigh quotient", {"lowest": lowest, "highest": -negated}
+        ),
+    )
+    return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, obligations)
+
+
+# ---------------------------------------------------------------------- classes
+
+
+def _perron_candidates(system: ErrorSystem) -> list[Candidate]:
+    """Perron vectors of every leader group and of the followers, coupled at several losses."""
+    A, basis = system.matrix, system.basis
+    log_weights = np.zeros(len(A))
+    for rows, component in zip(system.parts, system.leaders, strict=False):
+        graph = system.structure.graph.subgraph(component.nodes)
+        p = np.log(left_vector(graph))
+        log_weights[rows] = p - p.max()
+    found: list[Candidate] = []
+    followers = system.parts[-1] if len(system.parts) > len(system.leaders) else None
+    for largest in (None, 1e6, 1e3, 30.0) if followers is not None else (None,):
+        if followers is not None:
+            block = A[np.ix_(followers, followers)]
+            try:
+                log_weights[followers] = lmi.h_matrix_certificate(block, max_condition=largest).log_omega
+            except LMIError:
+                continue
+        found += _coupled("perron", A, system.parts, log_weights, basis)
+    return found
+
+
+def _lmi_candidates(system: ErrorSystem, thorough: bool) -> tuple[list[Candidate], float]:
+    """Return the best diagonal matrix, its blocks coupled at several losses, if ``thorough`` the whole frontier."""
+    A, basis = system.matrix, system.basis
+    best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
+    found = [_diagonal("lmi", best)]
+    parts = lmi.irreducible_blocks(A)
+    if len(parts) > 1:
+        found += _coupled("lmi", A, parts, best.log_omega, basis)
+    if thorough:
+        found += [_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis)]
+    elif best.condition > _LARGE:  # nearly as fast at a prefactor of use, as a rule
+        with contextlib.suppress(lmi.NoCertificate):
+            found.append(
+                _diagonal(
+                    "lmi", lmi.diagonal_lyapunov(A, objective="rate", max_condition=LARGEST_PREFACTOR, basis=basis)
+                )
+            )
+    return found, best.upper
+
+
+def _full_candidates(system: ErrorSystem) -> list[Candidate]:
+    A, U = system.matrix, system.basis
+    spectral = laplacian_spectrum(system.structure).spectral_rate
+    reduced = A if U is None else U.T @ A @ U
+    found = []
+    for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2):
+        P = member.matrix
+        if U is not None:  # beyond the subspace anything between the extremes will do
+            P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)
+        found.append(Candidate("full", member.rate, member.condition, matrix=P))
+    return found
+
+
+def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:
+    return Candidate(kind, found.rate, found.condition, log_weights=found.log_omega)
+
+
+def _coupled(
+    kind: str, A: np.ndarray, parts: Sequence[np.ndarray], log_weights: np.ndarray, basis: np.ndarray | None
+) -> list[Candidate]:
+    """Couple blocks at several rates below the slowest of them."""
+    rates = []
+    for part in parts:
+        own = None if basis is None else basis[part]
+        if own is not None:
+            own = own[:, np.abs(own).max(axis=0) > 0]
+        rates.append(lmi.diagonal_rate(A[np.ix_(part, part)], log_weights[part], own))
+    slowest = min(rates)
+    if not slowest > 0:
+        raise lmi.NoCertificate(f"the slowest block decays at {slowest:.3g}, which is not positive")
+    if len(parts) == 1:
+        return [_diagonal(kind, lmi.DiagonalCertificate(log_weights - log_weights.max(), slowest))]
+    found = []
+    for loss in _COUPLING_LOSSES:
+        try:
+            coupled = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
+            rate = lmi.diagonal_rate(A, coupled, basis)
+        except lmi.NoCertificate:
+            continue
+        if rate > 0:
+            found.append(_diagonal(kind, lmi.DiagonalCertificate(coupled, rate)))
+    return found
