@@ -264,11 +264,7 @@ class Envelope:
     def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``."""
         clock = np.asarray(clock, dtype=float)
-        x0 = np.asarray(x0, dtype=float)
-        bounds = [
-            np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)) / m.lowest) * _decay(m.rate, clock)
-            for m in self._in_norm
-        ]
+        bounds = [self._start(m, x0) / math.sqrt(m.lowest) * _decay(m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
     def distance(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
@@ -297,11 +293,21 @@ class Envelope:
         bounds = []
         for m in self.members:
             if m.distance is not None:
-                start = float(np.sqrt(m.value(m.coordinates_of(x0, self._laplacian)))) * (1 + 1e-12)
-                bounds.append(np.multiply.outer(np.sqrt(constants(m.distance)) * start, _decay(m.rate, clock)))
+                start = np.sqrt(constants(m.distance)) * self._start(m, x0) * (1 + 1e-12)
+                bounds.append(np.multiply.outer(start, _decay(m.rate, clock)))
         if bounds:
             return np.minimum.reduce(bounds)
         return np.full((len(x0), *clock.shape), np.inf)
+
+    def _start(self, member: Member, x0: np.ndarray) -> float:
+        """Return ``sqrt(V(0))``, squared in units of the start."""
+        x0 = np.asarray(x0, dtype=float)
+        unit = self._unit(x0)
+        return float(np.sqrt(member.value(member.coordinates_of(x0 / unit, self._laplacian)))) * unit
+
+    def _unit(self, x0: np.ndarray) -> float:
+        """Return the size of the start, in which squares neither overflow nor vanish."""
+        return float(np.abs(x0).max(initial=0.0)) or 1.0
 
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every member; see :class:`Comparison`.
@@ -363,7 +369,7 @@ class Envelope:
         worst, matrix = 0.0, influence(self.structure)
         for column in range(states.shape[1]):
             x = states[:, column]
-            size = float(np.abs(x[:, 0]).max()) or 1.0
+            size = self._unit(x[:, 0])
             bounds, start = self._distance_bounds(trajectory, x / size, size)
             final, _ = matrix.apply([Fraction(float(v)) for v in start])
             gap = np.abs(x / size - np.array([float(v) for v in final])[:, None])

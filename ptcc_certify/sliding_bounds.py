@@ -152,7 +152,8 @@ class SlidingEnvelope(Envelope):
         x, y = trajectory.states / own, (trajectory.states - trajectory.sigma) / own
         size = max(float(np.abs(part).max()) for part in (x, y))
         v, sliding = self._bounds(member, x[:, 0], own, self._z(trajectory), trajectory.clock)
-        unit = float((v + sliding).max()) or 1.0
+        total = v + sliding
+        unit = float(total[total < 1e200].max(initial=0.0)) or 1.0  # where only growth is bounded, it ends in infinity
         floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
         return [
             History(np.sqrt(member.value(member.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)

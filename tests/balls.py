@@ -46,3 +46,19 @@ def value(graph: SignedDigraph, V: LyapunovFunction, gauge: Sequence[int] | None
         mean /= sum(weights, flint.arb(0))
         z = [x - int(g) * mean for g, x in zip(gauge, X, strict=True)]
     return sum((w * y * y for w, y in zip(weights, z, strict=True)), flint.arb(0))
+
+
+def form_value(
+    graph: SignedDigraph,
+    nodes: Sequence[int],
+    diagonal: Sequence[Fraction] | None,
+    matrix: Sequence[Sequence[Fraction]] | None,
+    X: Sequence[flint.arb],
+) -> flint.arb:
+    """``E' P E`` of a state on the rows ``nodes`` of ``E = -L X``."""
+    L = graph.exact_laplacian()
+    E = [-sum((ball(L[i][j]) * X[j] for j in range(len(X)) if L[i][j]), flint.arb(0)) for i in nodes]
+    if diagonal is not None:
+        return sum((ball(w) * e * e for w, e in zip(diagonal, E, strict=True)), flint.arb(0))
+    moved = rational_matrix(matrix or []) * flint.arb_mat([[e] for e in E])
+    return sum((e * moved[i, 0] for i, e in enumerate(E)), flint.arb(0))

@@ -100,7 +100,7 @@ def test_lemma_4_every_h_matrix_has_a_diagonal_lyapunov_matrix(seed, n):
     S = np.diag(found.omega) @ A
     assert found.omega.min() > 0
     assert found.omega.max() == 1
-    assert np.linalg.eigvalsh(S + S.T)[0] == pytest.approx(found.margin, rel=1e-9)
+    assert np.linalg.eigvalsh(S + S.T)[0] == pytest.approx(found.rate, rel=1e-9)
     assert 0 < found.rate <= 2 * np.linalg.eigvals(A).real.min() * (1 + 1e-9)
 
 
@@ -140,7 +140,7 @@ def test_weak_duality_bounds_the_search(seed, n):
     Y = rng.normal(size=(n, n))
     X = Y @ Y.T
     X /= np.trace(X)
-    assert lmi.diagonal_lyapunov(A).margin <= np.maximum(0, 2 * np.diag(A @ X)).sum() * (1 + 1e-7) + 1e-9
+    assert lmi.diagonal_lyapunov(A).rate <= np.maximum(0, 2 * np.diag(A @ X)).sum() * (1 + 1e-7) + 1e-9
 
 
 def test_a_matrix_without_a_diagonal_lyapunov_matrix():
