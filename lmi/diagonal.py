@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
 #: Share of the smallest block rate that is given up when blocks are coupled.
-COUPLING_LOSS = 1e-6
+COUPLING_LOSS = 5e-7
 
 
 def diagonal_lyapunov(
@@ -53,7 +53,7 @@ def diagonal_lyapunov(
     which is what ``V = x' Omega x`` really decays by; quasiconcave, so with ``b`` from the last ``Omega_0`` the program
     ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0`` climbs superlinearly. The optimum over a reducible matrix
     is the smallest of its irreducible blocks, reached in the limit of large condition: blocks are searched by
-    themselves and coupled at a loss of 1e-6.
+    themselves and coupled at a loss of 5e-7.
 
     A diagonal Lyapunov matrix exists for every nonsingular H-matrix with positive diagonal (Lemma 4) and for the
     Laplacian of every strongly connected structurally unbalanced signed digraph (Lemma 3.2), but the function takes

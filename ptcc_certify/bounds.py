@@ -280,11 +280,11 @@ class Envelope:
         (N, M) array or (N,) array
             Infinite where nothing was proved.
         """
-        return self._distances(clock, x0, lambda d: np.array([float_above(c) for c in d.agents]))
+        return self._distances(clock, x0, lambda d: d.roots)
 
     def distance_norm(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
         """Bound of ``||x - Q x0||`` at clock values ``s`` from ``x0``; see :meth:`distance`."""
-        return self._distances(clock, x0, lambda d: np.array([float_above(d.norm)]))[0]
+        return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
 
     def _distances(
         self, clock: np.ndarray | float, x0: np.ndarray, constants: Callable[[DistanceBound], np.ndarray]
@@ -293,17 +293,20 @@ class Envelope:
         bounds = []
         for m in self.members:
             if m.distance is not None:
-                start = np.sqrt(constants(m.distance)) * self._start(m, x0) * (1 + 1e-12)
-                bounds.append(np.multiply.outer(start, _decay(m.rate, clock)))
+                start = self._start(m, x0)
+                size = constants(m.distance) * start * (1 + 1e-12) if start else 0.0 * constants(m.distance)
+                bounds.append(np.multiply.outer(np.nan_to_num(size), _decay(m.rate, clock)))
         if bounds:
             return np.minimum.reduce(bounds)
         return np.full((len(x0), *clock.shape), np.inf)
 
     def _start(self, member: Member, x0: np.ndarray) -> float:
-        """Return ``sqrt(V(0))``, squared in units of the start."""
+        """Return ``sqrt(V(0))``; nothing is squared that could leave float64."""
         x0 = np.asarray(x0, dtype=float)
         unit = self._unit(x0)
-        return float(np.sqrt(member.value(member.coordinates_of(x0 / unit, self._laplacian)))) * unit
+        z = member.coordinates_of(x0 / unit, self._laplacian)
+        own = float(np.abs(z).max(initial=0.0)) or 1.0
+        return float(np.sqrt(member.value(z / own))) * own * unit
 
     def _unit(self, x0: np.ndarray) -> float:
         """Return the size of the start, in which squares neither overflow nor vanish."""

@@ -19,6 +19,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.structure import Structure
 
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Bits of the balls, doubled until the constants are sharp.
 _BITS, _MOST_BITS = 256, 4096
+#: Bits of the constants that are kept.
+_KEPT_BITS = 40
 #: The largest eigenvalue is bounded by ``(tr C^(2^k))^(1/2^k)``, at most ``N^(1/2^k)`` too large.
 _SQUARINGS = 9
 
@@ -43,6 +47,34 @@ class DistanceBound:
 
     agents: tuple[Fraction, ...]
     norm: Fraction
+
+    @cached_property
+    def roots(self) -> np.ndarray:
+        """``sqrt(agents)`` (N,), rounded up."""
+        return np.array([root_above(c) for c in self.agents])
+
+    @cached_property
+    def norm_root(self) -> float:
+        """``sqrt(norm)``, rounded up."""
+        return root_above(self.norm)
+
+
+def root_above(value: Fraction) -> float:
+    """Return a float that is not below the square root of a nonnegative rational of any size.
+
+    Examples
+    --------
+    >>> root_above(Fraction(10) ** 500) >= 1e250, root_above(Fraction(0))
+    (True, 0.0)
+    """
+    if value == 0:
+        return 0.0
+    shift = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    root = math.sqrt(float(value * Fraction(4) ** -shift)) * (1 + 1e-15)
+    try:
+        return math.nextafter(math.ldexp(root, shift), math.inf)
+    except OverflowError:
+        return math.inf
 
 
 class OutcomeGeometry:
@@ -130,7 +162,7 @@ class OutcomeGeometry:
             if not _sharp(C[i, i]):
                 return None
             agents.append(_above(C[i, i]))
-        return DistanceBound(tuple(agents), _largest_eigenvalue(C, min(sum(agents, Fraction(0)), Fraction(10**300))))
+        return DistanceBound(tuple(agents), _largest_eigenvalue(C, sum(agents, Fraction(0))))
 
     @cached_property
     def _projection(self) -> list[list[Fraction]]:
@@ -185,14 +217,17 @@ def _ball(x: Fraction | int) -> flint.arb:
 
 
 def _sharp(x: Any) -> bool:
-    """Tell whether a ball is known to seven digits, or is 0 for all that matters."""
-    return bool(x.is_finite()) and (x.rel_accuracy_bits() > 24 or bool(abs(x) < 1e-250))
+    """Tell whether a ball is known to seven digits, or is 0."""
+    return bool(x.is_finite()) and (x.rel_accuracy_bits() > 24 or x == 0)
 
 
 def _above(x: Any) -> Fraction:
     """Return a short rational that is not below any number of the ball."""
-    upper = math.nextafter(float(x.upper()), math.inf)
-    return Fraction(max(upper, 0.0)) if math.isfinite(upper) else Fraction(10**308)
+    mantissa, exponent = (int(part) for part in x.upper().man_exp())
+    if mantissa <= 0:
+        return Fraction(0)
+    short = max(mantissa.bit_length() - _KEPT_BITS, 0)
+    return Fraction(-(-mantissa >> short)) * Fraction(2) ** (exponent + short)
 
 
 def _largest_eigenvalue(C: Any, fallback: Fraction) -> Fraction:

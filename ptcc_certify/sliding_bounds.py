@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member, float_above
+from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.reaching import LAST_Z, ReachingTime, sliding_bound
@@ -237,9 +237,8 @@ class SlidingEnvelope(Envelope):
             if member.distance is None:
                 continue
             v = self._bounds(member, x0, unit, z, clock)[0]
-            agents = np.sqrt([float_above(c) for c in member.distance.agents])
-            bounds = np.minimum(bounds, np.multiply.outer(agents, v))
-            norm = np.minimum(norm, math.sqrt(float_above(member.distance.norm)) * v)
+            bounds = np.minimum(bounds, np.multiply.outer(member.distance.roots, v))
+            norm = np.minimum(norm, member.distance.norm_root * v)
         size = sliding_bound(self.protocol, self.sigma0, z) / unit
         return bounds + size, norm + np.linalg.norm(size, axis=0)
 

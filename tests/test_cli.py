@@ -175,7 +175,7 @@ def test_a_violated_bound_is_1(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: pytest.MonkeyPatch):
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise RuntimeError("a bug")
 
     monkeypatch.setattr("ptcc_certify.certificate.certify", fail)
@@ -183,7 +183,9 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
     assert run.code == 70
     assert "RuntimeError" in run.err and "report" in run.err and run.out == ""
     for error, code in ((MemoryError(), 2), (OverflowError(), 2), (KeyboardInterrupt(), 130)):
-        monkeypatch.setattr("ptcc_certify.certificate.certify", lambda *_, error=error: (_ for _ in ()).throw(error))
+        monkeypatch.setattr(
+            "ptcc_certify.certificate.certify", lambda *_, error=error, **__: (_ for _ in ()).throw(error)
+        )
         run = ptcc("certify", "fig1b")
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
