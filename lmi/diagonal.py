@@ -20,6 +20,7 @@ from lmi.closed_form import h_matrix_diagonal, perron_certificate
 from lmi.coupling import couple_blocks
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact import no_diagonal_rate_above, round_to_bits
+from lmi.interior_point import maximise_margin
 from lmi.matrices import irreducible_blocks, square
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
+#: Up to this many rows Clarabel climbs to the best rate; above, and on a subspace, :mod:`lmi.interior_point` does.
+CLARABEL_ROWS = 20
 #: Share of the smallest block rate that is given up when blocks are coupled.
 COUPLING_LOSS = 5e-7
 
@@ -170,11 +173,14 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
     frame, found = _climb(A, None, basis, tolerance)
     if not found.rate > 0:
         return found
+    # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
+    attempts = [(frame, tolerance), (_balanced(A), tolerance / 100), (frame, tolerance / 100)]
+    attempts.append((found.log_omega, tolerance / 100))
     for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
-        for log_omega in (frame, found.log_omega):
-            Y = _dual_factor(A, log_omega, found.rate * (1 + excess), basis, tolerance)
-            if Y is not None and (upper := diagonal_rate_limit(A, Y)) < found.upper:
-                found = replace(found, upper=max(upper, found.rate), witness=(Y,))
+        for log_omega, accuracy in attempts:
+            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy):
+                if (upper := diagonal_rate_limit(A, Y)) < found.upper:
+                    found = replace(found, upper=max(upper, found.rate), witness=(Y,))
             if found.gap <= 1.5 * excess:
                 return found
     return found
@@ -206,12 +212,7 @@ def _climb(
 
 def _start(A: np.ndarray, basis: np.ndarray | None, max_condition: float | None) -> tuple[np.ndarray, float]:
     """Return the better of the identity, a balanced scaling and the Perron vectors of ``M(A)``, with its rate."""
-    from scipy.linalg import matrix_balance
-
-    candidates = [np.zeros(len(A))]
-    with np.errstate(all="ignore"):
-        scale = matrix_balance(A, permute=False, separate=True)[1][0]
-        candidates.append(-2 * np.log(scale))
+    candidates = [np.zeros(len(A)), _balanced(A)]
     with contextlib.suppress(LMIError, np.linalg.LinAlgError):
         candidates.append(perron_certificate(A).log_omega)
     rated = []
@@ -227,6 +228,15 @@ def _start(A: np.ndarray, basis: np.ndarray | None, max_condition: float | None)
     if not rated:
         raise NoCertificate("the entries lie too far apart for floating point")
     return max(rated, key=lambda pair: pair[1])
+
+
+def _balanced(A: np.ndarray) -> np.ndarray:
+    """Return ``log_omega`` with which the rows and columns of ``Omega^1/2 A Omega^-1/2`` have norms of a size."""
+    from scipy.linalg import matrix_balance
+
+    with np.errstate(all="ignore"):
+        log_omega = -2 * np.log(matrix_balance(A, permute=False, separate=True)[1][0])
+    return log_omega - log_omega.max()
 
 
 def _step(
@@ -255,6 +265,11 @@ def _step(
     if basis is not None:
         tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * basis)[0]
 
+    if n > CLARABEL_ROWS or tail is not None:
+        C = S - np.diag(b / 2 * square_unit)
+        found = maximise_margin(C, weight, tail, tolerance, np.exp(frame), max_condition)
+        return found.omega, unit[:, None] * _dual_rows(found.X, tail)
+
     def problem(cp: Any) -> tuple[cp.Problem, cp.Expression]:
         omega, t = cp.Variable(n), cp.Variable()
         form = _symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
@@ -269,24 +284,39 @@ def _step(
         return cp.Problem(cp.Maximize(t), constraints), cp.hstack([omega, t])
 
     solution = _solve(problem, tolerance, dual=True)
-    assert isinstance(solution, tuple)
-    # The dual is factored before it is scaled: afterwards its small rows would be lost.
-    values, vectors = np.linalg.eigh((solution[1] + solution[1].T) / 2)
+    return solution[0][:n], unit[:, None] * _dual_rows(solution[1], tail)
+
+
+def _dual_rows(X: np.ndarray, tail: np.ndarray | None) -> np.ndarray:
+    """Factor the dual matrix before it is scaled: afterwards its small rows would be lost."""
+    values, vectors = np.linalg.eigh((X + X.T) / 2)
     factor = vectors * np.sqrt(np.maximum(values, 0.0))
-    return solution[0][:n], unit[:, None] * (factor if tail is None else tail @ factor)
+    return factor if tail is None else tail @ factor
 
 
-def _dual_factor(
+def _dual_factors(
     A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float
-) -> np.ndarray | None:
-    """Return ``Y`` such that ``X = Y Y'`` should show that no diagonal rate exceeds ``b``; in the original rows."""
+) -> list[np.ndarray]:
+    """Return matrices ``Y`` such that ``X = Y Y'`` may show that no diagonal rate exceeds ``b``; in the original rows.
+
+    Rows in which the solver left noise are cleared at several levels: a row of zeros meets its condition.
+    """
     try:
-        _, factor = _step(A, frame, frame, b, basis, None, tolerance)
+        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance)
     except NoCertificate:
-        return None
-    Y = np.exp(-frame / 2)[:, None] * factor
-    top = np.abs(Y).max(initial=0.0)
-    return Y / top if top > 0 and math.isfinite(top) else None
+        return []
+    unit = np.sqrt(np.diag(scaled(A, frame))) if (np.diag(A) > 0).all() else np.ones(len(A))
+    size = np.einsum("ij,ij->i", scaled_factor, scaled_factor) * unit**2  # of X in the solver's own rows
+    found: list[np.ndarray] = []
+    for noise in (0.0, 1e-14, 1e-12, 1e-10, 1e-8) if basis is None else (0.0,):
+        kept = size > noise * size.max()
+        if found and kept.all():
+            continue
+        Y = np.where(kept[:, None], np.exp(-frame / 2)[:, None] * scaled_factor, 0.0)
+        top = np.abs(Y).max(initial=0.0)
+        if top > 0 and math.isfinite(top):
+            found.append(Y / top)
+    return found
 
 
 def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
@@ -360,16 +390,17 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
         log_omega, _ = _start(A, None, None)
     except NoCertificate:
         return None
-    for flat in (np.zeros(len(A)), log_omega):
-        Y = _dual_factor(A, flat, rate, None, tolerance)
-        if Y is None:
-            continue
-        # Columns by size: small ones carry the solver's noise, and the sum often passes without them.
-        order = np.argsort(-np.einsum("ij,ij->j", Y, Y))
-        for count in sorted({len(order), 1, 2}):
-            rows = [[round_to_bits(float(x), 40) for x in row] for row in Y[:, order[:count]]]
-            if no_diagonal_rate_above(exact, rows, Fraction(rate)):
-                return rows
+    attempts = [(np.zeros(len(A)), tolerance), (log_omega, tolerance), (_balanced(A), tolerance / 100)]
+    for frame, accuracy in attempts:
+        for Y in _dual_factors(A, frame, rate, None, accuracy):
+            # Columns by size: small ones carry the solver's noise, and the sum often passes without them.
+            order = np.argsort(-np.einsum("ij,ij->j", Y, Y))
+            for count in sorted({len(order), 1, 2}):
+                if diagonal_rate_limit(A, chosen := Y[:, order[:count]]) > rate + 1e-3 * abs(rate) + 1e-12:
+                    continue
+                rows = [[round_to_bits(float(x), 40) for x in row] for row in chosen]
+                if no_diagonal_rate_above(exact, rows, Fraction(rate)):
+                    return rows
     return None
 
 

@@ -97,7 +97,7 @@ class Sharpening:
     members : tuple of SharpMember
         Proved.
     tried : dict of str to float
-        Largest rate found of each class, in floating point.
+        Largest rate found of each class at any prefactor, in floating point.
     diagonal_limit : float or None
         No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
     notes : tuple of str
@@ -131,6 +131,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
         return Sharpening()
     candidates: list[Candidate] = []
     notes: list[str] = []
+    tried: dict[str, float] = {}
     limit = None
     wanted = [*clocks] if at is None else [*clocks, at]
     with np.errstate(all="ignore"):
@@ -145,6 +146,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
             except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
                 notes.append(f"class {kind}: {error}")
                 continue
+            tried[kind] = max(c.rate for c in found)
             candidates += [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
         proved = []
         for candidate in choose(candidates, wanted):
@@ -153,9 +155,6 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
             else:
                 proved.append(member)
-    tried: dict[str, float] = {}
-    for c in candidates:
-        tried[c.kind] = max(tried.get(c.kind, -math.inf), c.rate)
     return Sharpening(tuple(proved), tried, limit, tuple(notes))
 
 

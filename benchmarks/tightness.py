@@ -1,0 +1,313 @@
+"""How near the certified rates come to the best possible one, and the bounds to the true norm, class by class.
+
+    OPENBLAS_NUM_THREADS=1 python benchmarks/tightness.py [--per-case 10] [--jobs 2] [--real FOLDER] [--output FILE]
+
+An ensemble of random signed digraphs (generator and seeds below), and the real graphs of a folder if it is given. For
+each class of Lyapunov functions: the tightness of the proved rate, and the proved bound of ``||E(t)|| / ||E(0)||`` over
+``||exp(-L s)||`` on the range of ``L``, from ball arithmetic. Every bound is compared with that norm, and the distance
+of every agent to its outcome with its own bound, from a random start.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import flint
+import numpy as np
+
+from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
+from ptcc_certify.bounds import Member
+from ptcc_certify.error_system import ErrorSystem
+from ptcc_certify.sharpen import LARGEST_PREFACTOR, sharpen
+
+CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
+DECADES = (1, 6)
+NEGATIVE = (0.3, 0.5)
+CLASSES = ("paper", "perron", "lmi", "full", "best")
+INSTANTS = (0.5, 0.9, 0.99)
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+SMALLEST, LARGEST = 3, 60
+
+
+# ---------------------------------------------------------------------- the ensemble
+
+
+def ensemble(per_case: int) -> list[tuple[str, int, int, float]]:
+    """Case, seed, decades of weight, share of negative edges; the seed alone determines the graph of a case."""
+    return [
+        (case, 1_000_000 * c + 10_000 * d + 1_000 * n + k, DECADES[d], NEGATIVE[n])
+        for c, case in enumerate(CASES)
+        for d in range(len(DECADES))
+        for n in range(len(NEGATIVE))
+        for k in range(per_case)
+    ]
+
+
+def make(case: str, seed: int, decades: int, negative: float) -> SignedDigraph:
+    """Draw a graph: N = 3..60, in-degree 1 to 4, weights log-uniform over the decades to three digits."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(SMALLEST, LARGEST + 1))
+    groups = leader_groups(case, size, rng)
+    edges: dict[tuple[int, int], int] = {}
+    node = 0
+    leaders: list[list[int]] = []
+    for count, balanced in groups:
+        nodes = list(range(node, node + count))
+        edges.update(strong(nodes, balanced, negative, rng))
+        leaders.append(nodes)
+        node += count
+    known = [v for nodes in leaders for v in nodes]
+    followers = list(range(node, size))
+    for i, v in enumerate(followers):
+        # The first follower listens to every group, so that the graph is weakly connected.
+        sources = {int(rng.choice(nodes)) for nodes in leaders} if i == 0 else {int(rng.choice(known))}
+        others = [u for u in range(size) if u != v]
+        wanted = int(rng.integers(1, 5))
+        while len(sources) < min(wanted, len(others)):
+            sources.add(int(rng.choice(others)))
+        edges.update({(u, v): -1 if rng.random() < negative else 1 for u in sources})
+        known.append(v)
+    rows = [(u, v, weight(sign, decades, rng)) for (u, v), sign in sorted(edges.items())]
+    return SignedDigraph.from_edges(rows)
+
+
+def leader_groups(case: str, size: int, rng: np.random.Generator) -> list[tuple[int, bool]]:
+    """Sizes and balance of the closed components of a case."""
+    if case in ("1.1", "1.2"):
+        return [(size, case == "1.1")]
+    if case == "2.1 one leader":
+        return [(1, True)]
+    if case in ("2.1 several", "2.2"):
+        return [(int(rng.integers(2, max(size // 2, 2) + 1)), case != "2.2")]
+    if case == "3.1 single leaders":
+        return [(1, True)] * int(rng.integers(2, min(4, size - 1) + 1))
+    few = 2 if size >= 5 else 1
+    share = max(size // 3, few)
+    if case == "3.1 mixed":  # one balanced group, one of any kind
+        other = bool(rng.random() < 0.5)
+        first = int(rng.integers(1, share + 1))
+        return [(first, True), (max(int(rng.integers(1, share + 1)), 1 if other else 2), other)]
+    return [(max(int(rng.integers(2, share + 1)), 2) if share > 2 else 2, False) for _ in range(2)]
+
+
+def strong(nodes: list[int], balanced: bool, negative: float, rng: np.random.Generator) -> dict[tuple[int, int], int]:
+    """A ring and random in-edges up to in-degree 1 to 4, with signs; keys are (source, target)."""
+    if len(nodes) == 1:
+        return {}
+    ring = [int(v) for v in rng.permutation(nodes)]
+    pairs = {(ring[i - 1], ring[i]) for i in range(len(ring))}
+    for v in nodes:
+        wanted = int(rng.integers(1, 5))
+        for u in rng.choice(nodes, size=min(wanted, len(nodes)), replace=False)[: wanted - 1]:
+            if int(u) != v:
+                pairs.add((int(u), v))
+    if balanced:
+        # Camps of such sizes that the share of edges between them is the wanted one.
+        share = (1 - math.sqrt(1 - 2 * negative)) / 2
+        camp = {v: -1 if rng.random() < share else 1 for v in nodes}
+        return {(u, v): camp[u] * camp[v] for u, v in sorted(pairs)}
+    signs = {pair: -1 if rng.random() < negative else 1 for pair in sorted(pairs)}
+    if analyse(SignedDigraph.from_edges([(u, v, s) for (u, v), s in signs.items()])).balanced:
+        first = next(iter(signs))  # every edge lies on a cycle: one sign more breaks the balance
+        signs[first] = -signs[first]
+    return signs
+
+
+def weight(sign: int, decades: int, rng: np.random.Generator) -> str:
+    return f"{sign * 10.0 ** rng.uniform(-decades / 2, decades / 2):.3g}"
+
+
+# ---------------------------------------------------------------------- one graph
+
+
+def ball(x: Fraction) -> flint.arb:
+    return flint.arb(x.numerator) / flint.arb(x.denominator)
+
+
+def flow(system: ErrorSystem, clock: float) -> tuple[float, np.ndarray]:
+    """``||exp(-A s)||`` on the error's subspace, and ``exp(-L s)`` in balls rounded to floats."""
+    A = system.exact_matrix
+    K = system.exact_basis or [[Fraction(int(i == j)) for j in range(len(A))] for i in range(len(A))]
+    bits = 256
+    while True:
+        flint.ctx.prec = bits
+        power = (flint.arb_mat([[ball(x) for x in row] for row in A]) * -flint.arb(clock)).exp()
+        moved = power * flint.arb_mat([[ball(x) for x in row] for row in K])
+        largest = max((abs(x) for row in moved.tolist() for x in row), key=lambda x: float(x.mid()))
+        radius = max(float(x.rad()) for row in moved.tolist() for x in row)
+        if radius <= 1e-12 * float(largest.mid()):
+            break
+        bits *= 2
+        if bits > 20_000:
+            raise ArithmeticError("the exponential is not resolved")
+    F = np.array([[float(x.mid()) for x in row] for row in moved.tolist()])
+    R = np.linalg.qr(np.array([[float(x) for x in row] for row in K]), mode="r")
+    return float(np.linalg.norm(np.linalg.solve(R.T, F.T), 2)), F
+
+
+def distances(graph: SignedDigraph, x0: list[Fraction], final: list[Fraction], clock: float) -> np.ndarray:
+    """``|x_k - outcome_k|`` at a value of the clock, from balls."""
+    flint.ctx.prec = 2048
+    L = flint.arb_mat([[ball(x) for x in row] for row in graph.exact_laplacian()])
+    X = (L * -flint.arb(clock)).exp() * flint.arb_mat([[ball(x)] for x in x0])
+    return np.array([float(abs(X[k, 0] - ball(final[k])).lower()) for k in range(len(x0))])
+
+
+def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
+    """Everything the table needs about one graph."""
+    structure = analyse(graph)
+    clocks = [float(PROTOCOL.gain.clock_at_remaining(1 - fraction)) for fraction in INSTANTS]
+    rng = np.random.default_rng(len(graph.labels))
+    x0 = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
+    started = time.perf_counter()
+    best = certify(graph, PROTOCOL, x0, simulation=False)
+    seconds = time.perf_counter() - started
+    if best.constant or best.spectral_rate is None:
+        return {"name": name, "n": graph.n_nodes, "skipped": "nothing decays or no spectral rate"}
+    system, spectral = ErrorSystem(structure), best.spectral_rate
+    norms = [flow(system, s)[0] for s in clocks]
+    found = {kind: sharpen(system, kind, clocks) for kind in ("perron", "lmi", "full")}
+    paper = [m for m in best.envelope.members if m.kind == "paper"]
+    members = {
+        "paper": paper,
+        **{kind: [Member.of_sharp(m) for m in sharpening.members] for kind, sharpening in found.items()},
+        "best": list(best.envelope.members),
+    }
+    result: dict[str, Any] = {"name": name, "n": graph.n_nodes, "spectral": spectral, "seconds": seconds}
+    result["verdict"] = best.verdict
+    result["notes"] = [note for note in best.notes if "class" in note]
+    worst, agents = 0.0, 0.0
+    for kind, own in members.items():
+        in_error = [m for m in own if m.coordinates == "E"]
+        rates = [m.rate for m in own]
+        useful = [m.rate for m in own if m.prefactor <= LARGEST_PREFACTOR]
+        bounds = [
+            min((0.5 * math.log(m.prefactor) - m.rate * s / 2 for m in in_error), default=math.inf) for s in clocks
+        ]
+        result[kind] = {
+            "tightness": max(rates, default=0.0) / spectral,
+            "useful": max([0.0, *useful]) / spectral,
+            "over": [math.exp(min(b - math.log(v), 700.0)) for b, v in zip(bounds, norms, strict=True)],
+        }
+        for m in in_error:
+            for s, v in zip(clocks, norms, strict=True):
+                worst = max(worst, v / math.exp(0.5 * math.log(m.prefactor) - m.rate * s / 2) if v > 1e-290 else 0.0)
+    if best.outcome is not None:
+        bound = best.outcome_distance([1 - fraction for fraction in INSTANTS])
+        final = [Fraction(x) for x in best.outcome.final_state]
+        for column, s in enumerate(clocks):
+            if bound[:, column].min() > 1e-250:
+                agents = max(agents, float((distances(graph, x0, final, s) / bound[:, column]).max()))
+    result["worst"], result["agents"] = worst, agents
+    limit, reached = found["lmi"].diagonal_limit, found["lmi"].tried.get("lmi")
+    result["gap"] = None if limit is None or reached is None else limit / reached - 1
+    proved = [float(m.rate) for m in found["lmi"].members]
+    result["proved_of_limit"] = None if limit is None else max(proved, default=0.0) / limit
+    useful = [float(m.rate) for m in found["lmi"].members if m.prefactor <= LARGEST_PREFACTOR]
+    several = len(structure.closed_components) > 1 or structure.followers.size > 0
+    result["composite"] = max(useful, default=0.0) / limit if several and limit else None
+    result["undirected"] = structure.undirected
+    return result
+
+
+def work(task: tuple[str, Any]) -> dict[str, Any]:
+    name, what = task
+    graph = read_graph(what) if isinstance(what, str) else make(*what)
+    return examine(name, graph)
+
+
+# ---------------------------------------------------------------------- the table
+
+
+def quartiles(values: list[float]) -> str:
+    q = np.quantile(values, [0.25, 0.5, 0.75]) if values else [math.nan] * 3
+    return " ".join(f"{x:>9.4g}" for x in q)
+
+
+def report(results: list[dict[str, Any]], title: str) -> list[str]:
+    lines = [f"{title}: {len(results)} graphs, N = {min(r['n'] for r in results)}..{max(r['n'] for r in results)}", ""]
+    lines.append(f"{'quartiles':<10}{'tightness':^30}{'prefactor <= 1e6':^30}")
+    lines += [
+        f"{kind:<10}" + " ".join(quartiles([r[kind][what] for r in results]) for what in ("tightness", "useful"))
+        for kind in CLASSES
+    ]
+    lines += ["", f"{'bound / true norm':<18}" + "".join(f"{f'at {f:g} T':^30}" for f in INSTANTS)]
+    for kind in CLASSES:
+        own = [r for r in results if kind != "paper" or r["paper"]["over"][0] < 1e300]
+        columns = [quartiles([r[kind]["over"][i] for r in own]) for i in range(len(INSTANTS))]
+        lines.append(f"{kind:<18}" + " ".join(columns))
+    gaps = [r["gap"] for r in results if r["gap"] is not None]
+    proved = [r["proved_of_limit"] for r in results if r["proved_of_limit"] is not None]
+    composite = [r["composite"] for r in results if r["composite"] is not None]
+    lines += [
+        "",
+        f"best diagonal rate: dual gap at most 1e-4 on {sum(g <= 1e-4 for g in gaps)} of {len(results)}, "
+        f"median {np.median(gaps):.1e}, largest {max(gaps):.1e}",
+        f"proved share of the dual limit: quartiles {quartiles(proved)}, least {min(proved):.4g}",
+        f"composites, class lmi at prefactor <= 1e6 over the slowest block: quartiles {quartiles(composite)}",
+        f"worst true norm over a member's bound {max(r['worst'] for r in results):.9f}",
+        f"worst distance of an agent over its bound {max(r['agents'] for r in results):.9f}",
+        f"verdicts: {sum(r['verdict'] == 'certified' for r in results)} certified; "
+        f"notes: {sum(bool(r['notes']) for r in results)}; seconds of certify: quartiles "
+        f"{quartiles([r['seconds'] for r in results])}, longest {max(r['seconds'] for r in results):.1f}",
+        "",
+    ]
+    return lines
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--per-case", type=int, default=10, help="graphs per case, decades and share of negative edges")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--real", help="folder of edge lists, of which those up to 105 nodes are taken")
+    parser.add_argument("--output", help="write everything measured to this JSON file")
+    options = parser.parse_args()
+    tasks: list[tuple[str, Any]] = [
+        (f"{case} {seed}", (case, seed, d, f)) for case, seed, d, f in ensemble(options.per_case)
+    ]
+    if options.real:
+        for path in sorted(Path(options.real).glob("*.csv")):
+            if path.name != "regulatory_005.csv":  # has edges of unknown sign, which are refused
+                tasks.append((path.name, str(path)))
+    results = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for k, result in enumerate(pool.map(work, tasks, chunksize=1), start=1):
+            results.append(result)
+            if sys.stderr.isatty():
+                print(f"\r{k} of {len(tasks)}", end="", file=sys.stderr)
+    if options.output:
+        Path(options.output).write_text(json.dumps(results, indent=1), encoding="utf-8")
+    done = [r for r in results if "skipped" not in r]
+    drawn = [r for r in done if not r["name"].endswith(".csv")]
+    print("\n".join(report(drawn, "ensemble")))
+    for case in CASES:
+        own = [r for r in drawn if r["name"].startswith(case)]
+        medians = "  ".join(f"{kind} {np.median([r[kind]['tightness'] for r in own]):.3f}" for kind in CLASSES)
+        print(f"{case:<20} median tightness  {medians}")
+    for decades, at in zip(DECADES, range(len(DECADES)), strict=True):
+        own = [r for r in drawn if int(r["name"].split()[-1]) // 10_000 % 100 == at]
+        over = np.median([r["best"]["over"][1] for r in own])
+        print(
+            f"{decades} decade(s): median tightness lmi {np.median([r['lmi']['tightness'] for r in own]):.3f}, "
+            f"best {np.median([r['best']['tightness'] for r in own]):.3f}, bound / true norm at 0.9 T {over:.2f}"
+        )
+    if real := [r for r in done if r["name"].endswith(".csv")]:
+        print()
+        print("\n".join(report(real, "real graphs")))
+        for r in real:
+            row = "  ".join(f"{kind} {r[kind]['tightness']:.4f}" for kind in CLASSES)
+            print(
+                f"{r['name']:<24}N {r['n']:>3}  {row}  over at 0.9 T {r['best']['over'][1]:.2f}  {r['seconds']:.1f} s"
+            )
+
+
+if __name__ == "__main__":
+    main()
