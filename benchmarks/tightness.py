@@ -26,6 +26,7 @@ import numpy as np
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
 from ptcc_certify.bounds import Member
 from ptcc_certify.error_system import ErrorSystem
+from ptcc_certify.errors import PTCCError
 from ptcc_certify.sharpen import LARGEST_PREFACTOR, sharpen
 
 CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
@@ -220,8 +221,12 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
 
 def work(task: tuple[str, Any]) -> dict[str, Any]:
     name, what = task
-    graph = read_graph(what) if isinstance(what, str) else make(*what)
-    return examine(name, graph)
+    try:
+        graph = read_graph(what) if isinstance(what, str) else make(*what)
+    except PTCCError as error:
+        return {"name": name, "skipped": str(error)}
+    started = time.perf_counter()
+    return {**examine(name, graph), "measured": time.perf_counter() - started}
 
 
 # ---------------------------------------------------------------------- the table
@@ -274,9 +279,7 @@ def main() -> None:
         (f"{case} {seed}", (case, seed, d, f)) for case, seed, d, f in ensemble(options.per_case)
     ]
     if options.real:
-        for path in sorted(Path(options.real).glob("*.csv")):
-            if path.name != "regulatory_005.csv":  # has edges of unknown sign, which are refused
-                tasks.append((path.name, str(path)))
+        tasks += [(path.name, str(path)) for path in sorted(Path(options.real).glob("*.csv"))]
     results = []
     with ProcessPoolExecutor(options.jobs) as pool:
         for k, result in enumerate(pool.map(work, tasks, chunksize=1), start=1):
@@ -286,6 +289,9 @@ def main() -> None:
     if options.output:
         Path(options.output).write_text(json.dumps(results, indent=1), encoding="utf-8")
     done = [r for r in results if "skipped" not in r]
+    for r in results:
+        if "skipped" in r:
+            print(f"{r['name']}: {r['skipped']}")
     drawn = [r for r in done if not r["name"].endswith(".csv")]
     print("\n".join(report(drawn, "ensemble")))
     for case in CASES:

@@ -26,6 +26,7 @@ _EXPORTS = {
     "h_matrix_diagonal": "lmi.closed_form",
     "m_matrix_certificate": "lmi.closed_form",
     "perron_certificate": "lmi.closed_form",
+    "perron_vectors": "lmi.closed_form",
     "CoupledCertificate": "lmi.diagonal",
     "FixedLeader": "lmi.diagonal",
     "FreeLeader": "lmi.diagonal",

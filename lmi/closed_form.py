@@ -255,24 +255,52 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     (2.0, [0.333333333, 1.0])
     """
     A = _sparse(A)
-    M = _comparison(A)
-    if connected_components(M, connection="strong")[0] > 1:
-        raise NotAnHMatrix("the matrix is reducible")
-    rows = np.zeros(A.shape[0])
-    ratio, error = _ratios(M, rows)
-    if (np.abs(ratio) <= error).all():
-        log_u, log_v = rows, _log_left_vector(M)
-    else:
-        right, left = _Components(M, singular=True), _Components(M.T, singular=True)
-        if (value := min(right.high[0], left.high[0])) < 0:
-            raise NotAnHMatrix(f"M(A) is not an M-matrix: it has the eigenvalue {value:.6g}")
-        log_u, log_v = right.log_perron, left.log_perron
+    log_u, log_v = perron_vectors(A)
     log_omega = log_v - log_u
     log_omega -= log_omega.max()
     rate = _tight_rate(A, log_omega)
     if not rate > 0:
         raise NoCertificate("the Perron vectors give no rate above rounding; a balanced digraph has none")
     return DiagonalCertificate(log_omega, rate, witness=(log_u, log_v))
+
+
+def perron_vectors(A: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Logarithms of the right and left Perron vectors of ``M(A)``: eigenvectors of its smallest eigenvalue.
+
+    Where the rows of ``M(A)`` sum to 0, as for the Laplacian of a signed digraph, the right one is constant and the
+    left one is computed without subtractions.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+        Irreducible.
+
+    Returns
+    -------
+    tuple of two (n,) arrays
+
+    Raises
+    ------
+    NotAnHMatrix
+        ``A`` is reducible or ``M(A)`` is not an M-matrix.
+
+    Examples
+    --------
+    >>> u, v = perron_vectors([[3.0, 3.0], [1.0, 1.0]])
+    >>> u.tolist(), round(float(v[1] - v[0]), 9)
+    ([0.0, 0.0], 1.098612289)
+    """
+    M = _comparison(_sparse(A))
+    if connected_components(M, connection="strong")[0] > 1:
+        raise NotAnHMatrix("the matrix is reducible")
+    rows = np.zeros(M.shape[0])
+    ratio, error = _ratios(M, rows)
+    if (np.abs(ratio) <= error).all():
+        return rows, _log_left_vector(M)
+    right, left = _Components(M, singular=True), _Components(M.T, singular=True)
+    if (value := min(right.high[0], left.high[0])) < 0:
+        raise NotAnHMatrix(f"M(A) is not an M-matrix: it has the eigenvalue {value:.6g}")
+    return right.log_perron, left.log_perron
 
 
 class _Components:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
-from lmi.closed_form import h_matrix_diagonal, perron_certificate
+from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.coupling import couple_blocks
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact import no_diagonal_rate_above, round_to_bits
@@ -41,6 +41,7 @@ def diagonal_lyapunov(
     objective: str = "margin",
     max_condition: float | None = None,
     basis: Any = None,
+    start: Any = None,
     tolerance: float = 1e-9,
 ) -> DiagonalCertificate:
     """Find the diagonal ``Omega > 0`` of the best margin or of the best rate.
@@ -73,6 +74,9 @@ def diagonal_lyapunov(
         Largest ``max(omega) / min(omega)``, at least 1.
     basis : (n, r) array, optional
         Rate only: of an invariant subspace of ``A``, block by block; the inequality is asked for there only.
+    start : (n,) array, optional
+        Rate with ``max_condition`` only: logarithms of a diagonal from which to climb besides others, such as the
+        ``log_omega`` of a faster one.
     tolerance : float
         Relative gap asked of the solver.
 
@@ -113,9 +117,11 @@ def diagonal_lyapunov(
     if n == 0:
         raise MatrixError("A has no rows")
     if objective == "rate":
-        return _rate_optimum(A, max_condition, _basis(basis, n), tolerance)
-    if basis is not None:
-        raise MatrixError('basis belongs to objective="rate"')
+        if start is not None and np.shape(start) != (n,):
+            raise MatrixError(f"start has shape {np.shape(start)}, not {(n,)}")
+        return _rate_optimum(A, max_condition, _basis(basis, n), tolerance, start)
+    if basis is not None or start is not None:
+        raise MatrixError('basis and start belong to objective="rate"')
     if n == 1:
         return _margin_certificate(A, np.ones(1))
     scale, least = _scale(A), 0.0 if max_condition is None else 1 / max_condition
@@ -133,11 +139,19 @@ def diagonal_lyapunov(
 
 
 def _rate_optimum(
-    A: np.ndarray, max_condition: float | None, basis: np.ndarray | None, tolerance: float
+    A: np.ndarray,
+    max_condition: float | None,
+    basis: np.ndarray | None,
+    tolerance: float,
+    start: np.ndarray | None = None,
 ) -> DiagonalCertificate:
     """Search block by block where the matrix is reducible, otherwise at once."""
     if max_condition is not None:
-        _, found = _climb(A, max_condition, basis, tolerance)
+        known = None if start is None else np.asarray(start, dtype=float)
+        if known is None and len(irreducible_blocks(A)) > 1:
+            with contextlib.suppress(NoCertificate):
+                known = _rate_optimum(A, None, basis, tolerance).log_omega
+        _, found = _climb(A, max_condition, basis, tolerance, known=known)
         if not found.rate > 0:
             raise NoCertificate(f"the best rate found at condition {max_condition:.3g} is {found.rate:.3g}")
         return found
@@ -187,10 +201,18 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
 
 
 def _climb(
-    A: np.ndarray, max_condition: float | None, basis: np.ndarray | None, tolerance: float, steps: int = 12
+    A: np.ndarray,
+    max_condition: float | None,
+    basis: np.ndarray | None,
+    tolerance: float,
+    steps: int = 40,
+    known: np.ndarray | None = None,
 ) -> tuple[np.ndarray, DiagonalCertificate]:
-    """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative."""
-    frame, best = _start(A, basis, max_condition)
+    """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative.
+
+    ``known`` is a diagonal to start from besides.
+    """
+    frame, best = _start(A, basis, max_condition, known)
     current = frame
     for _ in range(steps):
         try:
@@ -210,24 +232,34 @@ def _climb(
     return frame, DiagonalCertificate(current, best)
 
 
-def _start(A: np.ndarray, basis: np.ndarray | None, max_condition: float | None) -> tuple[np.ndarray, float]:
+def _start(
+    A: np.ndarray, basis: np.ndarray | None, max_condition: float | None, known: np.ndarray | None = None
+) -> tuple[np.ndarray, float]:
     """Return the better of the identity, a balanced scaling and the Perron vectors of ``M(A)``, with its rate."""
-    candidates = [np.zeros(len(A)), _balanced(A)]
+    candidates = [np.zeros(len(A)), _balanced(A), *([] if known is None else [known])]
     with contextlib.suppress(LMIError, np.linalg.LinAlgError):
-        candidates.append(perron_certificate(A).log_omega)
+        log_u, log_v = perron_vectors(A)
+        candidates.append(log_v - log_u)
     rated = []
     for log_omega in candidates:
         if not np.isfinite(log_omega).all():
             continue
-        fitted = log_omega - log_omega.max()
-        if max_condition is not None:
-            fitted = np.maximum(fitted, -math.log(max_condition))
-        rate = _rate_or_none(A, fitted, basis)
-        if rate is not None:
-            rated.append((fitted, rate))
+        log_omega = log_omega - log_omega.max()
+        for fitted in _fitted(log_omega, max_condition):
+            rate = _rate_or_none(A, fitted, basis)
+            if rate is not None:
+                rated.append((fitted, rate))
     if not rated:
         raise NoCertificate("the entries lie too far apart for floating point")
     return max(rated, key=lambda pair: pair[1])
+
+
+def _fitted(log_omega: np.ndarray, max_condition: float | None) -> list[np.ndarray]:
+    """Return the diagonal cut, and its power shrunk, to a largest condition."""
+    limit = math.inf if max_condition is None else math.log(max_condition)
+    if -log_omega.min() <= limit:
+        return [log_omega]
+    return [np.maximum(log_omega, -limit), log_omega * (limit / -log_omega.min())]
 
 
 def _balanced(A: np.ndarray) -> np.ndarray:
@@ -405,7 +437,12 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
 
 
 def rate_frontier(
-    A: Any, *, conditions: Sequence[float] | None = None, basis: Any = None, tolerance: float = 1e-9
+    A: Any,
+    *,
+    conditions: Sequence[float] | None = None,
+    basis: Any = None,
+    best: DiagonalCertificate | None = None,
+    tolerance: float = 1e-9,
 ) -> tuple[DiagonalCertificate, ...]:
     """Return rate against prefactor: diagonal matrices, each the fastest at its condition number.
 
@@ -419,6 +456,8 @@ def rate_frontier(
         By default 1 and six values up to the condition of the best rate, but at most 1e8.
     basis : (n, r) array, optional
         See :func:`diagonal_lyapunov`.
+    best : DiagonalCertificate, optional
+        The best rate, if it was searched before.
 
     Returns
     -------
@@ -438,15 +477,18 @@ def rate_frontier(
     A = square(A)
     basis = _basis(basis, len(A))
     points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), basis))]
+    known = None if best is None else best.log_omega
     if conditions is None:
-        best = _rate_optimum(A, None, basis, tolerance)
+        best = _rate_optimum(A, None, basis, tolerance) if best is None else best
+        known = best.log_omega
         top = min(best.log_condition, math.log(1e8))
-        conditions = [math.exp(top * share) for share in (0.1, 0.2, 0.35, 0.5, 0.7, 0.9)]
+        conditions = [math.exp(top * share) for share in (0.9, 0.7, 0.5, 0.35, 0.2, 0.1)]
         points.append(best)
     for condition in conditions:
         if condition > 1:
             with contextlib.suppress(NoCertificate):
-                points.append(_climb(A, condition, basis, tolerance, steps=6)[1])
+                points.append(_climb(A, condition, basis, tolerance, steps=12, known=known)[1])
+                known = points[-1].log_omega
     points.sort(key=lambda point: (point.log_condition, -point.rate))
     frontier: list[DiagonalCertificate] = []
     for point in points:

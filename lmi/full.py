@@ -26,6 +26,8 @@ LOSSES = (1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 SPLITS = (np.inf, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.05, 1.0)
 #: A basis of invariant subspaces with a larger condition number is not used.
 _LARGEST_BASIS = 1e7
+#: A rate that is larger by less, relatively, is not worth a larger prefactor.
+_SAME_RATE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ def full_frontier(
     points = sorted((c for c in found if c is not None), key=lambda c: (c.condition, -c.rate))
     frontier: list[FullCertificate] = []
     for point in points:
-        if not frontier or point.rate > frontier[-1].rate:
+        if not frontier or point.rate > frontier[-1].rate + _SAME_RATE * abs(frontier[-1].rate):
             frontier.append(point)
     if not frontier or not frontier[-1].rate > 0:
         raise NoCertificate("no full Lyapunov matrix with a positive rate was found in floating point")

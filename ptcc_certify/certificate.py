@@ -631,7 +631,7 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
     try:
         instant = as_fraction(at, "at")
     except NumberError as error:
-        raise ParameterError(str(error)) from None
+        raise ParameterError(f"at: {error}") from None
     if not 0 <= instant < protocol.T:
         raise ParameterError(f"at = {float(instant):g} is not an instant before the deadline {float(protocol.T):g}")
     return instant

@@ -134,8 +134,8 @@ class OutcomeGeometry:
         where = {v: i for i, v in enumerate(nodes)}
         try:
             if coordinates == "E":
-                inverse = self._inverse(flint.ctx.prec)
-                R = flint.arb_mat([[-inverse[i, v] for v in nodes] for i in range(n)])
+                inverse, still = self._inverse(flint.ctx.prec), self._still
+                R = flint.arb_mat([[flint.arb(0) if i in still else -inverse[i, v] for v in nodes] for i in range(n)])
             else:
                 Q = self._projection
                 R = flint.arb_mat([[_ball(int(i == v) - Q[i][v]) for v in nodes] for i in range(n)])
@@ -163,6 +163,11 @@ class OutcomeGeometry:
                 return None
             agents.append(_above(C[i, i]))
         return DistanceBound(tuple(agents), _largest_eigenvalue(C, sum(agents, Fraction(0))))
+
+    @cached_property
+    def _still(self) -> set[int]:
+        """Agents that listen to nobody: they are where they end."""
+        return {c.nodes[0] for c in self._influence.balanced if len(c.nodes) == 1}
 
     @cached_property
     def _projection(self) -> list[list[Fraction]]:

@@ -33,8 +33,10 @@ DIAGONAL = ("perron", "lmi")
 LARGEST_PREFACTOR = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
-#: Above this prefactor a diagonal matrix of a smaller one is searched too; beyond the second none is of use.
-_LARGE, _HOPELESS = 1e8, 1e15
+#: Rates that differ by less, relatively, are the same.
+_SAME_RATE = 1e-6
+#: Beyond this prefactor a diagonal matrix is of no use to anybody.
+_HOPELESS = 1e15
 _MATRIX_BITS = 60
 
 
@@ -146,6 +148,9 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
             except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
                 notes.append(f"class {kind}: {error}")
                 continue
+            if not found:
+                notes.append(f"class {kind}: nothing was found in floating point")
+                continue
             tried[kind] = max(c.rate for c in found)
             candidates += [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
         proved = []
@@ -171,15 +176,21 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
         return []
     chosen = [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
-    chosen.append(max(useful, key=lambda c: c.rate) if useful else min(candidates, key=lambda c: c.condition))
+    chosen.append(_fastest(useful) if useful else min(candidates, key=lambda c: c.condition))
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
-        chosen.append(max(diagonal, key=lambda c: c.rate))
+        chosen.append(_fastest(diagonal))
     distinct: list[Candidate] = []
     for candidate in chosen:
         if not any(candidate is other for other in distinct):
             distinct.append(candidate)
     return sorted(distinct, key=lambda c: c.rate)
+
+
+def _fastest(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the candidate of the largest rate, and of those that share it but for rounding the least prefactor."""
+    top = max(c.rate for c in candidates)
+    return min((c for c in candidates if c.rate >= top - _SAME_RATE * abs(top)), key=lambda c: c.condition)
 
 
 def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
@@ -243,22 +254,19 @@ def _perron_candidates(system: ErrorSystem) -> list[Candidate]:
 
 
 def _lmi_candidates(system: ErrorSystem, thorough: bool) -> tuple[list[Candidate], float]:
-    """Return the best diagonal matrix, its blocks coupled at several losses, if ``thorough`` the whole frontier."""
+    """Return the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
     A, basis = system.matrix, system.basis
     best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
     found = [_diagonal("lmi", best)]
-    parts = lmi.irreducible_blocks(A)
-    if len(parts) > 1:
-        found += _coupled("lmi", A, parts, best.log_omega, basis)
-    if thorough:
-        found += [_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis)]
-    elif best.condition > _LARGE:  # nearly as fast at a prefactor of use, as a rule
-        with contextlib.suppress(lmi.NoCertificate):
-            found.append(
-                _diagonal(
-                    "lmi", lmi.diagonal_lyapunov(A, objective="rate", max_condition=LARGEST_PREFACTOR, basis=basis)
+    for largest in (_HOPELESS / 1e3, LARGEST_PREFACTOR):
+        if best.log_condition > math.log(largest):
+            with contextlib.suppress(lmi.NoCertificate):
+                near = lmi.diagonal_lyapunov(
+                    A, objective="rate", max_condition=largest, basis=basis, start=best.log_omega
                 )
-            )
+                found.append(_diagonal("lmi", near))
+    if thorough:
+        found += [_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best)]
     return found, best.upper
 
 

@@ -192,7 +192,9 @@ class SlidingEnvelope(Envelope):
         at = np.searchsorted(knots, z)
         last = self._clock_at(np.array([np.inf]))[0]
         with np.errstate(over="ignore"):
-            later = v[-1] * np.minimum(np.exp(-half * np.maximum(clock - last, 0.0)), np.finfo(float).max)
+            # Where only the growth is bounded this ends at the largest float, not at infinity: 0 times it stays 0.
+            growth = np.minimum(np.exp(-half * np.maximum(clock - last, 0.0)), np.finfo(float).max)
+            later = np.minimum(v[-1] * growth, np.finfo(float).max)
         sliding = np.append(np.linalg.norm(C @ size, axis=0), 0.0)
         return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
 
