@@ -111,7 +111,10 @@ def maximise_margin(
             start = relative**-0.1
             extra = np.array([max_condition**-0.95 * scale.max()]) * n / start.sum()
             start = start * n / start.sum()
-        return _iterate(problem, rows, start, extra, tolerance)
+        try:
+            return _iterate(problem, rows, start, extra, tolerance)
+        except (ZeroDivisionError, OverflowError, ValueError, np.linalg.LinAlgError):
+            raise NoCertificate("the entries lie too far apart for floating point") from None
 
 
 class _Problem:

@@ -365,9 +365,13 @@ class Envelope:
         )
 
     def _distance_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
-        """Compare every agent's distance to its outcome with its bound, column by column."""
+        """Compare every agent's distance to its outcome with its bound, column by column.
+
+        Before the deadline only: the bound is 0 from there on, and whether the run has arrived is told elsewhere.
+        """
         if not any(m.distance is not None for m in self.members) or trajectory.t[0] != 0:
             return None
+        judged = judged & (trajectory.t < float(self.gain.T))
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         worst, matrix = 0.0, influence(self.structure)
         for column in range(states.shape[1]):
