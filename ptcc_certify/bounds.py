@@ -264,7 +264,8 @@ class Envelope:
     def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``."""
         clock = np.asarray(clock, dtype=float)
-        bounds = [self._start(m, x0) / math.sqrt(m.lowest) * _decay(m.rate, clock) for m in self._in_norm]
+        with np.errstate(over="ignore"):
+            bounds = [self._start(m, x0) / math.sqrt(m.lowest) * _decay(m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
     def distance(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
@@ -294,8 +295,9 @@ class Envelope:
         for m in self.members:
             if m.distance is not None:
                 start = self._start(m, x0)
-                size = constants(m.distance) * start * (1 + 1e-12) if start else 0.0 * constants(m.distance)
-                bounds.append(np.multiply.outer(np.nan_to_num(size), _decay(m.rate, clock)))
+                with np.errstate(over="ignore", invalid="ignore"):
+                    size = constants(m.distance) * (start * (1 + 1e-12))
+                    bounds.append(np.multiply.outer(np.nan_to_num(size), _decay(m.rate, clock)))
         if bounds:
             return np.minimum.reduce(bounds)
         return np.full((len(x0), *clock.shape), np.inf)
@@ -402,11 +404,12 @@ class Envelope:
         z = member.coordinates_of(states, self._laplacian)
         unit = _sizes(z)
         root = np.sqrt(member.value(z / unit))
-        decay = _decay(member.rate, trajectory.clock - trajectory.clock[0])
+        with np.errstate(over="ignore"):
+            bounds = np.multiply.outer(root[:, 0], _decay(member.rate, trajectory.clock - trajectory.clock[0]))
         return [
             History(
                 root[column],
-                root[column, 0] * decay,
+                bounds[column],
                 FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column], float(unit[column, 0])),
             )
             for column in range(states.shape[1])

@@ -222,7 +222,22 @@ class Certificate:
             return None
         return self._geometry.bound(coordinates, nodes, diagonal, matrix)
 
-    def outcome_distance(self, remaining: Sequence[float]) -> np.ndarray:
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start, (M,).
+
+        At the instants where ``1 - t/T`` is ``remaining``; under the sliding-mode protocol whatever the disturbance.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        """
+        envelope, start = self.envelope, self._float_start()
+        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
+            return envelope.state_bound(np.asarray(remaining, dtype=float), start)
+        return envelope.bound(self._clocks(remaining), start)
+
+    def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the start, (N, M), at the instants where ``1 - t/T`` is ``remaining``.
 
         Under the sliding-mode protocol whatever the disturbance.
@@ -232,13 +247,18 @@ class Certificate:
         ParameterError
             The certificate has no start.
         """
+        envelope, start = self.envelope, self._float_start()
+        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
+            return envelope.outcome_distance(np.asarray(remaining, dtype=float), start)
+        return envelope.distance(self._clocks(remaining), start)
+
+    def _float_start(self) -> np.ndarray:
         if self.start is None:
             raise ParameterError("the certificate has no start; give x0")
-        envelope, start = self.envelope, np.array([float(x) for x in self.start])
-        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
-            return envelope.outcome_distance(np.array(remaining, dtype=float), start)
-        clock = np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
-        return envelope.distance(clock, start)
+        return np.array([float(x) for x in self.start])
+
+    def _clocks(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        return np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
 
     def best_possible_residual(self, remaining: float) -> float | None:
         """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""
@@ -528,6 +548,8 @@ ReachingTime(0, 1 before T_r)))
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical = _search_and_prove(structure, theorem, notes)
     sharpening = _sharpen(structure, protocol, method, instant, notes)
+    if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and (V is None or V.blocks):
+        notes.insert(0, _precision_note(graph))
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
     result = None if start is None else outcome(structure, [x - s for x, s in zip(start, gone, strict=True)])
@@ -651,6 +673,14 @@ def _sharpen(
     found = sharpen(ErrorSystem(structure), method, clocks, own)
     notes.extend(found.notes)
     return found
+
+
+def _precision_note(graph: SignedDigraph) -> str:
+    """Tell how far apart the weights lie, where no rate was proved."""
+    sizes = [abs(graph.exact_weight(i)) for i in range(graph.n_edges)]
+    ratio = max(sizes) / min(sizes)
+    decades = len(str(ratio.numerator // ratio.denominator)) - 1
+    return f"no rate was proved; the weights span {decades} decades, of which float64 resolves less than 16"
 
 
 def _prove_outcome(structure: Structure, matrix: Influence, sliding: bool) -> tuple[Obligation, ...]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ptcc_certify.bounds import FLOOR_FACTOR
+from ptcc_certify.sharpen import Sharpening
 from ptcc_certify.structure import Structure
 from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
@@ -128,9 +132,10 @@ def plot_sliding(
 
 
 def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
-    """Draw ``sqrt(V(t)/V(0))`` of the simulated run under its proved bound, on the axis ``1 - t/T``.
+    """Draw ``||E(t)||`` of the simulated run under its proved bounds, on the axis ``1 - t/T``.
 
-    Both axes are logarithmic; time runs to the right, towards the deadline. Grey: the integrator's floor.
+    Both axes are logarithmic; time runs to the right, towards the deadline. Dashed: the paper's certificate alone.
+    Grey: the integrator's floor. If only Theorem 1.1's own coordinates were proved, ``||eps(t)||`` instead.
 
     Parameters
     ----------
@@ -147,24 +152,38 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
     ValueError
         There is nothing to draw.
     """
-    run, seen = certificate.trajectory, certificate.comparison
-    if run is None or seen is None:
+    run, envelope = certificate.trajectory, certificate.envelope
+    if run is None or certificate.comparison is None or not envelope.members:
         raise ValueError("the certificate holds no simulated run with a proved bound")
-    ax = _axes(ax)
-    history = certificate.envelope.histories(certificate.envelope.members[0], run)[0]
-    before = run.remaining > 0
-    remaining, scale = run.remaining[before], history.root[0] or history.bound[0] or 1.0
-    ax.loglog(remaining, history.bound[before] / scale, color="#D55E00", label="proved bound")
-    if history.root[0] > 0:
-        root = history.root[before] / scale
-        ax.loglog(remaining, np.maximum(root, 1e-300), color="#0072B2", label="simulated (CVODES)")
-        ax.axhline(history.floor / scale, color="#7F7F7F", linewidth=0.8, linestyle=":", label="integrator's floor")
-        ax.set_ylim(bottom=max(float(root.min()), 1e-18) / 3)
+    ax, before = _axes(ax), run.remaining > 0
+    remaining, states = run.remaining[before], run.states[:, before]
+    member = next(m for m in envelope.members if m.coordinates == envelope.coordinates)
+    norm = np.linalg.norm(member.coordinates_of(states, certificate.graph.laplacian()), axis=0)
+    bound = certificate.norm_bound(remaining)
+    scale = float(norm[0]) or float(bound[0]) or 1.0
+    ax.loglog(remaining, bound / scale, color="#D55E00", label="proved bound")
+    paper = replace(envelope, members=tuple(m for m in envelope.members if m.kind == "paper"))
+    if len(envelope.members) > 1 and paper.members and paper.coordinates == envelope.coordinates:
+        alone = replace(certificate, sharpening=Sharpening()).norm_bound(remaining)
+        ax.loglog(remaining, alone / scale, color="#D55E00", linewidth=0.9, linestyle="--", label="the paper's alone")
+    if norm[0] > 0:
+        ax.loglog(remaining, np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
+        floor = FLOOR_FACTOR * run.rtol * float(np.abs(states).max()) * _row_sum(certificate)
+        ax.axhline(floor / scale, color="#7F7F7F", linewidth=0.8, linestyle=":", label="integrator's floor")
+        ax.set_ylim(bottom=max(float((norm / scale).min()), 1e-18) / 3)
     ax.invert_xaxis()
     ax.set_xlabel("time left, $1 - t/T$")
-    ax.set_ylabel(r"$\sqrt{V(t)/V(0)}$")
+    name = "E" if envelope.coordinates == "E" else r"\varepsilon"
+    ax.set_ylabel(rf"$\|{name}(t)\| / \|{name}(0)\|$")
     _legend_above(ax)
     return ax
+
+
+def _row_sum(certificate: Certificate) -> float:
+    """Bound ``||dz||`` for an error of 1 in every state."""
+    if certificate.envelope.coordinates == "eps":
+        return 2 * math.sqrt(certificate.graph.n_nodes)
+    return float(np.linalg.norm(abs(certificate.graph.laplacian()).sum(axis=1)))
 
 
 def _legend_above(ax: Axes) -> None:

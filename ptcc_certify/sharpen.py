@@ -20,6 +20,7 @@ from fractions import Fraction
 import numpy as np
 
 import lmi
+import lmi.full
 from lmi.errors import LMIError
 from lmi.exact import prove_generalized_margin
 from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
@@ -33,6 +34,8 @@ DIAGONAL = ("perron", "lmi")
 LARGEST_PREFACTOR = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
+#: Wanted losses of full matrices where the bound is optimised at one instant.
+_FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
 #: Rates that differ by less, relatively, are the same.
 _SAME_RATE = 1e-6
 #: Beyond this prefactor a diagonal matrix is of no use to anybody.
@@ -123,7 +126,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
     clocks : sequence of float
         Values of the stretched clock at which the bound should be small; the largest useful rate is taken besides.
     at : float, optional
-        One more such value.
+        One more such value, for which the classes are searched more finely.
 
     Returns
     -------
@@ -142,9 +145,11 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 continue
             try:
                 if kind == "lmi":
-                    found, limit = _lmi_candidates(system, method == "lmi")
+                    found, limit = _lmi_candidates(system, method == "lmi" or at is not None)
+                elif kind == "full":
+                    found = _full_candidates(system, lmi.full.LOSSES if at is None else _FINE_LOSSES)
                 else:
-                    found = _perron_candidates(system) if kind == "perron" else _full_candidates(system)
+                    found = _perron_candidates(system)
             except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
                 notes.append(f"class {kind}: {error}")
                 continue
@@ -270,12 +275,13 @@ def _lmi_candidates(system: ErrorSystem, thorough: bool) -> tuple[list[Candidate
     return found, best.upper
 
 
-def _full_candidates(system: ErrorSystem) -> list[Candidate]:
+def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> list[Candidate]:
+    """Return full matrices on the error's subspace, continued beyond it."""
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
     reduced = A if U is None else U.T @ A @ U
     found = []
-    for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2):
+    for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
         P = member.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
             P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)

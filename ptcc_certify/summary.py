@@ -115,13 +115,11 @@ def _class_lines(certificate: Certificate) -> list[str]:
         lines.append(_line("", f"paper {_down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"))
     found = certificate.sharpening
     if found.tried:
-        members = ", ".join(f"{m.kind} {_signed(m.rate, 6)} ({_up(m.prefactor, 3)})" for m in found.members)
-        lines.append(_line("", f"{certificate.method}: rate (||E||^2 prefactor) {members or 'none proved'}"))
-    if found.diagonal_limit is not None and certificate.diagonal_rate is not None:
-        reached = float(certificate.diagonal_rate) / found.diagonal_limit
-        lines.append(
-            _line("", f"no diagonal matrix exceeds {found.diagonal_limit:.6g} (numerical); proved {reached:.1%}")
-        )
+        tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
+        limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
+        lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit})"))
+        taken = [f"{m.kind} {_signed(m.rate, 4)} (prefactor {_up(m.prefactor, 2)})" for m in found.members]
+        lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
     return lines
 
 

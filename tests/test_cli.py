@@ -190,6 +190,31 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
 
+@pytest.mark.parametrize("method", ["paper", "perron", "lmi", "full", "best"])
+def test_the_method_decides_which_classes_are_searched(method: str):
+    data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
+    classes = [member["class"] for member in data["lyapunov"]["members"]]
+    wanted = {"paper": {"paper"}, "best": {"paper", "lmi", "full"}}.get(method, {"paper", method})
+    assert classes[0] == "paper" and set(classes) == wanted
+    assert set(data["unverified"]["search"]["tried"]) == (
+        {"perron", "lmi", "full"} if method == "best" else wanted - {"paper"}
+    )
+    screen = ptcc("certify", "fig3a", "--method", method, "--x0", X0).out
+    assert ("tried" in screen) == ("taken" in screen) == (method != "paper")
+    assert len(screen.splitlines()) <= 24
+
+
+def test_the_bound_at_an_instant_is_printed_for_every_agent():
+    run = ptcc("certify", "fig3a", "--x0", X0, "--at", "0.3")
+    assert run.code == 0 and "at t = 0.3: 1 " in run.out and len(run.out.splitlines()) <= 24
+    sliding = ptcc("certify", "fig3a", "--protocol", "sliding-mode", "--sigma0", "random", "--at", "0.9")
+    assert sliding.code == 0 and "at t = 0.9: 1 " in sliding.out and len(sliding.out.splitlines()) <= 24
+    for bad in ("1", "-0.1", "soon", "nan", "1e999"):
+        refused = ptcc("certify", "fig3a", f"--at={bad}")
+        assert_refused(refused)
+        assert "at" in refused.err
+
+
 @pytest.mark.parametrize("command", ["classify", "certify"])
 def test_a_refuted_expectation_is_3(command: str):
     run = ptcc(command, "fig1b", "--expect", "stability")
