@@ -19,7 +19,6 @@ from ptcc_certify.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     Matrix,
     dense_laplacian,
-    diagonal_matrix,
     exact_block,
     float_block,
     follower_nodes,
@@ -156,8 +155,3 @@ def rounded_matrix(P: np.ndarray, bits: int) -> Matrix:
     unit = 2.0 ** (bits - np.ceil(np.log2(top)))
     rows = [[Fraction(round(float(x) * unit)) for x in row] for row in P]
     return [[rows[max(i, j)][min(i, j)] for j in range(len(P))] for i in range(len(P))]
-
-
-def diagonal_form(weights: tuple[Fraction, ...]) -> Matrix:
-    """Return ``diag(weights)``."""
-    return diagonal_matrix(weights)
