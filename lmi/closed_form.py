@@ -19,7 +19,7 @@ DENSE_ROWS = 1500
 #: Up to this many rows a left null vector is computed without subtractions.
 ELIMINATION_ROWS = 3000
 #: Coupled components reach ``2 lambda_min`` only in the limit: this share of it is given up.
-LOSS = 1e-6
+LOSS = 5e-7
 #: The shares of ``lambda_min`` tried under a bound on the condition; above 1 the shift is negative.
 LOSSES = np.geomspace(LOSS, 10.0, 15)
 EPS = float(np.finfo(float).eps)
@@ -99,7 +99,7 @@ def m_matrix_certificate(
         Off-diagonal entries <= 0.
     u, v : (n,) array, optional
         Positive witnesses, used as they are. Default: Perron vectors where no strong component is coupled to another
-        (rate ``2 lambda_min`` to rounding), otherwise a rate of ``2 lambda_min (1 - 1e-6)`` to rounding.
+        (rate ``2 lambda_min`` to rounding), otherwise a rate of ``2 lambda_min (1 - 5e-7)`` to rounding.
     max_condition : float, optional
         Largest admissible ``max(Omega) / min(Omega)``, >= 1. Smaller ``t`` and powers of the witness are tried (``b``
         is concave in ``(log u, log v)``) and the best is kept; another ``Omega`` of that condition may do better.

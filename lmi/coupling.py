@@ -21,6 +21,7 @@ import numpy as np
 
 from lmi.certificate import scaled
 from lmi.errors import MatrixError, NoCertificate
+from lmi.matrices import block_columns
 
 
 def smallest_eigenvalue(S: np.ndarray) -> float:
@@ -279,9 +280,8 @@ def _frame(own: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> 
     """Return an orthonormal basis of the subspace, in the scaled rows of one level."""
     if basis is None:
         return np.eye(len(own))
-    rows = basis[own]
-    rows = rows[:, np.abs(rows).max(axis=0, initial=0.0) > 0]
-    return np.linalg.qr(np.exp((log_omega[own] - log_omega[own].max()) / 2)[:, None] * rows)[0]
+    weight = np.exp((log_omega[own] - log_omega[own].max()) / 2)
+    return np.linalg.qr(weight[:, None] * block_columns(basis, own))[0]
 
 
 def _scaled_block(A: np.ndarray, own: np.ndarray, above: np.ndarray, log_omega: np.ndarray) -> np.ndarray:

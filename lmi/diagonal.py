@@ -1,4 +1,4 @@
-"""The search for diagonal Lyapunov matrices with cvxpy and Clarabel.
+"""The search for diagonal Lyapunov matrices with cvxpy and Clarabel; larger best rates with :mod:`lmi.interior_point`.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
 certificate is proved elsewhere (:mod:`lmi.exact`).
@@ -21,7 +21,7 @@ from lmi.coupling import couple_blocks
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact import no_diagonal_rate_above, round_to_bits
 from lmi.interior_point import maximise_margin
-from lmi.matrices import irreducible_blocks, square
+from lmi.matrices import block_columns, irreducible_blocks, square
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -114,11 +114,12 @@ def diagonal_lyapunov(
         raise MatrixError(f'objective "{objective}" is unknown; use "margin" or "rate"')
     if max_condition is not None and not max_condition >= 1:
         raise MatrixError(f"max_condition = {max_condition} is below 1")
+    max_condition = None if max_condition == math.inf else max_condition
     if n == 0:
         raise MatrixError("A has no rows")
     if objective == "rate":
-        if start is not None and np.shape(start) != (n,):
-            raise MatrixError(f"start has shape {np.shape(start)}, not {(n,)}")
+        if start is not None and (np.shape(start) != (n,) or not np.isfinite(np.asarray(start, dtype=float)).all()):
+            raise MatrixError(f"start is not a finite vector of {n} entries")
         return _rate_optimum(A, max_condition, _basis(basis, n), tolerance, start)
     if basis is not None or start is not None:
         raise MatrixError('basis and start belong to objective="rate"')
@@ -152,18 +153,21 @@ def _rate_optimum(
             with contextlib.suppress(NoCertificate):
                 known = _rate_optimum(A, None, basis, tolerance).log_omega
         _, found = _climb(A, max_condition, basis, tolerance, known=known)
-        if not found.rate > 0:
+        if not found.rate > _rounding(A, found.log_omega):
             raise NoCertificate(f"the best rate found at condition {max_condition:.3g} is {found.rate:.3g}")
         return found
     parts = irreducible_blocks(A)
-    bases = [None if basis is None else _restricted(basis, part) for part in parts]
+    bases = [None if basis is None else block_columns(basis, part) for part in parts]
     blocks = [
         (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance))
         for part, b in zip(parts, bases, strict=True)
         if b is None or b.shape[1]
     ]
+    if not blocks:
+        raise MatrixError("the basis has no columns: there is nothing to decay")
     worst = min(blocks, key=lambda block: block[2].rate)
-    if not worst[2].rate > 0:
+    part = worst[0]
+    if not worst[2].rate > _rounding(A[np.ix_(part, part)], worst[2].log_omega):
         raise NoCertificate(f"the best rate found is {worst[2].rate:.3g}, which is not positive")
     limit = min(blocks, key=lambda block: block[2].upper)
     witness = None
@@ -305,9 +309,6 @@ def _step(
     def problem(cp: Any) -> tuple[cp.Problem, cp.Expression]:
         omega, t = cp.Variable(n), cp.Variable()
         form = _symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
-        if tail is not None:
-            form = tail.T @ form @ tail
-            form = (form + form.T) / 2
         constraints = [form >> 0, cp.sum(omega) == n, omega >= 0]
         if max_condition is not None:
             low = cp.Variable()
@@ -365,8 +366,13 @@ def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
     Returns
     -------
     float
-        In floating point; :func:`lmi.no_diagonal_rate_above` decides in rationals. Infinite if the rows where ``X`` is
-        zero forbid any bound.
+        In floating point, raised by what rounding may have taken; :func:`lmi.no_diagonal_rate_above` decides in
+        rationals. Infinite if the rows where ``X`` is zero forbid any bound.
+
+    Raises
+    ------
+    MatrixError
+        The shapes do not match.
 
     References
     ----------
@@ -375,12 +381,18 @@ def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
 
     Examples
     --------
-    >>> diagonal_rate_limit([[1.0, -1.0], [-1.0, 1.0]], [[1.0], [1.0]])
-    0.0
+    >>> 0 <= diagonal_rate_limit([[1.0, -1.0], [-1.0, 1.0]], [[1.0], [1.0]]) < 1e-14
+    True
     """
     A, Y = square(A), np.asarray(Y, dtype=float)
+    if Y.ndim != 2 or len(Y) != len(A):
+        raise MatrixError(f"Y has shape {Y.shape}, not ({len(A)}, k)")
     moved, size = 2 * np.einsum("ij,ij->i", A @ Y, Y), np.einsum("ij,ij->i", Y, Y)
-    if (moved[size == 0] > 0).any() or not size.any():
+    # What rounding may have taken from these sums.
+    moved += (
+        (len(A) + Y.shape[1] + 4) * np.finfo(float).eps * 2 * np.einsum("ij,ij->i", np.abs(A) @ np.abs(Y), np.abs(Y))
+    )
+    if not size.any():
         return math.inf
     return float((moved[size > 0] / size[size > 0]).max())
 
@@ -415,6 +427,8 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
     True
     """
     A = square(A)
+    if len(A) == 0 or not math.isfinite(rate):
+        raise MatrixError("A has no rows, or the rate is not finite")
     exact = [[Fraction(float(x)) for x in row] for row in A]
     if (low := np.flatnonzero(2 * np.diag(A) <= rate)).size:
         return [[Fraction(int(i == low[0]))] for i in range(len(A))]
@@ -475,6 +489,8 @@ def rate_frontier(
     [(1.0, 1.764), (2.0, 2.0)]
     """
     A = square(A)
+    if len(A) == 0:
+        raise MatrixError("A has no rows")
     basis = _basis(basis, len(A))
     points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), basis))]
     known = None if best is None else best.log_omega
@@ -494,7 +510,7 @@ def rate_frontier(
     for point in points:
         if not frontier or point.rate > frontier[-1].rate:
             frontier.append(point)
-    if not frontier[-1].rate > 0:
+    if not frontier[-1].rate > _rounding(A, frontier[-1].log_omega):
         raise NoCertificate(f"the best rate found is {frontier[-1].rate:.3g}, which is not positive")
     return tuple(frontier)
 
@@ -503,15 +519,14 @@ def _basis(basis: Any, n: int) -> np.ndarray | None:
     if basis is None:
         return None
     basis = np.asarray(basis, dtype=float)
-    if basis.ndim != 2 or len(basis) != n or not np.isfinite(basis).all():
-        raise MatrixError(f"basis is not a finite matrix of {n} rows")
+    if basis.ndim != 2 or len(basis) != n or not np.isfinite(basis).all() or not basis.any():
+        raise MatrixError(f"basis is not a finite matrix of {n} rows that spans something")
     return basis
 
 
-def _restricted(basis: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return the columns of the basis that live on one block."""
-    rows = basis[part]
-    return rows[:, np.abs(rows).max(axis=0) > 0]
+def _rounding(A: np.ndarray, log_omega: np.ndarray) -> float:
+    """Bound what rounding may add to :func:`diagonal_rate`; a smaller rate is none."""
+    return len(A) * np.finfo(float).eps * float(np.abs(scaled(A, log_omega)).sum(axis=1).max())
 
 
 def _rate_or_none(A: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> float | None:

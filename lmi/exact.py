@@ -286,9 +286,13 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     False
     """
     n = len(A)
-    if len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
-        raise MatrixError("A is not square or Y has not as many rows")
-    A, Y = ([[x if type(x) is Fraction else _rational(x) for x in row] for row in M] for M in (A, Y))
+    if n == 0 or len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
+        raise MatrixError("A is not square, is empty, or Y has not as many rows")
+    try:
+        A, Y = ([[x if type(x) is Fraction else _rational(x) for x in row] for row in M] for M in (A, Y))
+        rate = _rational(rate)
+    except (TypeError, ValueError, OverflowError):
+        raise MatrixError("an entry or the rate is not a finite real number") from None
     a, y = _integers(A), _integers(Y)
     sizes = [sum(x * x for x in row) for row in y[0].tolist()]
     moved = [

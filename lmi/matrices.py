@@ -179,3 +179,15 @@ def irreducible_blocks(A: Any) -> list[np.ndarray]:
             if missing[driven_part] == 0:
                 ready.append(driven_part)
     return blocks
+
+
+def block_columns(basis: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Return the rows ``part`` of a basis, with the columns that are not zero there.
+
+    Examples
+    --------
+    >>> block_columns(np.eye(3), np.array([1])).tolist()
+    [[1.0]]
+    """
+    rows = basis[part]
+    return rows[:, np.abs(rows).max(axis=0, initial=0.0) > 0]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from numbers import Rational
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ptcc_certify.distance import DistanceBound
+from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain import Gain
 from ptcc_certify.outcomes import influence
@@ -78,6 +80,8 @@ class Member:
         Not above the smallest eigenvalue of ``P``.
     distance : DistanceBound or None
         Constants from ``V`` to the distance of each agent to its outcome.
+    exact_weights : tuple of Fraction
+        The diagonal as it was proved, for the coordinates ``eps``, whose mean it defines.
     """
 
     kind: str
@@ -89,6 +93,7 @@ class Member:
     prefactor: float
     lowest: float
     distance: DistanceBound | None = None
+    exact_weights: tuple[Fraction, ...] = ()
 
     @classmethod
     def of(cls, structure: Structure, V: LyapunovFunction, rate: Fraction | float, **more: Any) -> Member:
@@ -103,6 +108,7 @@ class Member:
             float_below(rate),
             float_above(V.prefactor),
             math.nextafter(float(weights.min(initial=np.inf)), 0.0),
+            exact_weights=V.weights,
             **more,
         )
 
@@ -140,6 +146,17 @@ class Member:
         share = self.weights / self.weights.sum()
         mean = np.tensordot(share * g, X, axes=1)
         return X - np.multiply.outer(g, mean)
+
+    def exact_coordinates_of(self, x: Sequence[Fraction], rows: Sequence[Mapping[int, Fraction]]) -> list[Fraction]:
+        """Return ``z`` of one state in rationals; ``rows`` are those of ``L``."""
+        if self.coordinates == "E":
+            return [-sum((w * x[j] for j, w in rows[v].items()), Fraction(0)) for v in self.nodes.tolist()]
+        assert self.gauge is not None
+        signs = [int(self.gauge[v]) for v in self.nodes.tolist()]
+        own = [x[v] for v in self.nodes.tolist()]
+        weighted = sum((w * g * y for w, g, y in zip(self.exact_weights, signs, own, strict=True)), Fraction(0))
+        mean = weighted / sum(self.exact_weights)
+        return [y - g * mean for y, g in zip(own, signs, strict=True)]
 
     def scaled(self, z: np.ndarray) -> np.ndarray:
         """Return ``R z``, whose Euclidean norm is ``sqrt(V)``, for coordinates of shape (n, ...)."""
@@ -254,27 +271,27 @@ class Envelope:
             Infinite where nothing was proved: an envelope without members bounds nothing.
         """
         clock = np.asarray(clock, dtype=float)
-        factors = [math.sqrt(m.prefactor) * _decay(m.rate, clock) for m in self._in_norm]
+        factors = [_grown(math.sqrt(m.prefactor), m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
         """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant."""
         return float(self.norm_factor(self.gain.clock_at_remaining(remaining)))
 
-    def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def bound(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``."""
         clock = np.asarray(clock, dtype=float)
-        with np.errstate(over="ignore"):
-            bounds = [self._start(m, x0) / math.sqrt(m.lowest) * _decay(m.rate, clock) for m in self._in_norm]
+        bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest), m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
-    def distance(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def distance(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
 
         Parameters
         ----------
         clock : (M,) array or float
-        x0 : (N,) array
+        x0 : sequence of N numbers
+            Rationals are taken exactly, floats as the dyadic numbers they are.
 
         Returns
         -------
@@ -283,32 +300,44 @@ class Envelope:
         """
         return self._distances(clock, x0, lambda d: d.roots)
 
-    def distance_norm(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def distance_norm(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``||x - Q x0||`` at clock values ``s`` from ``x0``; see :meth:`distance`."""
         return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
 
     def _distances(
-        self, clock: np.ndarray | float, x0: np.ndarray, constants: Callable[[DistanceBound], np.ndarray]
+        self,
+        clock: np.ndarray | float,
+        x0: Sequence[Any] | np.ndarray,
+        constants: Callable[[DistanceBound], np.ndarray],
     ) -> np.ndarray:
-        clock, x0 = np.asarray(clock, dtype=float), np.asarray(x0, dtype=float)
+        clock = np.asarray(clock, dtype=float)
         bounds = []
         for m in self.members:
             if m.distance is not None:
-                start = self._start(m, x0)
                 with np.errstate(over="ignore", invalid="ignore"):
-                    size = constants(m.distance) * (start * (1 + 1e-12))
-                    bounds.append(np.multiply.outer(np.nan_to_num(size), _decay(m.rate, clock)))
+                    size = np.nan_to_num(constants(m.distance) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
+                bounds.append(_grown(size, m.rate, clock))
         if bounds:
             return np.minimum.reduce(bounds)
-        return np.full((len(x0), *clock.shape), np.inf)
+        return np.full((len(x0), *clock.shape), 0.0 if self._still else np.inf)
 
-    def _start(self, member: Member, x0: np.ndarray) -> float:
-        """Return ``sqrt(V(0))``; nothing is squared that could leave float64."""
-        x0 = np.asarray(x0, dtype=float)
-        unit = self._unit(x0)
-        z = member.coordinates_of(x0 / unit, self._laplacian)
-        own = float(np.abs(z).max(initial=0.0)) or 1.0
-        return float(np.sqrt(member.value(z / own))) * own * unit
+    @cached_property
+    def _still(self) -> bool:
+        """Whether no agent moves: every one is where it ends."""
+        return not ErrorSystem(self.structure).nodes
+
+    @cached_property
+    def _rows(self) -> list[dict[int, Fraction]]:
+        return [{j: x for j, x in enumerate(row) if x} for row in self.structure.graph.exact_laplacian()]
+
+    def _start(self, member: Member, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
+        z = member.exact_coordinates_of([as_exact(x) for x in x0], self._rows)
+        top = max(map(abs, z), default=Fraction(0))
+        if top == 0:
+            return 0.0
+        relative = np.array([float(x / top) for x in z])
+        return float(np.sqrt(member.value(relative))) * (1 + 1e-12) * float_above(top)
 
     def _unit(self, x0: np.ndarray) -> float:
         """Return the size of the start, in which squares neither overflow nor vanish."""
@@ -341,7 +370,7 @@ class Envelope:
             root, bound, f = history
             excess = np.maximum(root - f, 0.0)[judged]
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                ratio = np.where(excess > 0, excess / bound[judged], 0.0)
+                ratio = np.nan_to_num(np.where(excess > 0, excess / bound[judged], 0.0), nan=np.inf, posinf=np.inf)
                 plain = np.where(root > 0, root / bound, 0.0)
             worst = max(worst, float(ratio.max(initial=0.0)))
             count += int((excess > 0).sum())
@@ -379,9 +408,9 @@ class Envelope:
         for column in range(states.shape[1]):
             x = states[:, column]
             size = self._unit(x[:, 0])
-            bounds, start = self._distance_bounds(trajectory, x / size, size)
-            final, _ = matrix.apply([Fraction(float(v)) for v in start])
-            gap = np.abs(x / size - np.array([float(v) for v in final])[:, None])
+            bounds, start = self._distance_bounds(trajectory, x, size)
+            final, _ = matrix.apply(start)
+            gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
             norm = np.linalg.norm(excess, axis=0)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -389,13 +418,12 @@ class Envelope:
             worst = max(worst, float(np.where(np.vstack([excess, norm]) > 0, both, 0.0)[:, judged].max(initial=0.0)))
         return worst
 
-    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray]:
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
         """Return the bounds of every agent and of the norm (N + 1, M) in that unit, and what ``Q`` is applied to."""
-        start = x[:, 0]
-        return (
-            np.vstack([self.distance(trajectory.clock, start), self.distance_norm(trajectory.clock, start)]),
-            start,
-        )
+        start = [as_exact(v) for v in x[:, 0]]
+        own = [v / Fraction(unit) for v in start]
+        bounds = np.vstack([self.distance(trajectory.clock, own), self.distance_norm(trajectory.clock, own)])
+        return bounds, start
 
     def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start."""
@@ -404,8 +432,7 @@ class Envelope:
         z = member.coordinates_of(states, self._laplacian)
         unit = _sizes(z)
         root = np.sqrt(member.value(z / unit))
-        with np.errstate(over="ignore"):
-            bounds = np.multiply.outer(root[:, 0], _decay(member.rate, trajectory.clock - trajectory.clock[0]))
+        bounds = _grown(root[:, 0], member.rate, trajectory.clock - trajectory.clock[0])
         return [
             History(
                 root[column],
@@ -427,12 +454,21 @@ class Envelope:
         return float(np.linalg.norm(np.abs(member.root) @ (size / unit)))
 
 
-def _decay(rate: float, clock: np.ndarray) -> np.ndarray:
-    """Return ``e^(-rate s / 2)``; where only the growth is bounded, at most the largest float, so that 0 stays 0."""
-    if rate == 0:
-        return np.ones_like(clock)
-    with np.errstate(over="ignore"):
-        return np.minimum(np.exp(-rate * clock / 2), np.finfo(float).max)
+def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
+    """Return ``size e^(-rate s / 2)`` for every size and every clock value, rounded up; formed in logarithms.
+
+    At the deadline, where the clock is infinite, 0 if the rate is positive or the size is 0.
+    """
+    with np.errstate(all="ignore"):
+        exponent = np.add.outer(np.log(size), -rate * clock / 2 if rate else np.zeros_like(clock))
+        grown = np.exp(exponent) * (1 + 1e-12)
+    grown = np.where((grown == 0) & (exponent > -np.inf), 5e-324, grown)
+    return np.where(np.isnan(grown), 0.0, grown)
+
+
+def as_exact(x: Any) -> Fraction:
+    """Return a rational as it is, a float as the dyadic number that it is."""
+    return Fraction(x) if isinstance(x, Rational) else Fraction(float(x))
 
 
 def _sizes(values: np.ndarray) -> np.ndarray:

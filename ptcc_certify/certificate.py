@@ -41,6 +41,9 @@ from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
 SCHEMA = "ptcc-certificate/1"
 PROPOSITION_1 = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
+DISTANCE = Obligation(
+    "distance", "|x_k - (Q x)_k|^2 <= c_k V, ||x - Q x||^2 <= c V", "L (x - Q x) = -E, ball arithmetic"
+)
 CERTIFIED, UNDECIDED = "certified", "undecided"
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
@@ -144,7 +147,12 @@ class Certificate:
     @property
     def prefactor(self) -> Fraction | None:
         """What multiplies the squared norm at the largest proved rate."""
-        return max(self._rated, key=lambda member: member[0])[1] if self.rate is not None else None
+        return self._fastest[1] if self.rate is not None else None
+
+    @property
+    def _fastest(self) -> tuple[Fraction, Fraction, str]:
+        """The largest proved rate, and of those that share it the least prefactor."""
+        return max(self._rated, key=lambda member: (member[0], -member[1]))
 
     @property
     def _rated(self) -> list[tuple[Fraction, Fraction, str]]:
@@ -163,7 +171,9 @@ class Certificate:
     def obligations(self) -> tuple[Obligation, ...]:
         """Everything that was proved."""
         sharper = (o for member in self.sharpening.members for o in member.obligations)
-        return (*self.proof.obligations, *sharper, *self.sliding_proof, *self.outcome_proof)
+        members = self.envelope.members
+        distance = (DISTANCE,) if any(m.distance is not None for m in members) else ()
+        return (*self.proof.obligations, *sharper, *distance, *self.sliding_proof, *self.outcome_proof)
 
     @property
     def verdict(self) -> str:
@@ -232,7 +242,7 @@ class Certificate:
         ParameterError
             The certificate has no start.
         """
-        envelope, start = self.envelope, self._float_start()
+        envelope, start = self.envelope, self._known_start()
         if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
             return envelope.state_bound(np.asarray(remaining, dtype=float), start)
         return envelope.bound(self._clocks(remaining), start)
@@ -247,15 +257,15 @@ class Certificate:
         ParameterError
             The certificate has no start.
         """
-        envelope, start = self.envelope, self._float_start()
+        envelope, start = self.envelope, self._known_start()
         if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
             return envelope.outcome_distance(np.asarray(remaining, dtype=float), start)
         return envelope.distance(self._clocks(remaining), start)
 
-    def _float_start(self) -> np.ndarray:
+    def _known_start(self) -> tuple[Fraction, ...]:
         if self.start is None:
             raise ParameterError("the certificate has no start; give x0")
-        return np.array([float(x) for x in self.start])
+        return self.start
 
     def _clocks(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         return np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
@@ -376,7 +386,7 @@ class Certificate:
     def _prefactor_section(self) -> dict[str, Any] | None:
         if self.prefactor is None:
             return None
-        kind = max(self._rated, key=lambda member: member[0])[2]
+        kind = self._fastest[2]
         coordinates = self.lyapunov.coordinates if kind == "paper" and self.lyapunov else "E"
         return {"value": format_exact(self.prefactor), "of": f"||{coordinates}||^2"}
 
@@ -635,7 +645,11 @@ def _search_and_prove(
     except (LMIError, np.linalg.LinAlgError) as error:
         notes.append(f"no Lyapunov matrix was found: {error}")
         return None, nothing, None
-    except HypothesisError:  # the structure meets the hypotheses exactly, so it is the floats that do not
+    except (
+        HypothesisError,
+        ZeroDivisionError,
+        OverflowError,
+    ):  # the structure meets the hypotheses exactly, so it is the floats that do not
         notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
         return None, nothing, None
     if n > EXACT_NODES:
@@ -655,7 +669,9 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
     except NumberError as error:
         raise ParameterError(f"at: {error}") from None
     if not 0 <= instant < protocol.T:
-        raise ParameterError(f"at = {float(instant):g} is not an instant before the deadline {float(protocol.T):g}")
+        raise ParameterError(
+            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}"
+        )
     return instant
 
 

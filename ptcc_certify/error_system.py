@@ -133,10 +133,9 @@ class ErrorSystem:
         return S if K is None else multiply(transpose(K), multiply(S, K))
 
     def prove_rate(self, P: Matrix, guess: float) -> Fraction | None:
-        """Prove ``P A + A' P > b P`` and ``P > 0`` on the subspace; return ``b``, near to the guess, or None.
+        """Prove ``P A + A' P > b P`` on the subspace; return ``b``, near to the guess, or None.
 
-        With ``b > 0`` the first inequality implies the second, since ``A`` has no eigenvalue of negative real part;
-        it is proved all the same by whoever asks for a prefactor.
+        That ``P`` itself is positive definite, without which this bounds nothing, is proved by the caller.
         """
         PA = multiply(P, self.exact_matrix)
         n = len(P)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -23,6 +23,7 @@ import lmi
 import lmi.full
 from lmi.errors import LMIError
 from lmi.exact import prove_generalized_margin
+from lmi.matrices import block_columns
 from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.lemmas import laplacian_spectrum, left_vector
@@ -157,7 +158,10 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 notes.append(f"class {kind}: nothing was found in floating point")
                 continue
             tried[kind] = max(c.rate for c in found)
-            candidates += [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+            kept = [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+            if not any(c.rate > 0 for c in kept):
+                notes.append(f"class {kind}: the rate {tried[kind]:.4g} needs a prefactor above {_HOPELESS:.0e}")
+            candidates += kept
         proved = []
         for candidate in choose(candidates, wanted):
             member = prove_member(system, candidate)
@@ -165,7 +169,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
             else:
                 proved.append(member)
-    return Sharpening(tuple(proved), tried, limit, tuple(notes))
+    return Sharpening(tuple(_without_hair_splitting(proved)), tried, limit, tuple(notes))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
@@ -196,6 +200,23 @@ def _fastest(candidates: Sequence[Candidate]) -> Candidate:
     """Return the candidate of the largest rate, and of those that share it but for rounding the least prefactor."""
     top = max(c.rate for c in candidates)
     return min((c for c in candidates if c.rate >= top - _SAME_RATE * abs(top)), key=lambda c: c.condition)
+
+
+def _without_hair_splitting(members: list[SharpMember]) -> list[SharpMember]:
+    """Lower rates that are larger by rounding alone to that of the member with the smaller prefactor.
+
+    A smaller rate is proved with the larger one. The largest rate then comes with a prefactor that is worth it.
+    """
+    result = []
+    for member in members:
+        near = [m.rate for m in members if m.prefactor < member.prefactor and 0 < m.rate < member.rate]
+        close = [rate for rate in near if member.rate - rate <= Fraction(_SAME_RATE) * rate]
+        if close:
+            rate = max(close)
+            first = replace(member.obligations[0], numbers={"b": rate})
+            member = replace(member, rate=rate, obligations=(first, *member.obligations[1:]))
+        result.append(member)
+    return result
 
 
 def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
@@ -299,9 +320,7 @@ def _coupled(
     """Couple blocks at several rates below the slowest of them."""
     rates = []
     for part in parts:
-        own = None if basis is None else basis[part]
-        if own is not None:
-            own = own[:, np.abs(own).max(axis=0) > 0]
+        own = None if basis is None else block_columns(basis, part)
         rates.append(lmi.diagonal_rate(A[np.ix_(part, part)], log_weights[part], own))
     slowest = min(rates)
     if not slowest > 0:

@@ -15,14 +15,15 @@ where ``b_k`` bounds ``|sigma_k|`` whatever the disturbance. The coordinates of 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member
+from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member, as_exact
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.reaching import LAST_Z, ReachingTime, sliding_bound
@@ -67,7 +68,7 @@ class SlidingEnvelope(Envelope):
         self._need_direct()
         return super().norm_factor(clock)
 
-    def bound(self, clock: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def bound(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``||z||`` at clock values; see :meth:`Envelope.bound`, and :meth:`state_bound` for any sigma(0).
 
         Raises
@@ -82,7 +83,7 @@ class SlidingEnvelope(Envelope):
         if not self.direct:
             raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
 
-    def state_bound(self, remaining: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def state_bound(self, remaining: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, from ``x0``.
 
         Parameters
@@ -98,12 +99,12 @@ class SlidingEnvelope(Envelope):
         """
         q = np.atleast_1d(np.asarray(remaining, dtype=float))
         z, clock = self._instants(q)
-        bound, start = np.full(q.size, np.inf), np.asarray(x0, dtype=float)
-        unit = self._unit(start)
+        bound, unit = np.full(q.size, np.inf), self._unit(np.array([float(x) for x in x0]))
         for member in self._in_norm:
-            v, sliding = self._bounds(member, start / unit, unit, z, clock)
-            with np.errstate(over="ignore"):
-                bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit)
+            if self._usable(member):
+                v, sliding = self._bounds(member, x0, unit, z, clock)
+                with np.errstate(over="ignore"):
+                    bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit * (1 + 1e-12))
         return bound if np.ndim(remaining) else bound[0]
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
@@ -148,12 +149,13 @@ class SlidingEnvelope(Envelope):
         assert isinstance(trajectory, SlidingTrajectory)
         if self.direct:
             return super().histories(member, trajectory)
+        if not self._usable(member):
+            return []
         own = self._unit(trajectory.states[:, 0])
         x, y = trajectory.states / own, (trajectory.states - trajectory.sigma) / own
         size = max(float(np.abs(part).max()) for part in (x, y))
-        v, sliding = self._bounds(member, x[:, 0], own, self._z(trajectory), trajectory.clock)
-        total = v + sliding
-        unit = float(total[total < 1e200].max(initial=0.0)) or 1.0  # where only growth is bounded, it ends in infinity
+        v, sliding = self._bounds(member, trajectory.states[:, 0], own, self._z(trajectory), trajectory.clock)
+        unit = float((v + sliding).max()) or 1.0
         floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
         return [
             History(np.sqrt(member.value(member.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
@@ -169,33 +171,35 @@ class SlidingEnvelope(Envelope):
         with np.errstate(divide="ignore"):
             return -np.log(trajectory.reaching_remaining)
 
+    def _usable(self, member: Member) -> bool:
+        """Whether a member bounds the reaching phase: one that bounds only the growth would end in infinity."""
+        return self.direct or member.rate > 0
+
     def _bounds(
-        self, member: Member, x0: np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+        self, member: Member, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
 
-        ``x0`` and what is returned are in units of ``unit``.
+        What is returned is in units of ``unit``; ``x0`` is not.
         """
-        sigma0 = np.array([float(x) for x in self.sigma0]) / unit
-        start = float(np.sqrt(member.value(member.coordinates_of(x0 - sigma0, self._laplacian))))
+        own = Fraction(unit)
+        y0 = [(as_exact(x) - sigma) / own for x, sigma in zip(x0, self.sigma0, strict=True)]
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
         size = sliding_bound(self.protocol, self.sigma0, knots) / unit
-        forcing = np.linalg.norm(B @ size, axis=0)
+        forcing = _column_norms(B @ size)
         s = self._clock_at(knots)
-        decay = np.exp(-half * np.diff(s, append=self._clock_at(np.array([np.inf]))))
+        step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
+        decay, share = np.exp(-step), -np.expm1(-step) / half
         v = np.empty(knots.size + 1)
-        v[0] = start
+        v[0] = self._start(member, y0)
         for i in range(knots.size):
-            v[i + 1] = decay[i] * v[i] + forcing[i] * (1 - decay[i]) / half
+            v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
         at = np.searchsorted(knots, z)
         last = self._clock_at(np.array([np.inf]))[0]
-        with np.errstate(over="ignore"):
-            # Where only the growth is bounded this ends at the largest float, not at infinity: 0 times it stays 0.
-            growth = np.minimum(np.exp(-half * np.maximum(clock - last, 0.0)), np.finfo(float).max)
-            later = np.minimum(v[-1] * growth, np.finfo(float).max)
-        sliding = np.append(np.linalg.norm(C @ size, axis=0), 0.0)
+        later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
+        sliding = np.append(_column_norms(C @ size), 0.0)
         return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
 
     @cached_property
@@ -220,31 +224,32 @@ class SlidingEnvelope(Envelope):
         deviation = member.coordinates_of(np.eye(L.shape[0]), L)
         return np.abs(member.scaled(deviation)), np.abs(member.scaled(deviation @ L))
 
-    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, np.ndarray]:
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
         """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
         if self.direct:
             return super()._distance_bounds(trajectory, x, unit)
         assert isinstance(trajectory, SlidingTrajectory)
-        sigma0 = np.array([float(s) for s in self.sigma0]) / unit
         bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(trajectory), trajectory.clock)
-        return np.vstack([bounds, norm]), x[:, 0] - sigma0
+        start = [as_exact(v) - sigma for v, sigma in zip(x[:, 0], self.sigma0, strict=True)]
+        return np.vstack([bounds, norm]), start
 
     def _outcome_bounds(
-        self, x0: np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+        self, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of ``|x_k - outcome_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
-        bounds = np.full((len(x0), z.size), np.inf)
-        norm = np.full(z.size, np.inf)
+        bounds = np.full((len(x0), z.size), 0.0 if self._still else np.inf)
+        norm = bounds[0].copy()
         for member in self.members:
-            if member.distance is None:
+            if member.distance is None or not self._usable(member):
                 continue
-            v = self._bounds(member, x0, unit, z, clock)[0]
-            bounds = np.minimum(bounds, np.multiply.outer(member.distance.roots, v))
-            norm = np.minimum(norm, member.distance.norm_root * v)
+            v = self._bounds(member, x0, unit, z, clock)[0] * (1 + 1e-12)
+            with np.errstate(invalid="ignore", over="ignore"):
+                bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
+                norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
         size = sliding_bound(self.protocol, self.sigma0, z) / unit
-        return bounds + size, norm + np.linalg.norm(size, axis=0)
+        return bounds + size, norm + _column_norms(size)
 
-    def outcome_distance(self, remaining: np.ndarray | float, x0: np.ndarray) -> np.ndarray:
+    def outcome_distance(self, remaining: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
 
         Parameters
@@ -256,10 +261,10 @@ class SlidingEnvelope(Envelope):
         -------
         (N, M) or (N,) array
         """
-        q, start = np.atleast_1d(np.asarray(remaining, dtype=float)), np.asarray(x0, dtype=float)
-        unit = self._unit(start)
+        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        unit = self._unit(np.array([float(x) for x in x0]))
         z, clock = self._instants(q)
-        bounds = self._outcome_bounds(start / unit, unit, z, clock)[0] * unit
+        bounds = self._outcome_bounds(x0, unit, z, clock)[0] * unit
         return bounds if np.ndim(remaining) else bounds[:, 0]
 
     def _instants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -268,3 +273,10 @@ class SlidingEnvelope(Envelope):
         with np.errstate(divide="ignore"):
             z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
             return z, np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
+
+
+def _column_norms(M: np.ndarray) -> np.ndarray:
+    """Return the Euclidean norms of the columns; nothing is squared that could leave float64."""
+    top = np.abs(M).max(axis=0, initial=0.0)
+    unit = np.where(top > 0, top, 1.0)
+    return np.linalg.norm(M / unit, axis=0) * top * (1 + 1e-12)

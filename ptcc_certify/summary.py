@@ -101,7 +101,8 @@ def _rate_lines(certificate: Certificate) -> list[str]:
     lines += _class_lines(certificate)
     lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     lines += _distance_lines(certificate)
-    arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
+    balls = not certificate.direct or any(m.distance is not None for m in certificate.envelope.members)
+    arithmetic = "exact or ball arithmetic" if balls else "exact arithmetic"
     lines.append(_line("proof", f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"))
     return lines
 
@@ -136,7 +137,7 @@ def _distance_lines(certificate: Certificate) -> list[str]:
         q = float(1 - certificate.at / certificate.protocol.T)
         each = certificate.outcome_distance([q])[:, 0]
         listed = _listed([f"{label} {_up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
-        lines.append(_line("", f"at t = {float(certificate.at):g}: {listed}"))
+        lines.append(_line("", f"at t = {float(certificate.at):.12g}: {listed}"))
     return lines
 
 
@@ -151,7 +152,7 @@ def _residual_lines(certificate: Certificate) -> list[str]:
     proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
     if at is not None:
         own = certificate.envelope.residual(float(1 - at / certificate.protocol.T))
-        proved.insert(0, f"{_up(own, 3)} at t = {float(at):g}")
+        proved.insert(0, f"{_up(own, 3)} at t = {float(at):.12g}")
     lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
@@ -172,7 +173,7 @@ def _reaching_lines(certificate: Certificate) -> list[str]:
         return []
     share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
-    bounds = envelope.state_bound(np.array([q for q, _ in chosen]), np.array([float(x) for x in certificate.start]))
+    bounds = envelope.state_bound(np.array([q for q, _ in chosen]), certificate.start)
     said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
     return [_line("left", f"||{coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)")]
 

@@ -426,6 +426,9 @@ class Recheck:
         own = sum(2 if member["class"] == "full" else 1 for member in members)
         *steps, last = self.data["proof"]
         assert last["kind"] == "outcome"
+        if steps and steps[-1]["kind"] == "distance":  # its numbers stand with the members
+            assert all("distance" in member for member in self.data["lyapunov"]["members"])
+            steps.pop()
         return steps[: len(steps) - own], steps[len(steps) - own :]
 
     def sharper(self, members: list[dict[str, Any]]) -> None:
@@ -1172,8 +1175,9 @@ def test_a_method_keeps_to_its_class(name: str):
         assert (data["rates"]["diagonal"] is None) == (beside & {"perron", "lmi"} == set())
         rates[method] = float(cert.rate)
     assert rates["paper"] <= min(rates.values()) * (1 + 1e-9)
-    assert rates["best"] >= max(rates.values()) * (1 - 1e-6)
-    assert rates["lmi"] >= rates["perron"] * (1 - 1e-6)
+    # Twice a millionth is given up for a smaller prefactor, once in the choice and once in the report.
+    assert rates["best"] >= max(rates.values()) * (1 - 2.1e-6)
+    assert rates["lmi"] >= rates["perron"] * (1 - 2.1e-6)
 
 
 UNDIRECTED = [name for name, kwargs in CLASSES if kwargs.get("special") == "undirected"]
