@@ -21,6 +21,7 @@ Helmberg, Rendl, Vanderbei, Wolkowicz, An interior-point method for semidefinite
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -266,7 +267,9 @@ class _Factored:
 
         if not np.isfinite(K).all():
             raise np.linalg.LinAlgError
-        self._K, self._factor = K, lu_factor(K, check_finite=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a singular system ends the iteration, which needs no word
+            self._K, self._factor = K, lu_factor(K, check_finite=False)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         from scipy.linalg import lu_solve
