@@ -43,10 +43,17 @@ _EXPORTS = {
     "couple_blocks": "lmi.coupling",
     "schur_positive_definite": "lmi.coupling",
     "DefinitenessProof": "lmi.exact",
+    "DominanceProof": "lmi.exact",
+    "ResidualWitness": "lmi.exact",
+    "SparseDefinitenessProof": "lmi.exact",
+    "definite_by_polynomial": "lmi.exact",
+    "dyadic_integers": "lmi.exact",
     "no_diagonal_rate_above": "lmi.exact",
+    "prove_dominance": "lmi.exact",
     "prove_generalized_margin": "lmi.exact",
     "prove_margin": "lmi.exact",
     "prove_positive_definite": "lmi.exact",
+    "prove_sparse_positive_definite": "lmi.exact",
     "round_to_bits": "lmi.exact",
 }
 __all__ = sorted(_EXPORTS)

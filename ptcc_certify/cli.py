@@ -1,7 +1,8 @@
 """The command line ``ptcc``: parses, calls, prints.
 
-Exit codes: 0 proved and everything asked holds; 1 a bound is violated; 2 bad input or usage; 3 an expectation is
-refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything else to standard error.
+Exit codes: 0 proved and everything asked holds; 1 a bound is violated, or a certificate rejected; 2 bad input or
+usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything
+else to standard error.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import sys
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.structure import Structure
 
-OK, VIOLATED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4
+OK, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 2, 3, 4
+VIOLATED = REJECTED = 1
 #: From this size on the search may take more than a second, which a terminal is told.
 SLOW_NODES = 40
 INTERNAL_ERROR, INTERRUPTED = 70, 130
@@ -42,13 +45,13 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return apply
 
 
-_graph_options = _options(
-    click.argument("graph"),
+_reading_options = _options(
     click.option("--edges", type=click.Choice(["information", "listens"]), help="Row a,b: flows a -> b, or a listens."),
     click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
     click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
 )
+_graph_options = _options(click.argument("graph"), _reading_options)
 _protocol_options = _options(
     click.option(
         "--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal", show_default=True
@@ -98,9 +101,9 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     expected = _behaviour(expect)
     structure = analyse(_read(graph, **read))
     if as_json:
-        from ptcc_certify.certificate import structure_json
+        from ptcc_certify.document import structure_document
 
-        _print_json(structure_json(structure))
+        _print_json(structure_document(structure))
     else:
         _print(structure_lines(structure, graph))
     return _refuted(structure, expected)
@@ -156,6 +159,34 @@ def certify(
         if output:
             click.echo(f"written    {output}")
     return _exit_code(certificate, expected, wanted)
+
+
+@cli.command()
+@click.argument("certificate")
+@click.argument("graph", required=False)
+@_reading_options
+@click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
+@_json_option
+def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **read: Any) -> int:
+    """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
+
+    Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
+    certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
+    """
+    from ptcc_certify.checker import check as run
+
+    signed = None if graph is None else _read(graph, **read)
+    report = run(certificate, stdlib=stdlib)
+    if signed is not None and report.sha256 != signed.sha256:
+        reason = f"the certificate is about another graph than {graph}"
+        report = replace(report, accepted=False, rejected="graph", reason=reason)
+    if as_json:
+        _print_json(report.to_dict())
+    else:
+        _print(report.lines())
+    if not report.accepted:
+        return REJECTED
+    return OK if report.verdict == "certified" else UNDECIDED
 
 
 @cli.command()
@@ -448,7 +479,7 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
         return code
     limit = certificate.rate_limit
     if limit is not None and min_rate > limit:
-        click.echo(f"refuted: no rate of this graph exceeds {float(limit):.6g} (mean eigenvalue)", err=True)
+        click.echo(f"refuted: no rate of this graph exceeds {float(limit):.6g} (proved)", err=True)
         return REFUTED_EXPECTATION
     click.echo("undecided: no such rate is proved, and none is excluded", err=True)
     return UNDECIDED

@@ -227,12 +227,13 @@ def _sharp(x: Any) -> bool:
 
 
 def _above(x: Any) -> Fraction:
-    """Return a short rational that is not below any number of the ball."""
+    """Return a short rational that is above every number of the ball, 0 if that is all it holds."""
     mantissa, exponent = (int(part) for part in x.upper().man_exp())
     if mantissa <= 0:
         return Fraction(0)
-    short = max(mantissa.bit_length() - _KEPT_BITS, 0)
-    return Fraction(-(-mantissa >> short)) * Fraction(2) ** (exponent + short)
+    extra = mantissa.bit_length() - _KEPT_BITS
+    kept = mantissa >> extra if extra >= 0 else mantissa << -extra
+    return Fraction(kept + 1) * Fraction(2) ** (exponent + extra)
 
 
 def _largest_eigenvalue(C: Any, fallback: Fraction) -> Fraction:

@@ -331,6 +331,13 @@ class SignedDigraph:
         """Return the weight of edge number ``edge`` exactly."""
         return self._weights.fraction(edge)
 
+    def weight_table(self) -> tuple[np.ndarray | None, int]:
+        """Return int64 numerators or float64 weights, in the order of the edges, and what divides them.
+
+        None where neither holds the weights exactly.
+        """
+        return (None if self._weights.kind == "fraction" else self._weights.table), self._weights.scale
+
     def equal_weights(self, other: np.ndarray) -> np.ndarray:
         """Tell for each edge ``i`` whether its weight equals that of edge ``other[i]``, exactly."""
         return np.asarray(self._weights.table == self._weights.table[other], dtype=bool)

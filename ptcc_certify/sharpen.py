@@ -27,7 +27,7 @@ from lmi.matrices import block_columns
 from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.lemmas import laplacian_spectrum, left_vector
-from ptcc_certify.theorems.base import BITS, Matrix, Obligation, diagonal_matrix
+from ptcc_certify.theorems.base import BITS, Matrix, diagonal_matrix
 
 METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
@@ -76,7 +76,8 @@ class SharpMember:
         ``P A + A' P > rate P`` on the error's subspace; negative rates, which bound the growth, occur too.
     lowest, highest : Fraction
         ``lowest I <= P <= highest I``.
-    obligations : tuple of Obligation
+    numerical_rate : float
+        The rate of the matrix before it was rounded, in floating point.
     """
 
     kind: str
@@ -86,7 +87,7 @@ class SharpMember:
     rate: Fraction
     lowest: Fraction
     highest: Fraction
-    obligations: tuple[Obligation, ...]
+    numerical_rate: float
 
     @property
     def prefactor(self) -> Fraction:
@@ -212,9 +213,7 @@ def _without_hair_splitting(members: list[SharpMember]) -> list[SharpMember]:
         near = [m.rate for m in members if m.prefactor < member.prefactor and 0 < m.rate < member.rate]
         close = [rate for rate in near if member.rate - rate <= Fraction(_SAME_RATE) * rate]
         if close:
-            rate = max(close)
-            first = replace(member.obligations[0], numbers={"b": rate})
-            member = replace(member, rate=rate, obligations=(first, *member.obligations[1:]))
+            member = replace(member, rate=max(close))
         result.append(member)
     return result
 
@@ -222,7 +221,6 @@ def _without_hair_splitting(members: list[SharpMember]) -> list[SharpMember]:
 def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
     """Round a candidate to rationals and prove its rate and prefactor in exact arithmetic; None if a step fails."""
     n = len(system.nodes)
-    kernel = "" if system.basis is None else " on the range of L"
     if candidate.log_weights is not None:
         weights = rounded_diagonal(candidate.log_weights, BITS)
         if min(weights) <= 0:
@@ -230,9 +228,9 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
         rate = system.prove_rate(diagonal_matrix(weights), candidate.rate)
         if rate is None:
             return None
-        statement = f"P L + L' P - b P > 0{kernel}, P diagonal on the rows of E that move"
-        proved = Obligation("rate", statement, "Lyapunov decrease", {"b": rate})
-        return SharpMember(candidate.kind, system.nodes, weights, None, rate, min(weights), max(weights), (proved,))
+        return SharpMember(
+            candidate.kind, system.nodes, weights, None, rate, min(weights), max(weights), candidate.rate
+        )
     assert candidate.matrix is not None
     P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
     rate = system.prove_rate(P, candidate.rate)
@@ -244,15 +242,7 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
     negated = prove_generalized_margin([[-x for x in row] for row in P], identity, -float(size[-1]))
     if lowest is None or lowest <= 0 or negated is None:
         return None
-    obligations = (
-        Obligation(
-            "rate", f"P L + L' P - b P > 0{kernel}, P on the rows of E that move", "Lyapunov decrease", {"b": rate}
-        ),
-        Obligation(
-            "prefactor", "lowest I < P < highest I", "Rayleigh quotient", {"lowest": lowest, "highest": -negated}
-        ),
-    )
-    return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, obligations)
+    return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, candidate.rate)
 
 
 # ---------------------------------------------------------------------- classes

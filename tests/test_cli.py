@@ -22,7 +22,7 @@ from bad_inputs import BAD_INPUTS, BadInput, Run, listing, ptcc, write
 from scipy.linalg import expm
 
 from ptcc_certify.bounds import Envelope
-from ptcc_certify.certificate import read_certificate
+from ptcc_certify.checker import read
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_graph
@@ -224,16 +224,32 @@ def test_a_refuted_expectation_is_3(command: str):
 
 
 def test_a_rate_beyond_the_exact_limit_is_3_and_one_below_it_4():
-    """fig1b: trace(L) = 10 over 5 nonzero eigenvalues bounds every rate; between it and the proved rate lies doubt."""
+    """fig1b: the limit of its slowest mode bounds every rate, below that of its mean eigenvalue; up to it is doubt."""
     data = one_object(ptcc("certify", "fig1b", "--json").out)
-    proved = Fraction(data["rates"]["certified"])
-    limit = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5
-    assert proved < limit
-    for wanted, code in ((proved, 0), (proved + Fraction(1, 10**6), 4), (limit, 4), (limit + Fraction(1, 10**6), 3)):
+    proved, limit = Fraction(data["rates"]["certified"]), Fraction(data["rates"]["limit"])
+    mean = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
+    hair = Fraction(1, 10**6)
+    assert proved + hair < limit < mean
+    for wanted, code in ((proved, 0), (proved + hair, 4), (limit, 4), (limit + hair, 3), (mean, 3)):
         run = ptcc("certify", "fig1b", "--min-rate", str(wanted))
         assert run.code == code
-        assert len(run.err.splitlines()) == (code != 0)
+        assert (
+            run.err
+            == {
+                0: "",
+                3: f"refuted: no rate of this graph exceeds {float(limit):.6g} (proved)\n",
+                4: "undecided: no such rate is proved, and none is excluded\n",
+            }[code]
+        )
         assert run.out
+
+
+def test_of_one_mode_the_mean_eigenvalue_is_the_limit():
+    """Two agents: 8 is twice the only nonzero eigenvalue, and the limit that was proved by inertia lies above it."""
+    name = save("pair.csv", [(1, 2, -1), (2, 1, -3)])
+    limit = Fraction(one_object(ptcc("certify", name, "--json").out)["rates"]["limit"])
+    assert 8 < limit < 8 + Fraction(1, 10**6)
+    assert ptcc("certify", name, "--min-rate", str((8 + limit) / 2)).code == 3
 
 
 def test_a_large_graph_is_undecided():
@@ -322,7 +338,7 @@ def test_json_is_exactly_one_object(command: str, name: str):
 def test_json_goes_out_also_when_an_expectation_is_refuted():
     run = ptcc("certify", "fig1a", "--json", "--expect", "consensus", "-o", "c.json")
     assert run.code == 3
-    assert one_object(run.out) == read_certificate("c.json")
+    assert one_object(run.out) == read("c.json")
 
 
 # ---------------------------------------------------------------------- files in and out
@@ -331,7 +347,7 @@ def test_json_goes_out_also_when_an_expectation_is_refuted():
 def test_the_certificate_is_written_whole(folder: Path):
     run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json", "--json")
     data = one_object(run.out)
-    assert one_object(Path("c.json").read_text(encoding="utf-8")) == data == read_certificate("c.json")
+    assert one_object(Path("c.json").read_text(encoding="utf-8")) == data == read("c.json")
     assert listing(folder) == ["c.json"]
     run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json")
     assert run.out.splitlines()[-1] == "written    c.json"
@@ -421,7 +437,7 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
     np.savez("surrogate.npz", A=[[0.0, 1.0], [1.0, 0.0]], labels=["\ud800", "b"])
     run = ptcc("certify", "surrogate.npz", "-o", "c.json", "--json")
     assert run.code == 0
-    assert read_certificate("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
+    assert read("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
     assert ptcc("simulate", "surrogate.npz").code == 0
 
 
@@ -597,7 +613,7 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
             assert match.group(8, 9, 10) == ("-", "-", "-")
         rate, tightness, worst = (float(x) for x in match.group(5, 6, 7))
         assert rate > 0 and 0 < tightness <= 1 and 0 < worst <= 1
-        data = read_certificate(f"new/results/{graph}.json")
+        data = read(f"new/results/{graph}.json")
         assert data["claim"]["theorem"] == match[3]
         assert data["claim"]["behaviour"] == behaviour
         assert float(Fraction(data["rates"]["certified"])) == pytest.approx(rate, abs=1e-4)

@@ -15,6 +15,8 @@ import pytest
 from generators import all_classes, random_graph
 
 from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.checker import SLIDING_BOUND, SLIDING_CLOCK, digest
+from ptcc_certify.checker import check as independent_check
 from ptcc_certify.disturbance import SampledDisturbance, StateDependent, telegraph_noise
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph, select
@@ -124,11 +126,66 @@ def test_every_key_about_the_sliding_mode_is_exact_and_readable():
     assert data["protocol"]["disturbance"] == "sin(2*k*t + pi/3)"
     assert data["claim"]["theorem"] == data["paper"]["theorem"] == "4.1"
     assert data["sigma0"]["1"] == "-9"
-    assert {o["kind"] for o in data["proof"]} >= {"sliding-bound", "reaching-time", "outcome"}
+    places = [(step["kind"], step["of"], step["numbers"], step["witness"]) for step in data["proof"]]
+    assert [kind for kind, _, _, _ in places[:4]] == ["structure", "claim", "outcome", "deviation-decrease"]
+    assert places[-3][:2] == ("rate-limit", "rates")
+    assert places[-2:] == [("sliding-bound", "protocol", {}, None), ("reaching-time", "reaching_time", {}, None)]
+    assert data["reaching_time"]["bound"] == SLIDING_BOUND and data["reaching_time"]["clock"] == SLIDING_CLOCK
     assert cert.reaching is not None
     assert [Fraction(z) for z in data["reaching_time"]["z"].values()] == [r.z for r in cert.reaching]
     assert data["unverified"]["simulation"]["reaching_kept"] is True
     assert data["unverified"]["residual"] is None
+
+
+def test_a_reaching_time_is_part_of_the_proof_only_where_one_is_proved():
+    """``mu3 kappa < 1`` and a large ``sigma(0)``: certain at ``T_r`` only, and ``z`` is null."""
+    graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
+    weak = SlidingModeProtocol(1, 1, 1, 1, 1, 2, 1, "1/2", 1)
+    late = certify(graph, weak, sigma0=["1e9", "-1e9"], simulation=False)
+    assert late.reaching is not None and [r.z for r in late.reaching] == [None, None]
+    both = certify(graph, weak, sigma0=["1e9", "1/100"], simulation=False)
+    assert both.reaching is not None and [r.z is None for r in both.reaching] == [True, False]
+    still = certify(graph, weak, sigma0=[0, 0], simulation=False)
+    half = certify(graph, weak, sigma0=["1e9", 0], simulation=False)  # the other is 0 from the start, which is no step
+    ends = {"late": late, "both": both, "still": still, "half": half}
+    proved = {
+        name: [o.kind for o in cert.obligations if o.of in ("protocol", "reaching_time")] for name, cert in ends.items()
+    }
+    assert proved == {
+        "late": ["sliding-bound"],
+        "both": ["sliding-bound", "reaching-time"],
+        "still": ["sliding-bound"],
+        "half": ["sliding-bound"],
+    }
+    assert all(cert.verdict == "certified" for cert in ends.values())
+
+
+def spoilt(data: dict[str, Any], *path: str, to: Any) -> str | None:
+    """What the check rejects once one entry is changed, and the digest with it."""
+    copy = json.loads(json.dumps(data))
+    place = copy
+    for key in path[:-1]:
+        place = place[key]
+    assert place[path[-1]] != to
+    place[path[-1]] = to
+    report = independent_check({**copy, "digest": digest(copy)})
+    assert not report.accepted
+    return report.rejected
+
+
+def test_the_check_sees_a_reaching_time_that_is_too_early_and_gains_that_prove_nothing():
+    cert = example("4", "fig1b")
+    assert cert.checked is not None and cert.checked.accepted
+    data = json.loads(cert.to_json())
+    for label, z in data["reaching_time"]["z"].items():
+        early = str(Fraction(z) * Fraction(999, 1000))
+        assert spoilt(data, "reaching_time", "z", label, to=early) == "reaching-time of reaching_time"
+        farther = str(Fraction(data["sigma0"][label]) * Fraction(1001, 1000))
+        moved = spoilt(data, "sigma0", label, to=farther)
+        assert moved is not None  # the outcome is that of another sigma(0), and the time too
+        assert spoilt(data, "reaching_time", "z", label, to=str(-Fraction(z))) == "reaching-time of reaching_time"
+    assert spoilt(data, "protocol", "mu1", to=data["protocol"]["delta"]) is not None
+    assert spoilt(data, "reaching_time", "bound", to="||sigma(t)|| <= 0") == "reaching_time"
 
 
 def test_certified_reaching_times_hold_in_balls():
@@ -151,6 +208,7 @@ def test_without_a_start_the_reaching_times_are_proved_all_the_same():
     cert = certify(SignedDigraph.from_edges([("a", "b", 1)]), protocol, sigma0={"b": 2, "a": 0})
     assert cert.reaching is not None and [r.z is not None and r.z > 0 for r in cert.reaching] == [False, True]
     assert cert.outcome is None and cert.trajectory is None
+    assert cert.verdict == "certified" and cert.obligations[-1].kind == "reaching-time"
     assert json.loads(cert.to_json())["sigma0"] == {"a": "0", "b": "2"}
 
 
@@ -162,6 +220,8 @@ def test_without_sigma_the_certificate_is_the_nominal_one():
     assert slid.outcome is not None and plain.outcome is not None
     assert slid.outcome.final_state == plain.outcome.final_state
     assert slid.envelope.residual(0.01) == plain.envelope.residual(0.01)
+    assert slid.verdict == plain.verdict == "certified"
+    assert slid.obligations[:-1] == plain.obligations and slid.obligations[-1].kind == "sliding-bound"
     assert json.loads(slid.to_json())["sigma0"] == dict.fromkeys(graph.labels, "0")
     assert json.loads(plain.to_json())["sigma0"] is None
 

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_latex import read, rows_of
 
+from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.protocols import NominalProtocol
@@ -92,7 +93,7 @@ def test_every_row(name: str, kwargs: dict):
         if not V.blocks:
             assert spectral is None
             assert proof.rate is None
-            assert proof.failed is None
+            assert proof.failed is None and proof.obligations == ()
             continue
         rate = theorem.rate(structure, V)
         assert rate == pytest.approx(rate_from_the_definition(structure, V, theorem.number), rel=1e-8)
@@ -101,6 +102,14 @@ def test_every_row(name: str, kwargs: dict):
         assert 0 < float(proof.rate) <= spectral * (1 + 1e-9)
         assert V.prefactor == max(V.weights) / min(V.weights) >= 1
         assert min(V.weights) > 0
+        last = [o for o in proof.obligations if o.kind != "rho-interval"][-1]
+        if theorem.number == "1.1":
+            assert (last.kind, last.of, last.numbers) == ("deviation-decrease", "paper", {"b": proof.rate})
+        else:
+            rho = {} if V.rho is None else {"rho": V.rho}
+            assert (last.kind, last.of) == ("margin", "paper")
+            assert last.numbers == {"m": proof.rate * max(V.weights), **rho}
+        assert all((o.statement, o.lemma) == OBLIGATIONS[o.kind] and o.witness is None for o in proof.obligations)
         if proof.interval is not None and V.rho is not None and proof.interval.exact is not None:
             assert 0 < proof.interval.printed <= proof.interval.exact
             assert V.rho <= proof.interval.exact

@@ -11,11 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 import lmi
 from lmi.exact import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
+from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
 from ptcc_certify.structure import ClosedComponent, Structure
@@ -110,23 +112,34 @@ class LyapunovFunction:
 
 @dataclass(frozen=True)
 class Obligation:
-    """One statement that was proved in exact arithmetic.
+    """One statement that was proved, and that the independent check verifies again.
 
     Attributes
     ----------
     kind : str
-    statement : str
-        The inequality in the paper's letters.
-    lemma : str
-        What turns the statement into the claim.
+        One of :data:`ptcc_certify.checker.OBLIGATIONS`, which gives the statement and its lemma.
+    of : str
+        The part of the certificate that it is about.
     numbers : mapping of str to Fraction
         The constants of the statement.
+    witness : mapping or None
+        What makes the statement easy to verify; need not be trusted.
     """
 
     kind: str
-    statement: str
-    lemma: str
+    of: str
     numbers: Mapping[str, Fraction] = field(default_factory=dict)
+    witness: Mapping[str, Any] | None = None
+
+    @property
+    def statement(self) -> str:
+        """What is stated."""
+        return OBLIGATIONS[self.kind][0]
+
+    @property
+    def lemma(self) -> str:
+        """What makes the statement part of the claim."""
+        return OBLIGATIONS[self.kind][1]
 
 
 @dataclass(frozen=True)
@@ -294,8 +307,11 @@ def prove_direct(structure: Structure, V: LyapunovFunction, letter: str) -> Rate
     m = prove_margin(S, smallest_eigenvalue(to_floats(S)))
     if m is None:
         return RateProof(None, (), failed=f"{letter} is not proved positive definite")
-    statement = Obligation("positive-definite", f"{letter} - m I > 0", "Lyapunov decrease", {"m": m})
-    return RateProof(m / max(weights), (statement,))
+    return RateProof(m / max(weights), (Obligation("margin", "paper", {"m": m} | _rho(V)),))
+
+
+def _rho(V: LyapunovFunction) -> dict[str, Fraction]:
+    return {} if V.rho is None else {"rho": V.rho}
 
 
 def prove_connectivity(graph: SignedDigraph, p: tuple[Fraction, ...], guess: float) -> Fraction | None:
@@ -337,8 +353,8 @@ def prove_coupled(
     m = prove_margin(S, smallest_eigenvalue(to_floats(S)))
     if m is None:
         return RateProof(None, leaders, failed=f"{letter} is not proved positive definite")
-    statement = Obligation("positive-definite", f"{letter}(rho) - m I > 0", "Lyapunov decrease", {"m": m, "rho": rho})
-    interval, found = prove_interval(V, phi, letter)
+    statement = Obligation("margin", "paper", {"m": m} | _rho(V))
+    interval, found = prove_interval(V, phi)
     return RateProof(m / max(V.weights), (*leaders, statement, *found), interval)
 
 
@@ -360,7 +376,7 @@ def exact_phi(structure: Structure, V: LyapunovFunction, gamma: Matrix) -> Calla
 
 
 def prove_interval(
-    V: LyapunovFunction, phi: Callable[[Fraction], Matrix], letter: str
+    V: LyapunovFunction, phi: Callable[[Fraction], Matrix]
 ) -> tuple[ExactInterval | None, tuple[Obligation, ...]]:
     """Prove the ends of the interval of ``rho``: ``Phi(end) > 0`` implies ``Phi(rho) > 0`` for ``0 < rho < end``."""
     if V.interval is None:
@@ -379,8 +395,7 @@ def prove_interval(
     interval = ExactInterval(ends["printed"], ends["exact"])
     if not numbers:
         return interval, ()
-    statement = f"{letter}(end) > 0 at both ends, so {letter}(rho) > 0 in between"
-    return interval, (Obligation("rho-interval", statement, "Lemma 5", numbers),)
+    return interval, (Obligation("rho-interval", "paper", numbers),)
 
 
 def closed_blocks(structure: Structure) -> list[tuple[int, ClosedComponent]]:

@@ -85,5 +85,5 @@ class DiagonalComposite(Theorem):
         K = [v for block in V.blocks[:-1] for v in block.nodes]
         weights = [w for block in V.blocks[:-1] for w in block.diagonal]
         gamma = symmetric_product(weights, exact_block(structure.graph.exact_laplacian(), K, K))
-        interval, found = prove_interval(V, exact_phi(structure, V, gamma), self.product_letter)
+        interval, found = prove_interval(V, exact_phi(structure, V, gamma))
         return RateProof(direct.rate, (*direct.obligations, *found), interval)

@@ -88,12 +88,7 @@ class BalancedQuasiStrong(Theorem):
         b = prove_connectivity(graph, nu, connectivity_rate(graph, nu))
         if b is None:
             return RateProof(None, (), failed="2 a(L_L) is not proved positive")
-        lemma = Obligation(
-            "positive-definite-modulo-kernel",
-            "L_L'(Xi_L L_L + L_L' Xi_L - b Xi_L)L_L > 0 modulo G_L 1",
-            "Lemma 3.1",
-            {"b": b},
-        )
+        lemma = Obligation("leader-decrease", "paper.Xi_L", {"b": b})
         return prove_coupled(structure, V, diagonal_matrix(b * x for x in nu), (lemma,), "Phi")
 
 

@@ -68,8 +68,7 @@ class BalancedStrong(Theorem):
         b = prove_weighted_deviation(structure.graph, gauge, V.weights, self.rate(structure, V))
         if b is None:
             return RateProof(None, (), failed="2 a(L) is not proved positive")
-        statement = "Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G"
-        return RateProof(b, (Obligation("positive-definite-modulo-kernel", statement, "Lemma 3.1", {"b": b}),))
+        return RateProof(b, (Obligation("deviation-decrease", "paper", {"b": b}),))
 
 
 class UnbalancedStrong(Theorem):

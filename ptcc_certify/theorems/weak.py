@@ -134,20 +134,17 @@ class BalancedWeak(Theorem):
             if balanced:
                 b = prove_connectivity(graph, block.diagonal, guess / float(min(block.diagonal)))
                 decrease = None if b is None else b * min(block.diagonal)
-                kind = "positive-definite-modulo-kernel"
-                statement = f"L_k'({block.name} L_k + L_k' {block.name} - b {block.name})L_k > 0 modulo G_k 1"
-                numbers = {"b": b}
+                kind, numbers = "leader-decrease", {"b": b}
             else:
                 S = symmetric_product(block.diagonal, graph.exact_laplacian())
                 decrease = prove_margin(S, smallest_eigenvalue(to_floats(S)))
-                kind, statement = "positive-definite", f"{block.name} L_k + L_k' {block.name} - m I > 0"
-                numbers = {"m": decrease}
+                kind, numbers = "leader-margin", {"m": decrease}
             if decrease is None:
                 return RateProof(
                     None, tuple(obligations), failed=f"the decrease of {block.name} is not proved positive"
                 )
             proved = {name: value for name, value in numbers.items() if value is not None}
-            obligations.append(Obligation(kind, statement, "Lemma 3.1" if balanced else "Lemma 3.2", proved))
+            obligations.append(Obligation(kind, f"paper.{block.name}", proved))
             gamma += [decrease] * len(block.nodes)
         Gamma: Matrix = diagonal_matrix(gamma)
         return prove_coupled(structure, V, Gamma, tuple(obligations), "Pi")

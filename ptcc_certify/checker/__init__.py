@@ -1,0 +1,121 @@
+"""The independent check of a certificate: from its JSON alone, in exact arithmetic, without a solver.
+
+Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from its edges, and checks every claim
+outside ``unverified``, step by step as the proof lists them. Imports the standard library and three modules on exact
+arithmetic, nothing that makes certificates; python-flint and NumPy are used where they are installed. ``FORMAT.md``
+specifies the file. The modules, in the order of the proof: ``reading``, ``structure``, ``outcome``, ``lyapunov``.
+
+    python -m ptcc_certify.checker certificate.json [--stdlib]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ptcc_certify.checker.lyapunov import LyapunovCheck
+from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Step
+from ptcc_certify.checker.outcome import SLIDING_BOUND, SLIDING_CLOCK
+from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
+from ptcc_certify.checker.structure import MANY_COMPONENTS
+from ptcc_certify.errors import FormatError
+
+__all__ = [
+    "MANY_COMPONENTS",
+    "OBLIGATIONS",
+    "SCHEMA",
+    "SLIDING_BOUND",
+    "SLIDING_CLOCK",
+    "CheckReport",
+    "Step",
+    "check",
+    "digest",
+    "read",
+]
+
+
+def check(source: str | Path | Mapping[str, Any], *, stdlib: bool = False) -> CheckReport:
+    """Check a certificate.
+
+    Parameters
+    ----------
+    source : path, or the parsed JSON object
+    stdlib : bool
+        Use the standard library alone, even where python-flint is installed.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> check({"schema": SCHEMA}).reason
+    'the key "producer" is missing'
+    """
+    if isinstance(source, Mapping):
+        data, folder = dict(source), Path()
+    else:
+        data, folder = read(source), Path(source).parent
+    run = _Check(data, folder, stdlib)
+    try:
+        run.everything()
+    except RejectedError as error:
+        reason = str(error)
+    except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
+        reason = f"malformed ({type(error).__name__})"
+    else:
+        return CheckReport(True, data["verdict"], tuple(run.steps), None, None, run.exact.name, run.sha256)
+    return CheckReport(False, "", tuple(run.steps), run.at, reason, run.exact.name, run.sha256)
+
+
+class _Check(LyapunovCheck):
+    """One run through a whole certificate."""
+
+    def everything(self) -> None:
+        keys = ["schema", "producer", "graph", "structure", "claim", "protocol", "paper", "lyapunov", "rates"]
+        keys += ["prefactor", "initial_state", "sigma0", "outcome", "reaching_time", "effort", "proof", "verdict"]
+        components = ["components"] if "components" in self.data else []
+        fields(self.data, [*keys, *components, "digest", "unverified"], "the certificate")
+        need(self.data["schema"] == SCHEMA, "an unknown schema")
+        need(isinstance(self.data["producer"], str), "producer is not a text")
+        need(isinstance(self.data["unverified"], dict), "unverified is not an object")
+        need(self.data["effort"] is None, "effort is not null")
+        entries(self.data["proof"], "proof")
+        self.protocol()
+        self.graph()
+        self.structure()
+        self.claims()
+        self.outcome()
+        self.paper()
+        self.members()
+        self.rates()
+        self.limit()
+        self.sliding()
+        self.at = "proof"
+        need(self.next == len(self.data["proof"]), "an obligation that nothing asks for")
+        self.at = "verdict"
+        moving = self.data["rates"]["certified"] is not None or not self.moving
+        said = "certified" if moving and self.data["outcome"] is not None else "undecided"
+        need(self.data["verdict"] == said, f"what was proved makes it {said}")
+        self.at = "digest"
+        need(digest(self.data) == self.data["digest"], "the certificate was changed after it was made")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check the certificate that the command line names; 0 proved, 1 rejected, 2 unreadable, 4 undecided."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    stdlib = "--stdlib" in words
+    paths = [word for word in words if word != "--stdlib"]
+    if len(paths) != 1 or paths[0].startswith("-"):
+        print("usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]", file=sys.stderr)
+        return 2
+    try:
+        report = check(paths[0], stdlib=stdlib)
+    except FormatError as error:
+        print(f"checker: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(report.lines()))
+    return 1 if not report.accepted else 0 if report.verdict == "certified" else 4

@@ -1,0 +1,7 @@
+"""Run the check: ``python -m ptcc_certify.checker certificate.json [--stdlib]``."""
+
+import sys
+
+from ptcc_certify.checker import main
+
+sys.exit(main())

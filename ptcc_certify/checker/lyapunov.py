@@ -1,0 +1,350 @@
+"""Verifies Lyapunov functions: the paper's own, the sharper ones, their rates and prefactors, and what limits rates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+from operator import mul
+from typing import Any
+
+from ptcc_certify.checker.outcome import OutcomeCheck
+from ptcc_certify.checker.reading import entries, exact, fields, need, short, shown, triangle
+
+Matrix = list[list[int]]
+Row = tuple[str, str, list[tuple[str, list[int], bool]]]
+
+
+class LyapunovCheck(OutcomeCheck):
+    """Every claim about decay."""
+
+    # ------------------------------------------------------------------ matrices
+
+    def _block(self, nodes: Sequence[int]) -> Matrix:
+        """Return rows and columns of ``L``, times unit."""
+        return [[self.L[i].get(j, 0) for j in nodes] for i in nodes]
+
+    def _state_form(self, P: Mapping[int, Mapping[int, int]]) -> Matrix:
+        """Return ``L'P L``: the form ``E'P E`` in the state, times unit squared."""
+        F = [[0] * self.n for _ in range(self.n)]
+        for a, row in P.items():
+            moved = [0] * self.n
+            for b, weight in row.items():
+                for j, x in self.L[b].items():
+                    moved[j] += weight * x
+            for i, x in self.L[a].items():
+                F[i] = [f + x * y for f, y in zip(F[i], moved, strict=True)]
+        return F
+
+    def _decrease(self, F: Matrix, b: Fraction, nodes: Sequence[int]) -> Matrix:
+        """Return ``F L + L'F - b F`` on some nodes, times a positive integer; ``F`` is symmetric."""
+        moved = []
+        for row in F:
+            product = [0] * self.n
+            for x, laplacian in zip(row, self.L, strict=True):
+                if x:
+                    for j, y in laplacian.items():
+                        product[j] += x * y
+            moved.append(product)
+        p, q = (b * self.unit).as_integer_ratio()
+        return [[q * (moved[i][j] + moved[j][i]) - p * F[i][j] for j in nodes] for i in nodes]
+
+    def _margin(self, S: Sequence[Sequence[Fraction]], m: Fraction) -> bool:
+        """Tell whether ``S - m I > 0`` is proved."""
+        n = len(S)
+        return self.exact.definite(integers([[S[i][j] - m * (i == j) for j in range(n)] for i in range(n)])[0])
+
+    # ------------------------------------------------------------------ the paper's own certificate
+
+    def _row(self) -> Row:
+        """Return objective, coordinates and blocks of the theorem's row."""
+        family, balanced = int(self.theorem[0]), self.theorem.endswith("1")
+        row, F = family - 3 if self.is_sliding else family, self.followers
+        groups = [(k, group) for k, group in enumerate(self.closed, start=1) if len(group) > 1]
+        if not self.moving:
+            return "none: every agent keeps its state", "eps" if row == 1 else "E", []
+        if row == 1:
+            if balanced:
+                return "2 a(L)", "eps", [("P", self.closed[0], False)]
+            return "lmin(Omega L + L' Omega) / lmax(Omega)", "E", [("Omega", self.closed[0], False)]
+        if balanced and not groups:
+            letter = "Xi_F" if row == 2 else "H_F"
+            return f"lmin({letter} L_F + L_F' {letter}) / lmax({letter})", "E", [(letter, F, False)]
+        if row == 2:
+            name, objective = ("Xi_L", "lmin(Phi) / lmax(Xi)") if balanced else ("Xit_L", "lmin(Psi) / lmax(Xit)")
+            return objective, "E", [(name, groups[0][1], False), ("Xi_F", F, True)]
+        letter, objective = (
+            ("H_", "lmin(Pi) / lmax(H)") if balanced else ("Theta_L", "lmin(Theta L + L' Theta) / lmax(Theta)")
+        )
+        last = [("H_F" if balanced else "Theta_F", F, True)] if F else []
+        return objective, "E", [(f"{letter}{k}", group, False) for k, group in groups] + last
+
+    def paper(self) -> None:
+        """Verify the certificate of the theorem's row as the paper has it."""
+        self.at, said = "paper", self.data["paper"]
+        self.paper_rate: Fraction | None = None
+        if said is None:
+            return
+        keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "prefactor")
+        said, (objective, coordinates, expected) = fields(said, keys, "paper"), self._row()
+        need(said["theorem"] == self.theorem and said["objective"] == objective, "another theorem or objective")
+        need(said["coordinates"] == coordinates, "other coordinates")
+        self.blocks: list[tuple[str, list[int], list[Fraction], bool]] = []
+        for entry, (name, nodes, times_rho) in zip(
+            entries(said["blocks"], "blocks", len(expected)), expected, strict=True
+        ):
+            fields(entry, ("name", "nodes", "diagonal", "times_rho"), "a block")
+            need(entry["name"] == name and entry["times_rho"] is times_rho, "another block")
+            need(self._numbers(entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
+            weights = [exact(w) for w in entries(entry["diagonal"], "diagonal", len(nodes))]
+            need(all(w > 0 for w in weights), "a weight is not positive")
+            self.blocks.append((name, nodes, weights, times_rho))
+        need((said["rho"] is not None) == any(b[3] for b in self.blocks), "rho belongs to a block times rho")
+        self.rho = Fraction(1) if said["rho"] is None else exact(said["rho"])
+        need(self.rho > 0, "rho is not positive")
+        self.weights = {v: w * (self.rho if b[3] else 1) for b in self.blocks for v, w in zip(b[1], b[2], strict=True)}
+        if not self.blocks:
+            need(said["rate"] is None and said["prefactor"] is None, "a rate where nothing moves")
+        else:
+            need(exact(said["prefactor"]) == max(self.weights.values()) / min(self.weights.values()), "prefactor")
+        if said["rate"] is None:
+            need(said["rho_interval"] is None, "an interval without a proof")
+            return
+        self.paper_rate = exact(said["rate"])
+        need(self.paper_rate > 0, "the rate is not positive")
+        if coordinates == "eps":
+            b = self.open("deviation-decrease", "paper", ["b"])["b"]
+            need(b == self.paper_rate, "b is not the rate")
+            need(self.exact.definite(self._decrease(self._deviation()[0], b, self.kept)), "not proved definite")
+            need(said["rho_interval"] is None, "an interval without rho")
+            self.done(f"b = {shown(b)}")
+            return
+        gamma = self._leaders() if self.theorem in ("2.1", "3.1", "5.1", "6.1") else None
+        numbers = self.open("margin", "paper", ["m"] if said["rho"] is None else ["m", "rho"])
+        need(numbers.get("rho", self.rho) == self.rho, "another rho")
+        need(self._margin(self._coupled(gamma, self.rho), numbers["m"]), "not proved definite")
+        need(self.paper_rate == numbers["m"] / max(self.weights.values()), "the rate is not m / largest weight")
+        self.done(f"m = {shown(numbers['m'])}, rate {shown(self.paper_rate)}")
+        self._interval(gamma)
+
+    def _deviation(self) -> tuple[Matrix, Fraction]:
+        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale, and the scale."""
+        (_, nodes, p, _), gauge = self.blocks[0], self.gauges[0] or []
+        total, n = sum(p), len(nodes)
+        Z = [[gauge[i] * gauge[j] * (total * p[i] * (i == j) - p[i] * p[j]) for j in range(n)] for i in range(n)]
+        form, scale = integers(Z)
+        return form, Fraction(total * scale)
+
+    def _leaders(self) -> dict[int, Fraction]:
+        """Verify the decrease of each leader block; return the diagonal of Gamma."""
+        gamma: dict[int, Fraction] = {}
+        for name, nodes, weights, times_rho in self.blocks:
+            if times_rho or nodes == self.followers:
+                continue
+            if self.gauges[self.closed.index(nodes)] is None:
+                m = self.open("leader-margin", f"paper.{name}", ["m"])["m"]
+                need(m > 0 and self._margin(self._lyapunov(nodes, weights), m), "not proved definite")
+                gamma.update(dict.fromkeys(nodes, m))
+                self.done(f"m = {shown(m)}")
+                continue
+            b = self.open("leader-decrease", f"paper.{name}", ["b"])["b"]
+            scale = math.lcm(*(w.denominator for w in weights))
+            form = self._state_form({v: {v: int(w * scale)} for v, w in zip(nodes, weights, strict=True)})
+            need(b > 0 and self.exact.definite(self._decrease(form, b, nodes[1:])), "not proved definite")
+            least = min(weights)
+            phi = self.theorem in ("2.1", "5.1")
+            gamma.update({v: b * (w if phi else least) for v, w in zip(nodes, weights, strict=True)})
+            self.done(f"b = {shown(b)}")
+        return gamma
+
+    def _lyapunov(self, nodes: Sequence[int], weights: Sequence[Fraction]) -> list[list[Fraction]]:
+        """Return ``W A + A'W`` on some rows of ``L``."""
+        A = self._block(nodes)
+        return [
+            [(weights[i] * A[i][j] + weights[j] * A[j][i]) / self.unit for j in range(len(A))] for i in range(len(A))
+        ]
+
+    def _coupled(self, gamma: dict[int, Fraction] | None, rho: Fraction) -> list[list[Fraction]]:
+        """Return the matrix of the row at some rho: ``W A + A'W``, with Gamma in place of the leaders' block."""
+        nodes = [v for block in self.blocks for v in block[1]]
+        weights = [w * (rho if block[3] else 1) for block in self.blocks for w in block[2]]
+        S = self._lyapunov(nodes, weights)
+        for i, v in enumerate(nodes):
+            if gamma and v in gamma:
+                for j, u in enumerate(nodes):
+                    if u in gamma:
+                        S[i][j] = gamma[v] * (i == j)
+        return S
+
+    def _interval(self, gamma: dict[int, Fraction] | None) -> None:
+        said = self.data["paper"]["rho_interval"]
+        self.at = "rho-interval of paper"
+        if self.data["paper"]["rho"] is None:
+            need(said is None, "an interval without rho")
+            return
+        said = fields(said, ("printed", "exact"), "rho_interval")
+        ends = {key: exact(value) for key, value in said.items() if value is not None}
+        if len(ends) < 2:
+            leading = {v for block in self.blocks if not block[3] for v in block[1]}
+            free = all(j not in leading for v in self.followers for j in self.L[v])
+            need(free, "rho is bounded, since followers listen to these leaders")
+        if not ends:
+            return
+        need(self.open("rho-interval", "paper", list(ends)) == {**ends, "witness": None}, "other ends")
+        need(ends.get("printed", 0) <= ends.get("exact", math.inf), "the ends are in the wrong order")
+        for end in ends.values():
+            need(end > 0 and self._margin(self._coupled(gamma, end), Fraction(0)), "an end is not proved admissible")
+        need(self.rho <= ends.get("exact", math.inf), "rho lies beyond the interval")
+        self.done(", ".join(f"{key} end {shown(end)}" for key, end in ends.items()))
+
+    # ------------------------------------------------------------------ the envelope
+
+    def members(self) -> None:
+        """Verify every Lyapunov function of the envelope."""
+        self.at = "lyapunov"
+        members = entries(fields(self.data["lyapunov"], ("members",), "lyapunov")["members"], "members")
+        self.found: list[tuple[Fraction, Fraction, str, str]] = []  # rate, prefactor, class, coordinates
+        need(self.paper_rate is None or bool(members), "the paper's certificate is not among the members")
+        for k, member in enumerate(members):
+            self.at = of = f"lyapunov.members[{k}]"
+            keys = ("coordinates", "blocks", "rho", "rate", "prefactor")
+            fields(member, ("class", *keys, "distance"), "a member")
+            if k == 0 and self.paper_rate is not None:
+                paper = self.data["paper"]
+                same = all(member[key] == paper[key] for key in keys) and member["class"] == "paper"
+                need(same, "the first member is not the paper's certificate")
+                self.found.append((self.paper_rate, exact(paper["prefactor"]), "paper", paper["coordinates"]))
+                if paper["coordinates"] == "eps":
+                    form, scale = self._deviation()
+                else:
+                    form, scale = self._weighted(self.weights)
+            else:
+                form, scale = self._sharp(member, of)
+            if member["distance"] is not None:
+                self._distance(member["distance"], form, scale, of)
+
+    def _weighted(self, weights: Mapping[int, Fraction]) -> tuple[Matrix, Fraction]:
+        """Return ``E'W E`` as a form of the state, times a scale, and the scale."""
+        scale = math.lcm(*(w.denominator for w in weights.values()))
+        return self._state_form({v: {v: int(w * scale)} for v, w in weights.items()}), Fraction(scale * self.unit**2)
+
+    def _sharp(self, member: dict[str, Any], of: str) -> tuple[Matrix, Fraction]:
+        """Verify rate and prefactor of a sharper Lyapunov matrix; return its form in the state and the scale."""
+        kind = member["class"]
+        need(kind in ("perron", "lmi", "full"), "an unknown class")
+        need(member["coordinates"] == "E" and member["rho"] is None, "other coordinates, or a rho")
+        (block,) = entries(member["blocks"], "blocks", 1)
+        shape = "lower_triangle" if kind == "full" else "diagonal"
+        fields(block, ("name", "nodes", shape, "times_rho"), "a block")
+        need(block["name"] == "P" and block["times_rho"] is False, "another block")
+        nodes = self._numbers(block["nodes"], "nodes of a block")
+        need(sorted(nodes) == self.moving, "nodes of a block")
+        rate = exact(member["rate"])
+        if kind == "full":
+            rows = triangle(block[shape], len(nodes))
+            P, common = integers(rows)
+            named = {v: dict(zip(nodes, row, strict=True)) for v, row in zip(nodes, P, strict=True)}
+            form, scale = self._state_form(named), Fraction(common * self.unit**2)
+        else:
+            weights = [exact(w) for w in entries(block[shape], shape, len(nodes))]
+            low, high = min(weights), max(weights)
+            need(low > 0, "a weight is not positive")
+            form, scale = self._weighted(dict(zip(nodes, weights, strict=True)))
+        need(self.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
+        need(self.exact.definite(self._decrease(form, rate, self.kept)), "not proved definite")
+        self.done(f"b = {shown(rate)}, class {kind}")
+        if kind == "full":
+            ends = self.open("prefactor", of, ["lowest", "highest"])
+            low, high = ends["lowest"], ends["highest"]
+            need(low > 0 and self._margin(rows, low), "the lower end is not proved")
+            need(self._margin([[-x for x in row] for row in rows], -high), "the upper end is not proved")
+            self.done(f"{shown(high / low)}")
+        need(exact(member["prefactor"]) == high / low, "the prefactor is another")
+        self.found.append((rate, high / low, kind, "E"))
+        return form, scale
+
+    def _distance(self, said: Any, form: Matrix, scale: Fraction, of: str) -> None:
+        """Verify the constants from ``V = x'form x / scale`` to the distances, in the coordinates ``kept``."""
+        self.open("distance", of)
+        said = fields(said, ("agents", "norm"), "distance")
+        need(list(fields(said["agents"], self.labels, "agents")) == self.labels, "agents are in another order")
+        need(self.projection is not None, "a distance to an outcome that is not exact")
+        D, common, gram = self._beyond
+        S = [[form[i][j] for j in self.kept] for i in self.kept]
+        forms = []
+        for row, text in zip(D, said["agents"].values(), strict=True):
+            p, q = (exact(text) * common**2 / scale).as_integer_ratio()
+            forms.append(([q * x for x in row], q * p))
+        failed = self.exact.bounded(S, forms)
+        need(failed is None, f"the constant of agent {short(self.labels[failed or 0])} is not proved")
+        p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
+        N = [[p * s - q * g for s, g in zip(r, t, strict=True)] for r, t in zip(S, gram, strict=True)]
+        need(p >= 0 and self.exact.definite(N), "the constant of the norm is not proved")
+        self.done(f"norm {shown(exact(said['norm']))}")
+
+    @cached_property
+    def _beyond(self) -> tuple[Matrix, int, Matrix]:
+        """``D = I - Q`` on the columns ``kept``, times a scale; the scale; ``D'D``."""
+        Q = self.projection or []
+        D, scale = integers([[(i == j) - Q[i].get(j, Fraction(0)) for j in self.kept] for i in range(self.n)])
+        columns = list(zip(*D, strict=True))
+        return D, scale, [[sum(map(mul, x, y)) for y in columns] for x in columns]
+
+    def rates(self) -> None:
+        """Verify that the rates and the prefactor are those of the members."""
+        self.at = "rates"
+        said = fields(self.data["rates"], ("paper", "diagonal", "certified", "limit"), "rates")
+        best = max((f for f in self.found if f[0] > 0), key=lambda f: (f[0], -f[1]), default=None)
+        diagonal = max((f[0] for f in self.found if f[0] > 0 and f[2] in ("perron", "lmi")), default=None)
+        proved = {"paper": self.paper_rate, "diagonal": diagonal, "certified": best and best[0]}
+        for key, value in proved.items():
+            need((None if said[key] is None else exact(said[key])) == value, f"the rate {key} is not the proved one")
+        self.at, said = "prefactor", self.data["prefactor"]
+        if best is None:
+            need(said is None, "a prefactor without a rate")
+        else:
+            fields(said, ("value", "of"), "prefactor")
+            need(exact(said["value"]) == best[1] and said["of"] == f"||{best[3]}||^2", "not that of the largest rate")
+
+    def limit(self) -> None:
+        """Verify that no rate exceeds the limit: ``H B + B'H > 0`` gives ``H`` and ``B`` the same inertia."""
+        if self.data["rates"]["limit"] is None:
+            return
+        limit = self.open("rate-limit", "rates", ["limit"], witness=True)
+        need(exact(self.data["rates"]["limit"]) == limit["limit"], "the limit is another")
+        said = fields(limit["witness"], ("nodes", "lower_triangle", "vectors"), "the witness")
+        nodes = self._numbers(said["nodes"], "nodes")
+        own = [v for v in range(self.n) if nodes and self.strong[v] == self.strong[nodes[0]]]
+        need(nodes == own and bool(nodes), "the nodes are not a strong component")
+        H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
+        p, q = (limit["limit"] / 2 * self.unit).as_integer_ratio()
+        B = [[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(self._block(nodes))]
+        HB = product(H, B)
+        S = [
+            [x + y for x, y in zip(row, column, strict=True)]
+            for row, column in zip(HB, zip(*HB, strict=True), strict=True)
+        ]
+        need(self.exact.definite(S), "not proved definite")
+        # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
+        still = nodes in self.closed and self.gauges[self.closed.index(nodes)] is not None
+        vectors = [
+            [exact(x) for x in entries(row, "a vector", len(nodes))]
+            for row in entries(said["vectors"], "vectors", 2 if still else 1)
+        ]
+        X, _ = integers(vectors)
+        below = product(X, product(H, [list(column) for column in zip(*X, strict=True)]))
+        need(self.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
+        self.done(f"no rate exceeds {shown(limit['limit'])}")
+
+
+def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[Matrix, int]:
+    """Return rational rows times their common denominator, and that."""
+    scale = math.lcm(*(x.denominator for row in rows for x in row))
+    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
+
+
+def product(A: Matrix, B: Matrix) -> Matrix:
+    """Return ``A B``."""
+    columns = list(zip(*B, strict=True))
+    return [[sum(map(mul, row, column)) for column in columns] for row in A]

@@ -1,0 +1,93 @@
+"""What a certificate may prove, and the report of a check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+#: What each kind of obligation states, and what makes it part of the claim.
+OBLIGATIONS = {
+    "structure": ("components, closedness, camps and negative cycles are those of the edges", "Lemma 1"),
+    "claim": ("the hypotheses of the theorem and of the corollaries hold", "Theorems 1 to 6, Corollaries 1 to 10"),
+    "deviation-decrease": ("Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G", "Lemma 3.1"),
+    "leader-decrease": ("L_k'(W L_k + L_k'W - b W)L_k > 0 modulo G_k 1, W the block of this component", "Lemma 3.1"),
+    "leader-margin": ("W L_k + L_k'W - m I > 0, W the block of this component", "Lemma 3.2"),
+    "margin": ("S - m I > 0 for the matrix S whose least eigenvalue the objective takes", "Lyapunov decrease"),
+    "rho-interval": ("S(end) > 0 at both ends, so S(rho) > 0 in between", "Lemma 5"),
+    "rate": ("P L + L'P - b P > 0 on the range of L", "Lyapunov decrease"),
+    "prefactor": ("lowest I < P < highest I", "Rayleigh quotient"),
+    "distance": ("(x_k - (Q x)_k)^2 <= c_k V for every agent, ||x - Q x||^2 <= c V", "Schur complement"),
+    "rate-limit": ("H B + B'H > 0, B = A - (limit/2) I, H negative on the vectors", "inertia of Lyapunov equations"),
+    "sliding-bound": ("mu1 > delta, mu2, mu3 > 0, so the bound holds and sigma = 0 from T_r on", "Proposition 1"),
+    "reaching-time": ("|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at z_k", "comparison with the adversary"),
+    "outcome": ("L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))", "Lemmas 2, 8 and 9"),
+}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One obligation that was verified: its kind, what it is about, and what was verified."""
+
+    kind: str
+    of: str
+    detail: str
+
+    @property
+    def statement(self) -> str:
+        """What the obligation states."""
+        return OBLIGATIONS[self.kind][0]
+
+    @property
+    def lemma(self) -> str:
+        """What makes the statement part of the claim."""
+        return OBLIGATIONS[self.kind][1]
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What came of a check.
+
+    Attributes
+    ----------
+    accepted : bool
+        Every claim outside ``unverified`` was verified.
+    verdict : str
+        Of the certificate: ``certified`` or ``undecided``.
+    steps : tuple of Step
+        The obligations that were verified, in order.
+    rejected : str or None
+        The obligation, or the part of the document, that was not.
+    reason : str or None
+    arithmetic : str
+        What the numbers were computed with.
+    sha256 : str
+        Of the graph.
+    """
+
+    accepted: bool
+    verdict: str
+    steps: tuple[Step, ...]
+    rejected: str | None
+    reason: str | None
+    arithmetic: str
+    sha256: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as JSON-ready data."""
+        steps = [{"kind": s.kind, "of": s.of, "verified": s.detail, "lemma": s.lemma} for s in self.steps]
+        return {
+            "accepted": self.accepted,
+            "verdict": self.verdict,
+            "obligations": steps,
+            "rejected": self.rejected,
+            "reason": self.reason,
+            "arithmetic": self.arithmetic,
+            "graph_sha256": self.sha256,
+        }
+
+    def lines(self) -> list[str]:
+        """Return the report as text, one line for each obligation."""
+        lines = [f"verified   {step.kind} of {step.of}: {step.detail} ({step.lemma})" for step in self.steps]
+        if self.accepted:
+            return [*lines, f"accepted   {self.verdict}; {len(self.steps)} obligation(s) by {self.arithmetic}"]
+        return [*lines, f"rejected   {self.rejected}: {self.reason}"]

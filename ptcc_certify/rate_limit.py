@@ -1,0 +1,132 @@
+"""A proved bound that no rate exceeds, whatever the Lyapunov function: twice a bound of the smallest real part.
+
+``V <= e^(-b s) V(0)`` for all starts means ``b <= 2 Re lambda`` for every nonzero eigenvalue ``lambda`` of ``L``. With
+``B = A - c I`` for a strong component's block ``A`` and a symmetric ``H`` with ``H B + B'H > 0``, ``H`` and ``B`` have
+the same inertia (Ostrowski and Schneider 1962): where ``H`` is negative on a subspace of dimension ``k``, at least
+``k`` eigenvalues of ``A`` have a real part below ``c``. One suffices; of a balanced closed component, whose eigenvalue
+0 does not count, two. So no rate exceeds ``2 c``.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.exact import prove_positive_definite, round_to_bits
+from ptcc_certify.error_system import rounded_matrix
+from ptcc_certify.lemmas import EXACT_NODES
+from ptcc_certify.rationals import format_exact
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems.base import Matrix, exact_block, multiply
+
+#: Relative amounts by which ``c`` lies above the smallest real part, one after the other, until the proof succeeds.
+_GAPS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1)
+_MATRIX_BITS, _VECTOR_BITS = 60, 40
+
+
+@dataclass(frozen=True)
+class RateLimit:
+    """No rate exceeds ``value``, and what proves it.
+
+    Attributes
+    ----------
+    value : Fraction
+    nodes : tuple of int
+        A strong component.
+    form : rows of Fractions
+        ``H``.
+    vectors : tuple of tuple of Fraction
+        On which ``H`` is negative.
+    """
+
+    value: Fraction
+    nodes: tuple[int, ...]
+    form: Matrix
+    vectors: tuple[tuple[Fraction, ...], ...]
+
+    def witness(self, labels: Sequence[str]) -> dict[str, Any]:
+        """Return nodes, form and vectors as JSON-ready data."""
+        return {
+            "nodes": [labels[v] for v in self.nodes],
+            "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(self.form)],
+            "vectors": [[format_exact(x) for x in vector] for vector in self.vectors],
+        }
+
+
+def prove_rate_limit(structure: Structure) -> RateLimit | None:
+    """Prove an upper bound of every rate, as near to the spectral rate as proves; None if nothing was proved.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> limit = prove_rate_limit(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])))
+    >>> float(limit.value)
+    8.00000008
+    """
+    if structure.graph.n_nodes > EXACT_NODES:
+        return None
+    slowest = _slowest(structure)
+    if slowest is None:
+        return None
+    nodes, decay, dimension = slowest
+    A = exact_block(structure.graph.exact_laplacian(), nodes, nodes)
+    with np.errstate(all="ignore"):
+        for gap in _GAPS:
+            found = _proved(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
+            if found is not None:
+                return found
+    return None
+
+
+def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
+    """Return the strong component with the smallest real part, that part, and how many eigenvalues lie up to it."""
+    L = structure.graph.laplacian()
+    balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
+    best = None
+    for number in range(int(structure.strong_component.max()) + 1):
+        nodes = np.flatnonzero(structure.strong_component == number)
+        skipped = int(int(nodes[0]) in balanced)
+        try:
+            parts = np.sort(np.linalg.eigvals(L[nodes][:, nodes].toarray()).real)[skipped:]
+        except np.linalg.LinAlgError:
+            continue
+        if parts.size and np.isfinite(parts[0]) and parts[0] > 0 and (best is None or parts[0] < best[1]):
+            best = (tuple(nodes.tolist()), float(parts[0]), 1 + skipped)
+    return best
+
+
+def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateLimit | None:
+    from scipy.linalg import matrix_balance, solve_continuous_lyapunov
+
+    n = len(nodes)
+    B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]
+    floats = np.array([[float(x) for x in row] for row in B])
+    try:
+        own, (scale, _) = matrix_balance(floats, permute=False, separate=True)
+        with warnings.catch_warnings():  # that eigenvalues cancel is told by the proof
+            warnings.simplefilter("ignore")
+            H = solve_continuous_lyapunov(own.T, np.diag(1 / np.maximum(np.abs(own).max(axis=1), 1e-300)))
+        H = (H + H.T) / 2 / np.outer(scale, scale)
+        if not np.isfinite(H).all():
+            return None
+        sizes, directions = np.linalg.eigh(H)
+        if not (sizes[:dimension] < 0).all():
+            return None
+        form = rounded_matrix(H, _MATRIX_BITS)
+    except (np.linalg.LinAlgError, ValueError, OverflowError, ZeroDivisionError):
+        return None
+    vectors = tuple(tuple(round_to_bits(float(x), _VECTOR_BITS) for x in column) for column in directions.T[:dimension])
+    HB = multiply(form, B)
+    if not prove_positive_definite([[HB[i][j] + HB[j][i] for j in range(n)] for i in range(n)]):
+        return None
+    columns = [list(column) for column in zip(*vectors, strict=True)]
+    below = multiply([list(v) for v in vectors], multiply(form, columns))
+    if not prove_positive_definite([[-x for x in row] for row in below]):
+        return None
+    return RateLimit(2 * c, nodes, form, vectors)

@@ -1,0 +1,112 @@
+"""Mutants of a certificate: every field outside ``unverified`` changed in several ways."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from ptcc_certify.checker import digest
+
+Path = tuple[str | int, ...]
+Json = dict[str, Any]
+
+
+def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Every value that is no container, and every empty container, with its path."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    found = False
+    for key, item in items:
+        if path or key not in ("unverified", "digest"):
+            yield from leaves(item, (*path, key))
+        found = True
+    if not found:
+        yield path, value
+
+
+def containers(value: Any, path: Path = ()) -> Iterator[Path]:
+    """Every list or object, with its path."""
+    if isinstance(value, dict | list):
+        yield path
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            if path or key not in ("unverified", "digest"):
+                yield from containers(item, (*path, key))
+
+
+def at(data: Any, path: Path) -> Any:
+    for key in path:
+        data = data[key]
+    return data
+
+
+def changed(data: Json, path: Path, new: Any) -> Json:
+    """A copy of ``data`` with another value at ``path``; only what leads there is copied."""
+    if not path:
+        return new
+    result: Any = copy.copy(data)
+    result[path[0]] = changed(data[path[0]], path[1:], new)
+    return result
+
+
+def of_leaf(value: Any, labels: list[str], long: bool) -> list[Any]:
+    """Other values for a leaf."""
+    if isinstance(value, bool):
+        return [not value, int(value), None]
+    if isinstance(value, int):
+        return [-value, value + 1, True, str(value), 10**17]
+    if value is None:
+        return ["1", {}, 0]
+    if isinstance(value, str):
+        new: list[Any] = [value + " ", None]
+        if value[-1:].isdigit():
+            new = [value[:-1] + str((int(value[-1]) + 1) % 10), value[:-1] + str((int(value[-1]) - 1) % 10)]
+            new += [value[1:] if value.startswith("-") else "-" + value, "nan", value + "0", [value]]
+        if value in labels:
+            new.append(labels[labels.index(value) - 1] if len(labels) > 1 else "another")
+        if long:
+            new += ["1e999999999", "9" * 5000, "1/0", "0x1p99999"]
+        return [x for x in new if x != value]
+    return [None, "1", [[]], {"a": 1}]
+
+
+def of_container(value: Any) -> list[Any]:
+    """A container with an entry less, more, twice, or two in the other order."""
+    if isinstance(value, list):
+        new = [value[:-1], [*value, value[-1]], [*value, None], value[::-1]] if value else [[None]]
+        if len(value) > 1:
+            new.append([value[1], value[0], *value[2:]])
+    else:
+        keys = list(value)
+        new = [{**value, "more": None}]
+        if keys:
+            new += [{k: value[k] for k in keys[:-1]}, {k: value[k] for k in keys[1:]}]
+            if len(keys) > 1:
+                new.append(dict(zip(keys, [value[k] for k in [*keys[1:], keys[0]]], strict=True)))
+    return [x for x in new if x != value]
+
+
+def mutants(data: Json, every: int = 1, start: int = 0, long: bool = False) -> Iterator[tuple[Path, Json]]:
+    """Single changes: of every leaf and of every container, one of ``every`` from ``start`` on."""
+    labels, count = data["graph"]["nodes"], start
+    for path, value in leaves({k: v for k, v in data.items() if k not in ("unverified", "digest")}):
+        for new in of_leaf(value, labels, long):
+            count += 1
+            if count % every == 0:
+                yield path, changed(data, path, new)
+    for path in containers({k: v for k, v in data.items() if k not in ("unverified", "digest")}):
+        if path:
+            for new in of_container(at(data, path)):
+                count += 1
+                if count % every == 0:
+                    yield path, changed(data, path, new)
+
+
+def resealed(data: Json) -> Json:
+    """The same with a digest that fits, as a forger would write it."""
+    return {**data, "digest": digest(data)}
+
+
+def same_claim(one: Json, other: Json) -> bool:
+    """Whether two certificates say the same outside ``unverified``; the order of the keys of an object says nothing."""
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)

@@ -1,0 +1,591 @@
+"""The independent check: accepts what is proved by every arithmetic, rejects every mutant and every forgery."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import hashlib
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph
+from mutations import Json, changed, mutants, resealed, same_claim
+
+import ptcc_certify
+from ptcc_certify import checker, document
+from ptcc_certify.certificate import certify
+from ptcc_certify.checker import check
+from ptcc_certify.definite import arithmetic
+from ptcc_certify.errors import FormatError
+from ptcc_certify.examples import load_graph, select
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+
+CLASSES = dict(all_classes())
+PACKAGE = Path(ptcc_certify.__file__).parent
+NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+
+
+def sliding(kappa: Fraction | int = 2) -> SlidingModeProtocol:
+    return SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=kappa, mu1=2, mu2=1, mu3=1, delta=1)
+
+
+@cache
+def made(name: str, seed: int = 3, slides: bool = False, simulation: bool = False) -> Json:
+    """The JSON of a certificate of one class of graphs."""
+    rng = np.random.default_rng(seed)
+    graph = random_graph(rng, **{"weights": "decimals", **CLASSES[name]}).graph
+    start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
+    sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)] if slides else None
+    protocol = sliding(Fraction(int(rng.integers(1, 6)), 2)) if slides else NOMINAL
+    certificate = certify(graph, protocol, start, sigma0=sigma0, simulation=simulation)
+    return json.loads(certificate.to_json())
+
+
+def accepted(data: Json) -> None:
+    for stdlib in (True, False):
+        report = check(data, stdlib=stdlib)
+        assert report.accepted, (report.rejected, report.reason)
+        assert report.verdict == data["verdict"]
+        assert len(report.steps) == len(data["proof"])
+
+
+def rejected(data: Json, where: str) -> None:
+    """Rejected by both arithmetics with a digest that fits, at an obligation that the pattern names."""
+    for stdlib in (True, False):
+        report = check(resealed(data), stdlib=stdlib)
+        assert not report.accepted
+        assert re.match(where, report.rejected or ""), (report.rejected, report.reason)
+
+
+# ---------------------------------------------------------------------- what is proved is accepted
+
+
+@pytest.mark.parametrize("slides", [False, True])
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_class_is_accepted_by_both_arithmetics(name: str, slides: bool):
+    data = made(name, 3 + slides, slides)
+    assert data["verdict"] == "certified"
+    accepted(data)
+
+
+def test_the_twelve_examples_are_accepted():
+    for example, name, _ in select("all"):
+        sigma0 = example.sigma0 and example.sigma0.split(",")
+        x0 = example.x0.split(",")
+        cert = certify(load_graph(name), example.protocol(), x0, sigma0=sigma0, disturbance=example.disturbance)
+        assert cert.verdict == "certified"
+        assert cert.checked is not None and cert.checked.accepted
+        accepted(json.loads(cert.to_json()))
+
+
+def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):
+    """A wrong claim that slips in anywhere before the JSON ends as undecided, with a note."""
+    honest = document.certificate_document
+
+    def lying(certificate: Any, verdict: str) -> Json:
+        data = honest(certificate, verdict)
+        rate = Fraction(data["rates"]["limit"]) * 2
+        return resealed({**data, "rates": {**data["rates"], "certified": str(rate)}})
+
+    monkeypatch.setattr("ptcc_certify.certificate.certificate_document", lying)
+    cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
+    assert cert.verdict == "undecided"
+    assert "does not accept" in cert.notes[0] and "rates" in cert.notes[0]
+
+
+def test_a_graph_beyond_exact_arithmetic_is_undecided_and_accepted_as_such():
+    graph = SignedDigraph.from_edges([(i, (i + 1) % 130, 1 if i else -1) for i in range(130)])
+    data = json.loads(certify(graph, NOMINAL, simulation=False).to_json())
+    assert data["verdict"] == "undecided" and data["outcome"] is None
+    accepted(data)
+    rejected({**data, "verdict": "certified"}, "verdict")
+
+
+@pytest.mark.parametrize("name", ["1.1", "2.1 K>=2", "2.1 K=1", "3.1 mixed", "3.1 all single", "disconnected 1.1 2.1"])
+@pytest.mark.parametrize("slides", [False, True])
+def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
+    """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
+    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    data = made.__wrapped__(name, 5, slides)
+    assert data["verdict"] == "certified"
+    accepted(data)
+    influence, final = data["outcome"]["influence"], data["outcome"]["final_state"]
+    balls = [
+        ("outcome", "influence", kind, *path)
+        for kind, rows in (
+            (
+                "components",
+                [
+                    ((k, "voices", i), x)
+                    for k, c in enumerate(influence["components"])
+                    for i, x in enumerate(c["voices"])
+                ],
+            ),
+            (
+                "followers",
+                [((label, i), x) for label, row in influence["followers"].items() for i, x in enumerate(row)],
+            ),
+        )
+        for path, x in rows
+        if isinstance(x, dict)
+    ]
+    assert balls
+    for path in balls[:6]:
+        ball: Any = data
+        for key in path:
+            ball = ball[key]
+        rejected(changed(data, path, {**ball, "radius": "1e-130"}), "outcome of graph")
+        rejected(changed(data, path, {**ball, "mid": ball["mid"].replace("e", "1e")}), "outcome of graph")
+    for label, ball in final.items():
+        if isinstance(ball, dict):
+            rejected(changed(data, ("outcome", "final_state", label), {**ball, "radius": "1e-119"}), "outcome of graph")
+    step = proof_step(data, "outcome")
+    rejected(changed(data, ("proof", step, "witness"), None), "outcome of graph")
+    zero = dict.fromkeys(data["graph"]["nodes"], "0")
+    rejected(changed(data, ("proof", step, "witness"), {"u": zero}), "outcome of graph")
+
+
+def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(document, "MANY_EDGES", 5)
+    for k, name in enumerate(("fig1a", "fig3b")):
+        graph = load_graph(name)
+        if k:  # floats
+            graph = SignedDigraph.from_edges([(s, t, float(w) / 3) for s, t, w in graph.edges])
+        cert = certify(graph, NOMINAL, simulation=False)
+        cert.save(tmp_path / "c.json")
+        for stdlib in (True, False):
+            assert check(tmp_path / "c.json", stdlib=stdlib).accepted
+        data = checker.read(tmp_path / "c.json")
+        column = data["graph"]["edges"]["weight"]
+        side = tmp_path / column["file"]
+        assert hashlib.sha256(side.read_bytes()).hexdigest() == column["sha256"]
+        assert np.load(side).tolist() == graph.weight_table()[0].tolist()  # type: ignore[union-attr]
+        content = side.read_bytes()
+        for broken in (content[:-8], content[:-1] + b"\x07", b"", content + b"\0"):
+            side.write_bytes(broken)
+            report = check(tmp_path / "c.json")
+            assert not report.accepted and report.reason == f"side file {side.name} is not what its hash says"
+        side.unlink()
+        assert "cannot be read" in (check(tmp_path / "c.json").reason or "")
+        for name in ("../x.npy", "/etc/passwd", "a/b.npy"):
+            moved = changed(data, ("graph", "edges", "source", "file"), name)
+            (tmp_path / "moved.json").write_text(json.dumps(resealed(moved)))
+            assert check(tmp_path / "moved.json").reason == "a side file's name is odd"
+
+
+# ---------------------------------------------------------------------- mutants
+
+
+SAMPLE = (("1.1", False), ("1.2", True), ("2.1 K>=2", False), ("2.1 K=1", True), ("2.2", False), ("3.1 mixed", True))
+#: Where one changed field may leave a statement that is true in its own right: other gains and starts, untrusted
+#: witnesses, constants that have a little slack, how the file was read. Only the digest tells that it was changed.
+OF_ITS_OWN_RIGHT = (
+    r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle$|protocol\.|initial_state|sigma0|reaching_time\.z|proof\.\d+\.(witness|numbers\.b)"
+    r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal))|outcome\.final_state\.\w+$"
+)
+
+
+def judge(data: Json, every: int, start: int, long: bool) -> tuple[Counter[str], list[str]]:
+    """Check mutants as they are and resealed; return what rejected them, and what a forger would get through."""
+    stops: Counter[str] = Counter()
+    passed = []
+    data = {**data, "unverified": {}}
+    for path, mutant in mutants(data, every, start, long):
+        if same_claim(mutant, data):
+            continue
+        report = check(mutant, stdlib=True)
+        assert not report.accepted, path
+        assert report.rejected
+        stops[re.sub(r"\d+", "k", report.rejected)] += 1
+        if report.rejected == "digest":
+            passed.append(".".join(map(str, path)))
+    return stops, passed
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_no_mutant_is_accepted(name: str, slides: bool):
+    stops, passed = judge(made(name, 5, slides), 37, SAMPLE.index((name, slides)), False)
+    assert sum(stops.values()) > 50
+    assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT, path)] == []
+
+
+@pytest.mark.campaign
+def test_no_mutant_is_accepted_of_many_certificates():
+    total, stops, forged, count = 0, Counter[str](), Counter[str](), 0
+    for k, name in enumerate(list(CLASSES)[:: max(len(CLASSES) // 24, 1)]):
+        data = made(name, 20 + k, bool(k % 2))
+        found, passed = judge(data, 7, k, True)
+        total, stops, count = total + sum(found.values()), stops + found, count + 1
+        forged += Counter(re.sub(r"\d+", "k", path) for path in passed)
+        assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT, path)] == []
+    print(f"\n{count} certificates, {total} mutants that changed the claim, 0 accepted; rejected by")
+    for where, number in stops.most_common():
+        print(f"{number:7d} {where}")
+    print(f"{sum(forged.values())} of them are true statements of their own, told by the digest alone:")
+    for where, number in forged.most_common(20):
+        print(f"{number:7d} {where}")
+    assert count >= 20 and total >= 5000
+
+
+def test_no_section_of_another_certificate_fits():
+    """The graph, claim, proof or verdict of one certificate in another, with a digest that fits."""
+    names = [("1.1", False), ("1.2", False), ("2.1 K>=2", False), ("2.2", False), ("3.1 mixed", False), ("1.1", True)]
+    made_ones = [made(name, 5, slides) for name, slides in names]
+    count = 0
+    for one in made_ones:
+        for other in made_ones:
+            for key in one:
+                if key in ("unverified", "digest", "schema", "producer") or one[key] == other.get(key):
+                    continue
+                mutant = {**one, key: other.get(key)}
+                assert not check(mutant, stdlib=True).accepted
+                # Other gains, and other starts of agents that decide nothing, make other true statements.
+                if key not in ("protocol", "initial_state"):
+                    report = check(resealed(mutant), stdlib=True)
+                    assert not report.accepted and report.rejected, key
+                count += 1
+    assert count > 200
+
+
+def test_edges_dropped_doubled_turned_or_of_another_sign_are_rejected():
+    for name, slides in SAMPLE:
+        data = made(name, 5, slides)
+        edges = data["graph"]["edges"]
+        for k, (s, t, w) in enumerate(edges):
+            flipped = w[1:] if w.startswith("-") else f"-{w}"
+            for new in (
+                edges[:k] + edges[k + 1 :],
+                [*edges[: k + 1], *edges[k:]],
+                [*edges[:k], [t, s, w], *edges[k + 1 :]],
+                [*edges[:k], [s, t, flipped], *edges[k + 1 :]],
+                [*edges[:k], [s, t, w + "1"], *edges[k + 1 :]],
+            ):
+                mutant = changed(data, ("graph", "edges"), new)
+                assert not check(mutant, stdlib=True).accepted
+                assert check(mutant, stdlib=True).rejected == "graph"  # the hash of the edges
+
+
+def test_a_rate_beyond_the_slack_is_rejected():
+    """Rates of all members and of the paper, raised by 1e-9 beyond what was left to the best provable one."""
+    for name, slides in SAMPLE:
+        data = made(name, 5, slides)
+        for k, member in enumerate(data["lyapunov"]["members"]):
+            if member["class"] == "paper":
+                continue
+            step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"].endswith(f"[{k}]"))
+            rate = Fraction(member["rate"])
+            for more in (Fraction(1, 10**2), Fraction(1, 10**5)):
+                higher = str(rate + abs(rate) * more)
+                forged = changed(
+                    changed(data, ("lyapunov", "members", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
+                )
+                if data["rates"]["certified"] == member["rate"]:
+                    forged = changed(forged, ("rates", "certified"), higher)
+                if data["rates"]["diagonal"] == member["rate"]:
+                    forged = changed(forged, ("rates", "diagonal"), higher)
+                report = check(resealed(forged), stdlib=True)
+                # A full matrix may have been found for a lower rate than its own best: then a little more is true.
+                if more > Fraction(1, 10**4) or not report.accepted:
+                    assert report.rejected == f"rate of lyapunov.members[{k}]", (name, k, member["class"])
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE[:2])
+def test_truncated_files_are_refused_in_one_line(name: str, slides: bool, tmp_path: Path):
+    text = json.dumps(made(name, 5, slides))
+    for length in range(0, len(text), 100):
+        (tmp_path / "c.json").write_text(text[:length])
+        with pytest.raises(FormatError, match=r"c\.json: not a (readable )?certificate") as error:
+            check(tmp_path / "c.json")
+        assert "\n" not in str(error.value)
+
+
+# ---------------------------------------------------------------------- forgeries
+
+
+def proof_step(data: Json, kind: str) -> int:
+    return next(k for k, step in enumerate(data["proof"]) if step["kind"] == kind)
+
+
+def test_an_unbalanced_component_called_balanced():
+    data = made("1.2", 5)
+    group = {**data["structure"]["closed_components"][0]}
+    del group["negative_cycle"]
+    group |= {"balanced": True, "gauge": [1] * len(group["nodes"])}
+    forged = changed(data, ("structure", "closed_components", 0), group)
+    forged = changed(forged, ("claim",), {"theorem": "1.1", "behaviour": "bipartite consensus", "corollaries": []})
+    rejected(forged, "structure of graph")
+
+
+def test_a_balanced_component_called_unbalanced():
+    data = made("1.1", 5)
+    group = {**data["structure"]["closed_components"][0]}
+    del group["gauge"]
+    edge = data["graph"]["edges"][0]
+    group |= {"balanced": False, "negative_cycle": [edge[:2], edge[:2]]}
+    forged = changed(data, ("structure", "closed_components", 0), group)
+    forged = changed(forged, ("claim",), {"theorem": "1.2", "behaviour": "stability", "corollaries": []})
+    rejected(forged, "structure of graph")
+
+
+def test_an_open_component_called_closed():
+    data = made("2.1 K>=2", 5)
+    follower = data["structure"]["followers"][0]
+    closed = [*data["structure"]["closed_components"], {"nodes": [follower], "balanced": True, "gauge": [1]}]
+    structure = {
+        **data["structure"],
+        "connectivity": "weak",
+        "closed_components": closed,
+        "leaders": [*data["structure"]["leaders"], follower],
+        "followers": data["structure"]["followers"][1:],
+    }
+    claim = {"theorem": "3.1", "behaviour": "bipartite containment", "corollaries": []}
+    rejected({**data, "structure": structure, "claim": claim}, "structure of graph")
+
+
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
+def test_a_rate_above_the_spectral_rate(name: str):
+    """No matrix whatsoever proves it; here every member's rate is set above what is proved to limit all rates."""
+    data = made(name, 5)
+    above = str(Fraction(data["rates"]["limit"]) * Fraction(1001, 1000))
+    members = len(data["lyapunov"]["members"])
+    for k in range(1, members):
+        step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"].endswith(f"[{k}]"))
+        forged = changed(data, ("lyapunov", "members", k, "rate"), above)
+        forged = changed(forged, ("proof", step, "numbers"), {"b": above})
+        forged = changed(forged, ("rates", "certified"), above)
+        rejected(forged, rf"rate of lyapunov\.members\[{k}\]")
+
+
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
+def test_a_limit_below_the_spectral_rate(name: str):
+    """Nor is a limit accepted that some eigenvalue contradicts."""
+    data = made(name, 5)
+    assert Fraction(data["rates"]["certified"]) <= Fraction(data["rates"]["limit"])
+    for factor in (Fraction(999, 1000), 1 - Fraction(1, 10**6)):
+        below = str(Fraction(data["rates"]["limit"]) * factor)
+        forged = changed(data, ("rates", "limit"), below)
+        forged = changed(forged, ("proof", proof_step(data, "rate-limit"), "numbers"), {"limit": below})
+        rejected(forged, "rate-limit of rates")
+
+
+def test_the_rounding_trap_of_the_balanced_case():
+    """``Om L + L'Om - m I`` with ``Om`` near ``p`` has an eigenvalue 0 that rounding makes positive: no proof."""
+    data = made("1.1", 5)
+    nodes = data["graph"]["nodes"]
+    diagonal = data["paper"]["blocks"][0]["diagonal"]
+    L = [[Fraction(0)] * len(nodes) for _ in nodes]
+    for s, t, w in data["graph"]["edges"]:
+        i, j = nodes.index(t), nodes.index(s)
+        L[i][j] -= Fraction(w)
+        L[i][i] += abs(Fraction(w))
+    p = [Fraction(w) for w in diagonal]
+    n = len(nodes)
+    S = [[p[i] * L[i][j] + p[j] * L[j][i] for j in range(n)] for i in range(n)]
+    for m in (Fraction(1, 10**18), Fraction(1, 10**300), Fraction(0)):
+        shifted = [[S[i][j] - m * (i == j) for j in range(n)] for i in range(n)]
+        scale = np.lcm.reduce([x.denominator for row in shifted for x in row], dtype=object)
+        for stdlib in (True, False):
+            assert not arithmetic(stdlib).definite([[int(x * scale) for x in row] for row in shifted])
+    # And as a certificate: the row of Theorem 1.2 on a balanced graph, with such an m.
+    paper = {
+        **data["paper"],
+        "theorem": "1.2",
+        "objective": "lmin(Omega L + L' Omega) / lmax(Omega)",
+        "coordinates": "E",
+        "blocks": [{**data["paper"]["blocks"][0], "name": "Omega"}],
+        "rate": str(Fraction(1, 10**18) / max(p)),
+    }
+    rejected({**data, "paper": paper}, "paper")
+
+
+def test_a_final_state_without_the_leaders_sigma():
+    """K = 1: the leader's own sliding variable moves it, and everybody with it: not Q X(0) but Q (X(0) - sigma(0))."""
+    data = made("2.1 K=1", 5, True)
+    leader = data["structure"]["leaders"][0]
+    assert Fraction(data["sigma0"][leader]) != 0
+    weights = {k: Fraction(v[0]) for k, v in data["outcome"]["influence"]["followers"].items()} | {leader: Fraction(1)}
+    start = Fraction(data["initial_state"][leader])
+    state = {label: str(weights[label] * start) for label in data["graph"]["nodes"]}
+    rejected(changed(data, ("outcome", "final_state"), state), "outcome of graph")
+    hidden = changed(data, ("sigma0", leader), "0")
+    rejected(hidden, "outcome of graph")
+
+
+def test_a_reaching_time_that_comes_too_soon():
+    data = made("1.1", 5, True)
+    for label, z in data["reaching_time"]["z"].items():
+        if z is not None and Fraction(z) > 0:
+            sooner = str(Fraction(z) * (1 - Fraction(1, 10**9)))
+            rejected(changed(data, ("reaching_time", "z", label), sooner), "reaching-time of reaching_time")
+
+
+def test_a_disturbance_that_the_gain_does_not_cover():
+    data = made("1.1", 5, True)
+    rejected(changed(data, ("protocol", "delta"), data["protocol"]["mu1"]), "protocol")
+    rejected(changed(data, ("protocol", "kappa"), "0"), "protocol")
+
+
+def test_a_matrix_that_is_not_definite():
+    """V <= e^(-b s) V(0) says nothing if V is not positive."""
+    data = made("1.2", 5)
+    k = next(i for i, m in enumerate(data["lyapunov"]["members"]) if m["class"] == "full")
+    rows = data["lyapunov"]["members"][k]["blocks"][0]["lower_triangle"]
+    negated = [[str(-Fraction(x)) for x in row] for row in rows]
+    rejected(
+        changed(data, ("lyapunov", "members", k, "blocks", 0, "lower_triangle"), negated), "(rate|prefactor) of lyap"
+    )
+
+
+# ---------------------------------------------------------------------- limits
+
+
+def one_line(path: Path, seconds: float = 20) -> str:
+    begin = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "ptcc_certify.checker", str(path)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 3 * 2**30)),
+    )
+    assert time.monotonic() - begin < seconds
+    assert done.returncode in (1, 2)
+    said = (done.stderr or done.stdout).strip().splitlines()
+    assert len(said) == 1 or done.returncode == 1
+    return said[-1]
+
+
+def test_huge_and_hostile_files_are_refused(tmp_path: Path):
+    path = tmp_path / "c.json"
+    with path.open("wb") as file:
+        file.write(b'{"schema": "ptcc-certificate/1", "x": "')
+        file.seek(10**9)
+        file.write(b'"}')
+    assert "more than 200000000 bytes" in one_line(path)
+    path.write_text('{"schema": "ptcc-certificate/1", "x": ' + "7" * 10**7 + "}")
+    assert "not a number" in one_line(path)
+    path.write_text('{"schema": "ptcc-certificate/1", "x": 1e999999999}')
+    assert "not a number" in one_line(path)
+    for nested in ("[" * 10**6, "[" * 10**6 + "]" * 10**6, '{"a":' * 10**6):
+        path.write_text('{"schema": "ptcc-certificate/1", "x": ' + nested)
+        assert "not a readable certificate" in one_line(path)
+    path.write_text('{"schema": "ptcc-certificate/1", "schema": "ptcc-certificate/1"}')
+    assert "a key occurs twice" in one_line(path)
+    for text in ("NaN", "Infinity", "-Infinity"):
+        path.write_text('{"schema": "ptcc-certificate/1", "x": ' + text + "}")
+        assert "not a number" in one_line(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    assert "not a readable certificate" in one_line(path)
+    path.write_text('{"schema": "ptcc-certificate/2"}')
+    assert 'not a certificate of schema "ptcc-certificate/1"' in one_line(path)
+    assert "no such file" in one_line(tmp_path / "missing.json").lower()
+    assert "directory" in one_line(tmp_path).lower()
+
+
+@pytest.mark.parametrize("text", ["1e999999999", "1e401", "9" * 10**7, "0x1p99999", "1/0", "1_0", "١", "", "1/-2", "."])
+def test_numbers_outside_the_grammar_are_rejected(text: str):
+    data = made("1.1", 5)
+    begin = time.monotonic()
+    rejected(changed(data, ("initial_state", data["graph"]["nodes"][0]), text), "initial_state")
+    rejected(changed(data, ("graph", "edges", 0, 2), text), "graph")
+    assert time.monotonic() - begin < 2
+
+
+# ---------------------------------------------------------------------- independence
+
+STANDARD = {
+    "__future__",
+    "array",
+    "collections",
+    "collections.abc",
+    "contextlib",
+    "dataclasses",
+    "decimal",
+    "fractions",
+    "functools",
+    "hashlib",
+    "importlib",
+    "itertools",
+    "json",
+    "math",
+    "operator",
+    "pathlib",
+    "re",
+    "sys",
+    "typing",
+}
+OWN = {"ptcc_certify.definite", "ptcc_certify.enclosure", "ptcc_certify.errors", "ptcc_certify.sparse_definite"}
+
+
+def checker_files() -> list[Path]:
+    own = [PACKAGE / f"{name.split('.')[1]}.py" for name in sorted(OWN)]
+    return [*sorted((PACKAGE / "checker").glob("*.py")), *own]
+
+
+def test_the_checker_imports_nothing_but_this():
+    """The standard library and itself; python-flint and NumPy where they are installed, inside functions."""
+    seen = set()
+    for file in checker_files():
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                seen |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0 and node.module
+                seen.add(node.module)
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("importlib.import_module", "__import__"):
+                seen.add(ast.unparse(node.args[0]))
+            elif isinstance(node, ast.Name):
+                assert node.id not in ("eval", "exec", "pickle", "compile"), file
+    allowed = STANDARD | OWN | {"'flint'", "numpy"}
+    assert {m for m in seen if not m.startswith("ptcc_certify.checker")} == allowed
+
+
+def test_the_checker_runs_where_nothing_else_is_installed(tmp_path: Path):
+    """Copied into an empty folder and run without site-packages: no NumPy, no flint, no solver."""
+    for file in (PACKAGE / "__init__.py", *checker_files()):
+        new = tmp_path / "ptcc_certify" / file.relative_to(PACKAGE)
+        new.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, new)
+    for k, (name, slides) in enumerate(SAMPLE):
+        (tmp_path / f"{k}.json").write_text(json.dumps(made(name, 5, slides)))
+    data = made("1.1", 5)
+    (tmp_path / "false.json").write_text(json.dumps({**data, "verdict": "undecided"}))
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        env = {"PYTHONPATH": str(tmp_path), "PATH": os.environ.get("PATH", "")}
+        command = [sys.executable, "-S", *words]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=env)
+
+    for name in ("numpy", "scipy", "casadi", "cvxpy", "clarabel", "flint"):
+        assert run("-c", f"import {name}").returncode == 1
+    for k in range(len(SAMPLE)):
+        done = run("-m", "ptcc_certify.checker", f"{k}.json")
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.stdout.splitlines()[-1].startswith("accepted   certified;")
+        assert "by standard library" in done.stdout
+    done = run("-m", "ptcc_certify.checker", "false.json")
+    assert done.returncode == 1 and done.stdout.splitlines()[-1].startswith("rejected   verdict")
+    assert run("-m", "ptcc_certify.checker").returncode == 2
+
+
+def test_texts_of_obligations_are_those_of_the_checker():
+    data = copy.deepcopy(made("3.1 mixed", 5, True))
+    for step in data["proof"]:
+        assert (step["statement"], step["lemma"]) == checker.OBLIGATIONS[step["kind"]]
+    data["proof"][0]["statement"] = "everything is well"
+    rejected(data, "structure of graph")
