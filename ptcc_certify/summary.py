@@ -88,8 +88,10 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
 
 
 def _rate_lines(certificate: Certificate) -> list[str]:
-    rate, spectral = certificate.rate, certificate.spectral_rate
+    rate, spectral, limit = certificate.rate, certificate.spectral_rate, certificate.limit
     best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
+    if limit is not None:
+        best = f"; none exceeds {_up(limit.value, 8)}, proved"
     if certificate.constant:
         kept = "its state" if certificate.direct else "x - sigma"
         return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
@@ -97,13 +99,19 @@ def _rate_lines(certificate: Certificate) -> list[str]:
         numerical = certificate.numerical_rate
         return [_line("rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}")]
     near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
+    if limit is not None:
+        near = f", tightness at least {_down(rate / limit.value, 4)}"
     lines = [_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}")]
     lines += _class_lines(certificate)
     lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     lines += _distance_lines(certificate)
     balls = not certificate.direct or any(m.distance is not None for m in certificate.envelope.members)
     arithmetic = "exact or ball arithmetic" if balls else "exact arithmetic"
-    lines.append(_line("proof", f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"))
+    said = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"
+    report = certificate.checked
+    if report is not None:
+        said += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
+    lines.append(_line("proof", said))
     return lines
 
 

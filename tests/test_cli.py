@@ -223,6 +223,41 @@ def test_a_refuted_expectation_is_3(command: str):
     assert run.out  # the answer is printed all the same
 
 
+def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path):
+    """0 proved, 1 rejected (a changed field, another graph), 4 undecided; the same from the module."""
+    assert ptcc("certify", "fig5b", "-o", "c.json").code == 0
+    for options in ((), ("--stdlib",), ("fig5b",)):
+        run = ptcc("check", "c.json", *options)
+        assert run.code == 0 and run.err == ""
+        lines = run.out.splitlines()
+        assert len(lines) == len(read("c.json")["proof"]) + 1
+        assert all(line.startswith("verified   ") for line in lines[:-1])
+        assert lines[-1].startswith("accepted   certified;")
+        assert ("python-flint" in lines[-1]) == (options != ("--stdlib",))
+    said = one_object(ptcc("check", "c.json", "--json").out)
+    assert said["accepted"] is True and said["rejected"] is None
+    assert [(step["kind"], step["of"]) for step in said["obligations"]] == [
+        (step["kind"], step["of"]) for step in read("c.json")["proof"]
+    ]
+    run = ptcc("check", "c.json", "fig5a")
+    assert run.code == 1
+    assert run.out.splitlines()[-1] == "rejected   graph: the certificate is about another graph than fig5a"
+    data = read("c.json")
+    data["rates"]["certified"] = "1000"
+    Path("false.json").write_text(json.dumps(data))
+    run = ptcc("check", "false.json")
+    assert run.code == 1
+    assert run.out.splitlines()[-1] == "rejected   rates: the rate certified is not the proved one"
+    assert ptcc("check", "false.json", "--json").code == 1
+    Path("ring.csv").write_text("".join(f"{i},{(i + 1) % 130},1\n" for i in range(130)))
+    assert ptcc("certify", "ring.csv", "-o", "ring.json").code == 4
+    run = ptcc("check", "ring.json", "ring.csv")
+    assert run.code == 4 and run.out.splitlines()[-1].startswith("accepted   undecided;")
+    module = [sys.executable, "-m", "ptcc_certify.checker"]
+    for name, code in (("c.json", 0), ("false.json", 1), ("ring.json", 4), ("nowhere.json", 2)):
+        assert subprocess.run([*module, name], capture_output=True, cwd=folder).returncode == code
+
+
 def test_a_rate_beyond_the_exact_limit_is_3_and_one_below_it_4():
     """fig1b: the limit of its slowest mode bounds every rate, below that of its mean eigenvalue; up to it is doubt."""
     data = one_object(ptcc("certify", "fig1b", "--json").out)

@@ -10,7 +10,7 @@ from operator import mul
 from typing import Any
 
 from ptcc_certify.checker.outcome import OutcomeCheck
-from ptcc_certify.checker.reading import entries, exact, fields, need, short, shown, triangle
+from ptcc_certify.checker.reading import entries, exact, fields, need, same, short, shown, triangle
 
 Matrix = list[list[int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
@@ -116,6 +116,7 @@ class LyapunovCheck(OutcomeCheck):
         if coordinates == "eps":
             b = self.open("deviation-decrease", "paper", ["b"])["b"]
             need(b == self.paper_rate, "b is not the rate")
+            self._null_vector(*self.blocks[0][1:3])
             need(self.exact.definite(self._decrease(self._deviation()[0], b, self.kept)), "not proved definite")
             need(said["rho_interval"] is None, "an interval without rho")
             self.done(f"b = {shown(b)}")
@@ -149,6 +150,7 @@ class LyapunovCheck(OutcomeCheck):
                 self.done(f"m = {shown(m)}")
                 continue
             b = self.open("leader-decrease", f"paper.{name}", ["b"])["b"]
+            self._null_vector(nodes, weights)
             scale = math.lcm(*(w.denominator for w in weights))
             form = self._state_form({v: {v: int(w * scale)} for v, w in zip(nodes, weights, strict=True)})
             need(b > 0 and self.exact.definite(self._decrease(form, b, nodes[1:])), "not proved definite")
@@ -157,6 +159,17 @@ class LyapunovCheck(OutcomeCheck):
             gamma.update({v: b * (w if phi else least) for v, w in zip(nodes, weights, strict=True)})
             self.done(f"b = {shown(b)}")
         return gamma
+
+    def _null_vector(self, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
+        """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term, as the paper's formula asks."""
+        weight = dict(zip(nodes, p, strict=True))
+        left = {v: weight[v] * self.L[v][v] for v in nodes}
+        for v in nodes:
+            for j, x in self.L[v].items():
+                if j != v:
+                    left[j] -= weight[v] * abs(x)
+        near = all(abs(left[v]) * 10**9 <= weight[v] * self.L[v][v] for v in nodes)
+        need(near, "the weights are not the left null vector of the comparison matrix")
 
     def _lyapunov(self, nodes: Sequence[int], weights: Sequence[Fraction]) -> list[list[Fraction]]:
         """Return ``W A + A'W`` on some rows of ``L``."""
@@ -212,8 +225,8 @@ class LyapunovCheck(OutcomeCheck):
             fields(member, ("class", *keys, "distance"), "a member")
             if k == 0 and self.paper_rate is not None:
                 paper = self.data["paper"]
-                same = all(member[key] == paper[key] for key in keys) and member["class"] == "paper"
-                need(same, "the first member is not the paper's certificate")
+                equal = all(same(member[key], paper[key]) for key in keys) and member["class"] == "paper"
+                need(equal, "the first member is not the paper's certificate")
                 self.found.append((self.paper_rate, exact(paper["prefactor"]), "paper", paper["coordinates"]))
                 if paper["coordinates"] == "eps":
                     form, scale = self._deviation()

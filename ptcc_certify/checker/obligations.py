@@ -9,8 +9,14 @@ from typing import Any
 OBLIGATIONS = {
     "structure": ("components, closedness, camps and negative cycles are those of the edges", "Lemma 1"),
     "claim": ("the hypotheses of the theorem and of the corollaries hold", "Theorems 1 to 6, Corollaries 1 to 10"),
-    "deviation-decrease": ("Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G", "Lemma 3.1"),
-    "leader-decrease": ("L_k'(W L_k + L_k'W - b W)L_k > 0 modulo G_k 1, W the block of this component", "Lemma 3.1"),
+    "deviation-decrease": (
+        "Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G, p near the left null vector of M(L)",
+        "Lemma 3.1",
+    ),
+    "leader-decrease": (
+        "L_k'(W L_k + L_k'W - b W)L_k > 0 modulo G_k 1, W the block, near the left null vector of M(L_k)",
+        "Lemma 3.1",
+    ),
     "leader-margin": ("W L_k + L_k'W - m I > 0, W the block of this component", "Lemma 3.2"),
     "margin": ("S - m I > 0 for the matrix S whose least eigenvalue the objective takes", "Lyapunov decrease"),
     "rho-interval": ("S(end) > 0 at both ends, so S(rho) > 0 in between", "Lemma 5"),

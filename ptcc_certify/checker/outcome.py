@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, fields, interval, need, short
+from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, fields, interval, need, same, short
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.enclosure import decay_integral_below
 
@@ -113,8 +113,7 @@ class OutcomeCheck(StructureCheck):
             self._final_state(said, final)
             need(all(abs(x) > r or r == 0 for x, r in values), "a value that may or may not be 0")
             at_zero = [k for (k, _, _), (x, _) in zip(balanced, values, strict=True) if x == 0]
-            plain = all(type(k) is int for k in entries(said["degenerate"], "degenerate"))
-            need(plain and said["degenerate"] == at_zero, "which components meet at 0")
+            need(same(said["degenerate"], at_zero), "which components meet at 0")
         self.done("exact" if self.projection is not None else "enclosed")
 
     def _final_state(self, said: dict[str, Any], final: Sequence[Interval]) -> None:
@@ -127,7 +126,8 @@ class OutcomeCheck(StructureCheck):
         for nodes, state in self.components:
             own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
             need(
-                (state is None and len(self.components) > MANY_COMPONENTS) or state == own, "the outcome of a component"
+                (state is None and len(self.components) > MANY_COMPONENTS) or same(state, own),
+                "the outcome of a component",
             )
 
     def _voices(self, group: Sequence[int], eta: Sequence[Interval]) -> None:

@@ -56,7 +56,11 @@ def read(path: str | Path) -> dict[str, Any]:
             raise ValueError(f"more than {MAX_BYTES} bytes")
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(
-            content, object_pairs_hook=unique, parse_constant=number, parse_float=number, parse_int=integer
+            content.decode("utf-8"),
+            object_pairs_hook=unique,
+            parse_constant=number,
+            parse_float=number,
+            parse_int=integer,
         )
     except (OSError, ValueError, RecursionError) as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -128,11 +132,23 @@ def fields(value: Any, keys: Sequence[str], what: str) -> dict[str, Any]:
     """Return an object that has exactly these keys."""
     if not isinstance(value, dict):
         raise RejectedError(f"{what} is not an object")
+    known = set(keys)
     for key in keys:
-        need(key in value, f'the key "{key}" is missing')
+        need(key in value, f'the key "{short(key)}" is missing')
     for key in value:
-        need(key in keys, f'the key "{short(str(key))}" is not known')
+        need(key in known, f'the key "{short(str(key))}" is not known')
     return value
+
+
+def same(one: Any, other: Any) -> bool:
+    """Tell whether two JSON values are the same; ``true`` is not 1.
+
+    Examples
+    --------
+    >>> same([1, {"a": None}], [1, {"a": None}]), same([1], [True])
+    (True, False)
+    """
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 def entries(value: Any, what: str, length: int | None = None) -> list[Any]:

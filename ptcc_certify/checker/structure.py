@@ -10,6 +10,7 @@ import sys
 from array import array
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from ptcc_certify.definite import arithmetic
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100
+#: Longest common denominator of all weights that is formed.
+MAX_UNIT_BITS = 100_000
 NOMINAL = ("T", "rho1", "rho2", "kappa")
 SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
 COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
@@ -88,18 +91,34 @@ class StructureCheck:
             hashed.update(line.encode("utf-8", "surrogatepass"))
         self.sha256 = hashed.hexdigest()
         need(said["sha256"] == self.sha256, "the SHA-256 of the edge list is another")
-        self.unit = math.lcm(scale, *{w.denominator for w in weights})  # weights are integers over this
-        self.edges = list(zip(sources, targets, (int(w * self.unit / scale) for w in weights), strict=True))
-        self.L: list[dict[int, int]] = [{} for _ in range(self.n)]  # rows of the signed Laplacian, times unit
+        self.scale, self.edges = scale, list(zip(sources, targets, weights, strict=True))
+        self.heard: list[dict[int, Fraction | int]] = [{} for _ in range(self.n)]  # source and weight, times scale
         for s, t, w in self.edges:
-            self.L[t][s] = -w
-            self.L[t][t] = self.L[t].get(t, 0) + abs(w)
+            self.heard[t][s] = w
+
+    @cached_property
+    def unit(self) -> int:
+        """A positive integer that makes every weight one."""
+        unit = 1
+        for _, _, w in self.edges:
+            unit = math.lcm(unit, w.denominator)
+            need(unit.bit_length() <= MAX_UNIT_BITS, "the weights have no common denominator of moderate length")
+        return unit * self.scale
+
+    @cached_property
+    def L(self) -> list[dict[int, int]]:
+        """Rows of the signed Laplacian, times ``unit``."""
+        rows, factor = [], self.unit // self.scale
+        for i, heard in enumerate(self.heard):
+            own = {j: -int(w * factor) for j, w in heard.items()}
+            rows.append({i: sum(map(abs, own.values())), **own} if own else {})
+        return rows
 
     def _edges(self, said: Any) -> tuple[list[int], list[int], list[Any], int]:
         """Return sources, targets, weights and what divides the weights."""
         if isinstance(said, dict):
             said = fields(said, ("count", "source", "target", "weight", "scale"), "edges")
-            need(isinstance(said["count"], int) and isinstance(said["scale"], str), "edges: count or scale is odd")
+            need(type(said["count"]) is int and said["count"] > 0, "edges: count is no positive integer")
             scale = exact(said["scale"])
             need(scale > 0 and scale.denominator == 1, "scale is not a positive integer")
             columns = [self._column(said[key], said["count"]) for key in ("source", "target", "weight")]
@@ -116,6 +135,7 @@ class StructureCheck:
         name = said["file"]
         need(isinstance(name, str) and re.fullmatch(r"[\w.-]{1,200}", name) is not None, "a side file's name is odd")
         try:
+            need((self.folder / name).is_file(), f"side file {name} cannot be read")
             with (self.folder / name).open("rb") as file:
                 content = file.read(8 * count + 1025)
         except OSError:
@@ -138,7 +158,7 @@ class StructureCheck:
 
     def _strong_components(self) -> list[int]:
         """Return the number of every node's strong component (Tarjan), without recursion."""
-        heard = [[j for j in row if j != i] for i, row in enumerate(self.L)]
+        heard = [list(row) for row in self.heard]
         order, low, number = [0] * self.n, [0] * self.n, [-1] * self.n
         stack: list[int] = []
         count = groups = 0
@@ -212,8 +232,7 @@ class StructureCheck:
             if gauge is None:
                 self._negative_cycle(entry["negative_cycle"], set(group))
             else:
-                plain = all(type(g) is int for g in entries(entry["gauge"], "gauge"))
-                need(plain and entry["gauge"] == gauge, "camps of a component")
+                need(same(entry["gauge"], gauge), "camps of a component")
         need(self._numbers(said["leaders"], "leaders") == [v for g in self.closed for v in g], "other leaders")
         need(self._numbers(said["followers"], "followers") == self.followers, "other followers")
         need(said["balanced"] is (not self.conflicts), "balance of the graph")
@@ -223,14 +242,14 @@ class StructureCheck:
         self.kept = sorted(
             set(range(self.n)) - {g[0] for g, gauge in zip(self.closed, self.gauges, strict=True) if gauge}
         )
-        self.moving = [v for v in range(self.n) if self.L[v]]
+        self.moving = [v for v in range(self.n) if self.heard[v]]
         self.done(f"{self.n} nodes, {len(self.edges)} edges, {len(self.closed)} closed component(s)")
 
     def _negative_cycle(self, said: Any, group: set[int]) -> None:
         """Check a closed walk of the undirected graph inside a component whose signs multiply to -1."""
         steps = [tuple(self._numbers(entries(step, "a step", 2), "a step")) for step in entries(said, "negative_cycle")]
-        need(bool(steps) and all(s in group and s != t and s in self.L[t] for s, t in steps), "not a walk along edges")
-        need(math.prod(1 if self.L[t][s] < 0 else -1 for s, t in steps) == -1, "the cycle is not negative")
+        need(bool(steps) and all(s in group and s in self.heard[t] for s, t in steps), "not a walk along edges")
+        need(math.prod(1 if self.heard[t][s] > 0 else -1 for s, t in steps) == -1, "the cycle is not negative")
         for home in steps[0]:
             place: int | None = home
             for s, t in steps:
@@ -290,7 +309,7 @@ class StructureCheck:
         if len(expected) == 1:
             need("components" not in self.data, "components of a connected graph")
             need(connectivity == expected[0][1], f"the graph is {expected[0][1]}")
-            need(said == expected[0][2], f"the claim is Theorem {expected[0][2]['theorem']}")
+            need(same(said, expected[0][2]), f"the claim is Theorem {expected[0][2]['theorem']}")
             self.theorem, self.components = expected[0][2]["theorem"], []
         else:
             need(connectivity == "disconnected" and said is None, "the graph is disconnected")
@@ -307,8 +326,8 @@ class StructureCheck:
             said = fields(said, ("nodes", "connectivity", *keys), "components")
             groups = [self._numbers(x, "a component") for x in entries(said["nodes"], "nodes")]
             need(groups == [e[0] for e in expected], "other components")
-            need(said["connectivity"] == [e[1] for e in expected], "connectivity of the components")
-            need(all(said[key] == [e[2][key] for e in expected] for key in keys), "claims of the components")
+            need(same(said["connectivity"], [e[1] for e in expected]), "connectivity of the components")
+            need(all(same(said[key], [e[2][key] for e in expected]) for key in keys), "claims of the components")
             return [(e[0], None) for e in expected]
         found = []
         for entry, (nodes, connectivity, claim) in zip(
@@ -316,6 +335,6 @@ class StructureCheck:
         ):
             fields(entry, ("nodes", "connectivity", "claim", "outcome"), "a component")
             need(self._numbers(entry["nodes"], "a component") == nodes, "another component")
-            need(entry["connectivity"] == connectivity and entry["claim"] == claim, "the claim of a component")
+            need(entry["connectivity"] == connectivity and same(entry["claim"], claim), "the claim of a component")
             found.append((nodes, entry["outcome"]))
         return found
