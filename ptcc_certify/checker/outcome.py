@@ -125,10 +125,8 @@ class OutcomeCheck(StructureCheck):
             need(abs(x - mid) + r <= radius, f"agent {short(label)} ends elsewhere")
         for nodes, state in self.components:
             own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
-            need(
-                (state is None and len(self.components) > MANY_COMPONENTS) or same(state, own),
-                "the outcome of a component",
-            )
+            grouped = state is None and len(self.components) > MANY_COMPONENTS
+            need(grouped or same(state, own), "the outcome of a component")
 
     def _voices(self, group: Sequence[int], eta: Sequence[Interval]) -> None:
         """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1``: exactly, or within the radii."""

@@ -117,7 +117,7 @@ def shown(x: Fraction) -> str:
     Examples
     --------
     >>> shown(Fraction(1, 3)), shown(Fraction(10) ** 500)
-    ('0.333333', '1E+500')
+    ('0.333333', '1.00000e+500')
     """
     return f"{Context(prec=6).divide(Decimal(x.numerator), Decimal(x.denominator)):g}"
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same
 from ptcc_certify.definite import arithmetic
 
 #: Above this many weak components they are listed in arrays.
