@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.checker import digest
@@ -66,8 +68,14 @@ def of_leaf(value: Any, labels: list[str], long: bool) -> list[Any]:
             new.append(labels[labels.index(value) - 1] if len(labels) > 1 else "another")
         if long:
             new += ["1e999999999", "9" * 5000, "1/0", "0x1p99999"]
-        return [x for x in new if x != value]
+        return [x for x in new if x != value and (number(x) is None or number(x) != number(value))]
     return [None, "1", [[]], {"a": 1}]
+
+
+def number(text: Any) -> Fraction | None:
+    """The rational that a text writes as ``p`` or ``p/q``: ``00`` is no other number than ``0``."""
+    plain = isinstance(text, str) and re.fullmatch(r"-?[0-9]{1,400}(/[0-9]*[1-9][0-9]*)?", text)
+    return Fraction(text) if plain else None
 
 
 def of_container(value: Any) -> list[Any]:

@@ -253,8 +253,9 @@ SAMPLE = (("1.1", False), ("1.2", True), ("2.1 K>=2", False), ("2.1 K=1", True),
 #: Where one changed field may leave a statement that is true in its own right: other gains and starts, untrusted
 #: witnesses, constants that have a little slack, how the file was read. Only the digest tells that it was changed.
 OF_ITS_OWN_RIGHT = (
-    r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle$|protocol\.|initial_state|sigma0|reaching_time\.z|proof\.\d+\.(witness|numbers\.b)"
-    r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal))|outcome\.final_state\.\w+$"
+    r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle$|protocol\.|initial_state|sigma0"
+    r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.[bm])"
+    r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal))"
 )
 
 
@@ -284,13 +285,14 @@ def test_no_mutant_is_accepted(name: str, slides: bool):
 
 @pytest.mark.campaign
 def test_no_mutant_is_accepted_of_many_certificates():
-    total, stops, forged, count = 0, Counter[str](), Counter[str](), 0
+    total, stops, forged, count, odd = 0, Counter[str](), Counter[str](), 0, list[str]()
     for k, name in enumerate(list(CLASSES)[:: max(len(CLASSES) // 24, 1)]):
         data = made(name, 20 + k, bool(k % 2))
         found, passed = judge(data, 7, k, True)
         total, stops, count = total + sum(found.values()), stops + found, count + 1
         forged += Counter(re.sub(r"\d+", "k", path) for path in passed)
-        assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT, path)] == []
+        odd += [path for path in passed if not re.match(OF_ITS_OWN_RIGHT, path)]
+    assert odd == []
     print(f"\n{count} certificates, {total} mutants that changed the claim, 0 accepted; rejected by")
     for where, number in stops.most_common():
         print(f"{number:7d} {where}")
