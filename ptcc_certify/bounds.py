@@ -328,7 +328,7 @@ class Envelope:
 
     @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
-        return [{j: x for j, x in enumerate(row) if x} for row in self.structure.graph.exact_laplacian()]
+        return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
 
     def _start(self, member: Member, x0: Sequence[Any] | np.ndarray) -> float:
         """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""

@@ -23,7 +23,8 @@ from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
-from ptcc_certify.document import certificate_document, outcome_witness, with_side_files
+from ptcc_certify.document import certificate_document, enclosed_witness, outcome_witness, with_side_files
+from ptcc_certify.enclosed import EnclosedOutcome, enclose
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
@@ -34,7 +35,7 @@ from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
 from ptcc_certify.rationals import as_fraction, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
-from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen
+from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
 from ptcc_certify.simulation import simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.structure import Claim, Structure, analyse
@@ -80,6 +81,8 @@ class Certificate:
         ``Q``, factored.
     outcome : Outcome or None
         ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without a start.
+    enclosed : EnclosedOutcome or None
+        The same in proved intervals, where the graph is too large for rationals.
     trajectory : Trajectory or None
     comparison : Comparison or None
     sharpening : Sharpening
@@ -105,6 +108,7 @@ class Certificate:
     reaching: tuple[ReachingTime, ...] | None
     influence: Influence
     outcome: Outcome | None
+    enclosed: EnclosedOutcome | None
     trajectory: Trajectory | None
     comparison: Comparison | None
     sharpening: Sharpening
@@ -162,7 +166,7 @@ class Certificate:
     @property
     def constant(self) -> bool:
         """Whether every agent keeps its state, so that there is no decay to certify."""
-        return self.lyapunov is not None and not self.lyapunov.blocks
+        return self.graph.n_edges == 0
 
     @cached_property
     def obligations(self) -> tuple[Obligation, ...]:
@@ -170,13 +174,18 @@ class Certificate:
         found = [Obligation("structure", "graph"), Obligation("claim", "graph")]
         if self.influence.exact:
             found.append(Obligation("outcome", "graph", witness=outcome_witness(self.structure, self.influence)))
+        elif self.enclosed is not None:
+            found.append(Obligation("outcome", "graph", witness=enclosed_witness(self.graph, self.enclosed)))
         found += self.proof.obligations if self.proof.rate is not None else ()
         sharp = iter(self.sharpening.members)
         for k, bound in enumerate(self.envelope.members):
             of = f"lyapunov.members[{k}]"
             if bound.kind != "paper":
                 member = next(sharp)
-                found.append(Obligation("rate", of, {"b": member.rate}))
+                if member.dominance is not None:
+                    found.append(Obligation("dominance", of, {"b": member.rate}, member.dominance.witness))
+                else:
+                    found.append(Obligation("rate", of, {"b": member.rate}))
                 if member.matrix is not None:
                     ends = {"lowest": member.lowest, "highest": member.highest}
                     found.append(Obligation("prefactor", of, ends))
@@ -195,7 +204,15 @@ class Certificate:
     def checked(self) -> CheckReport | None:
         """What the independent check says of the certificate as it would be written; None if nothing was proved."""
         proved = self.constant or self.rate is not None
-        return check(certificate_document(self, CERTIFIED)) if proved and self.influence.exact else None
+        ended = self.influence.exact or self.enclosed is not None
+        return check(self._document(CERTIFIED)) if proved and ended else None
+
+    def _document(self, verdict: str) -> dict[str, Any]:
+        """Return the JSON of a verdict, made once."""
+        kept = self.__dict__.setdefault("_documents", {})
+        if verdict not in kept:
+            kept[verdict] = certificate_document(self, verdict)
+        return kept[verdict]
 
     @property
     def verdict(self) -> str:
@@ -314,7 +331,7 @@ class Certificate:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``."""
-        return certificate_document(self, self.verdict)
+        return dict(self._document(self.verdict))
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
@@ -434,8 +451,12 @@ ReachingTime(0, 1 before T_r)))
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
     result = None if start is None else outcome(structure, [x - s for x, s in zip(start, gone, strict=True)])
+    enclosed = None
     if not matrix.exact:
-        notes.append(f"the outcome of a graph of more than {EXACT_NODES} nodes is computed in floating point only")
+        moved = None if start is None else [x - s for x, s in zip(start, gone, strict=True)]
+        enclosed = enclose(structure, matrix, moved)
+        if enclosed is None:
+            notes.append(f"the outcome is floating point only: a leader group has more than {EXACT_NODES} nodes")
     if trajectory is not None and result is not None:
         gap = float(np.abs(trajectory.final_state - result.values).max())
         if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
@@ -453,6 +474,7 @@ ReachingTime(0, 1 before T_r)))
         reaching=reaching,
         influence=matrix,
         outcome=result,
+        enclosed=enclosed,
         trajectory=trajectory,
         comparison=comparison,
         sharpening=sharpening,
@@ -540,11 +562,14 @@ def _sharpen(
 ) -> Sharpening:
     """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
     n, gain = structure.graph.n_nodes, protocol.gain
-    if n > EXACT_NODES:
-        if method != "paper":
-            notes.append(f"sharper Lyapunov functions are searched up to {EXACT_NODES} nodes; the graph has {n}")
-        return Sharpening()
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
+    if n > EXACT_NODES:
+        if method not in ("perron", "best"):
+            notes.append(f"above {EXACT_NODES} nodes only the class perron is proved; the graph has {n}")
+            return Sharpening()
+        found = sharpen_large(structure, clocks)
+        notes.extend(found.notes)
+        return found
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
     found = sharpen(ErrorSystem(structure), method, clocks, own)
     notes.extend(found.notes)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.checker import MANY_COMPONENTS, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, digest
+from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import SlidingModeProtocol
@@ -92,7 +93,7 @@ def with_side_files(document: dict[str, Any], graph: SignedDigraph, path: Path) 
         file = f"{sha256[:16]}-{name}.npy"
         files[path.parent / file] = content
         edges[name] = {"file": file, "sha256": sha256}
-    document["graph"]["edges"] = edges
+    document["graph"] = {**document["graph"], "edges": edges}
     document["digest"] = digest(document)
     return files
 
@@ -137,11 +138,17 @@ def _finite(value: float | None) -> float | None:
 # ---------------------------------------------------------------------- outcome
 
 
+def enclosed_witness(graph: SignedDigraph, enclosed: EnclosedOutcome) -> dict[str, Any]:
+    """Return ``u`` by agent."""
+    return {"u": {label: repr(x) for label, x in zip(graph.labels, enclosed.witness, strict=True)}}
+
+
 def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:
     """Return voices and pulls as intervals: of radius 0, but for those of a component that are too long to write."""
     voices = [_balls([Fraction(w) for w in voice]) for voice in matrix.voices]
-    columns = [_balls([Fraction(row[k]) for row in matrix.pulls]) for k in range(len(matrix.voices))]
-    pulls = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in matrix.pulls]
+    rows = matrix.pulls or ()
+    columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.voices))]
+    pulls = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
     return voices, pulls
 
 
@@ -179,7 +186,7 @@ def outcome_section(certificate: Certificate) -> dict[str, Any] | None:
     """Return the outcome with the influence of every leader, exact or in balls; None if it is floating point."""
     matrix, structure = certificate.influence, certificate.structure
     if not matrix.exact:
-        return None
+        return None if certificate.enclosed is None else _enclosed_section(certificate, certificate.enclosed)
     labels = certificate.graph.labels
     voices, pulls = influence_balls(matrix)
     section: dict[str, Any] = {"final_state": None, "degenerate": None}
@@ -211,6 +218,23 @@ def outcome_section(certificate: Certificate) -> dict[str, Any] | None:
         },
     }
     return section
+
+
+def _enclosed_section(certificate: Certificate, enclosed: EnclosedOutcome) -> dict[str, Any]:
+    """Return the outcome of a large graph: voices of leader groups, and the final state in intervals."""
+    labels, final = certificate.graph.labels, None
+    if enclosed.final is not None:
+        final = {
+            label: exact_or_ball(x) if r == 0 else {"mid": repr(float(x)), "radius": repr(float(r))}
+            for label, (x, r) in zip(labels, enclosed.final, strict=True)
+        }
+    groups = [
+        {"nodes": [labels[v] for v in c.nodes], "voices": [exact_or_ball(Fraction(w)) for w in voice]}
+        for c, voice in zip(certificate.influence.balanced, certificate.influence.voices, strict=True)
+        if len(c.nodes) > 1
+    ]
+    degenerate = None if enclosed.degenerate is None else list(enclosed.degenerate)
+    return {"final_state": final, "degenerate": degenerate, "influence": {"components": groups, "followers": None}}
 
 
 # ---------------------------------------------------------------------- sections

@@ -379,6 +379,17 @@ class SignedDigraph:
             rows[t][t] += abs(weight)
         return rows
 
+    def exact_rows(self, nodes: Iterable[int]) -> list[dict[int, Fraction]]:
+        """Return rows of the signed Laplacian as ``{column: rational}``, without zeros."""
+        start = np.searchsorted(self.target, np.arange(self.n_nodes + 1))
+        rows = []
+        for node in nodes:
+            edges = range(int(start[node]), int(start[node + 1]))
+            row = {int(self.source[edge]): -self._weights.fraction(edge) for edge in edges}
+            total = sum(map(abs, row.values()), Fraction(0))
+            rows.append({**row, node: total} if total else {})
+        return rows
+
     def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
         """Return the graph induced by the node indices ``nodes``, in that order."""
         nodes = np.asarray(nodes, dtype=np.int64)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.iterative import solve
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError
 from ptcc_certify.lemmas import (
     EXACT_NODES,
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
     from ptcc_certify.trajectory import Trajectory
 
 Number = Fraction | float
+#: Weights of followers on components are stored up to this number.
+MANY_PULLS = 1_000_000
+#: Largest leader group of a large graph whose voices are computed in rationals.
+GROUP_NODES = EXACT_NODES
 
 
 @dataclass(frozen=True)
@@ -42,15 +47,16 @@ class Influence:
     voices : tuple of tuple
         For each balanced closed component the weights ``eta_k`` times gauge, in the order of its nodes: the
         component meets at ``c_k = sum voices * X(0)`` times its gauge.
-    pulls : tuple of tuple
-        For each follower, its weight on each balanced closed component (``varpi``; absolute sum at most 1).
+    pulls : tuple of tuple, or None
+        For each follower, its weight on each balanced closed component (``varpi``; absolute sum at most 1). None where
+        followers times components are more than ``MANY_PULLS``.
     exact : bool
         Whether the numbers are rationals.
     """
 
     structure: Structure
     voices: tuple[tuple[Number, ...], ...]
-    pulls: tuple[tuple[Number, ...], ...]
+    pulls: tuple[tuple[Number, ...], ...] | None
     exact: bool
 
     @cached_property
@@ -76,7 +82,7 @@ class Influence:
         if where.size == 0:
             return {}
         result: dict[int, Number] = {}
-        pull = self.pulls[int(where[0])]
+        pull = self._pull_of(int(where[0]))
         for component, voice, weight in zip(self.balanced, self.voices, pull, strict=True):
             if weight:
                 result.update({v: weight * w for v, w in zip(component.nodes, voice, strict=True)})
@@ -93,9 +99,36 @@ class Influence:
         for component, value in zip(self.balanced, values, strict=True):
             for v, sign in zip(component.nodes, component.gauge or (), strict=True):
                 final[v] = sign * value
+        if self.pulls is None:
+            state = np.array([float(x) for x in final])
+            for v, x in zip(self.structure.followers.tolist(), follower_state(self.structure, state), strict=True):
+                final[v] = float(x)
+            return final, values
         for v, pull in zip(self.structure.followers.tolist(), self.pulls, strict=True):
             final[v] = sum((w * c for w, c in zip(pull, values, strict=True) if w), zero)
         return final, values
+
+    def _pull_of(self, follower: int) -> Sequence[Number]:
+        """Return the weights of one follower, by one solve with the transposed block if they are not stored."""
+        if self.pulls is not None:
+            return self.pulls[follower]
+        L, F = self.structure.graph.laplacian().tocsr(), self.structure.followers
+        block, unit = L[F][:, F], np.zeros(F.size)
+        unit[follower] = 1
+        heard = -(L[F].T @ solve(block.T.tocsr(), unit, block.diagonal()))
+        return [float(sum(g * heard[v] for v, g in zip(c.nodes, c.gauge or (), strict=True))) for c in self.balanced]
+
+
+def follower_state(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """Return ``-L_F^-1 L_FL x_L`` for the leaders' entries of ``state`` (N,), in floating point."""
+    F = structure.followers
+    if not F.size:
+        return np.zeros(0)
+    rows = structure.graph.laplacian().tocsr()[F]
+    leaders = state.copy()
+    leaders[F] = 0
+    block = rows[:, F].tocsr()
+    return solve(block, -(rows @ leaders), block.diagonal())
 
 
 def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
@@ -110,16 +143,20 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
     graph = structure.graph
     exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
     voices: list[tuple[Number, ...]] = []
-    for component in structure.closed_components:
-        if not component.balanced:
-            continue
+    several = [v for c in structure.closed_components if len(c.nodes) > 1 for v in c.nodes]
+    groups, place = graph.subgraph(several) if several else graph, {v: i for i, v in enumerate(several)}
+    balanced = [c for c in structure.closed_components if c.balanced]
+    for component in balanced:
         gauge = component.gauge or ()
         if len(component.nodes) == 1:
-            voices.append((Fraction(1) if exact else 1.0,))
+            voices.append((Fraction(1),))
             continue
-        block = graph.subgraph(component.nodes)
-        eta: Sequence[Number] = exact_left_vector(block) if exact else left_vector(block).tolist()
+        block = groups.subgraph([place[v] for v in component.nodes])
+        rational = exact or block.n_nodes <= GROUP_NODES
+        eta: Sequence[Number] = exact_left_vector(block) if rational else left_vector(block).tolist()
         voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
+    if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
+        return Influence(structure, tuple(voices), None, False)
     weights: Sequence[Sequence[Number]] = (
         exact_containment_weights(structure) if exact else containment_weights(structure).tolist()
     )

@@ -24,9 +24,11 @@ import lmi.full
 from lmi.errors import LMIError
 from lmi.exact import prove_generalized_margin
 from lmi.matrices import block_columns
+from ptcc_certify.dominance import DominantMember, dominant_members
 from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.lemmas import laplacian_spectrum, left_vector
+from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import BITS, Matrix, diagonal_matrix
 
 METHODS = ("paper", "perron", "lmi", "full", "best")
@@ -78,6 +80,8 @@ class SharpMember:
         ``lowest I <= P <= highest I``.
     numerical_rate : float
         The rate of the matrix before it was rounded, in floating point.
+    dominance : DominantMember or None
+        Of a large graph: what proves the rate row by row.
     """
 
     kind: str
@@ -88,6 +92,7 @@ class SharpMember:
     lowest: Fraction
     highest: Fraction
     numerical_rate: float
+    dominance: DominantMember | None = None
 
     @property
     def prefactor(self) -> Fraction:
@@ -171,6 +176,32 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
             else:
                 proved.append(member)
     return Sharpening(tuple(_without_hair_splitting(proved)), tried, limit, tuple(notes))
+
+
+def sharpen_large(structure: Structure, clocks: Sequence[float]) -> Sharpening:
+    """Return diagonal Lyapunov functions of a large graph, to be proved row by row by the check of the certificate.
+
+    Parameters
+    ----------
+    structure : Structure
+    clocks : sequence of float
+        See :func:`sharpen`.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            found = dominant_members(structure)
+    except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+        return Sharpening(notes=(f"class perron: {error}",))
+    if not found:
+        return Sharpening()
+    members = {}
+    for m in found:
+        low, high = min(m.diagonal), max(m.diagonal)
+        candidate = Candidate("perron", float(m.rate), float(high / low))
+        members[candidate] = SharpMember("perron", m.nodes, m.diagonal, None, m.rate, low, high, float(m.rate), m)
+    chosen = choose(list(members), clocks)
+    tried = {"perron": max(c.rate for c in members)}
+    return Sharpening(tuple(members[c] for c in chosen), tried)
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:

@@ -21,6 +21,11 @@ OBLIGATIONS = {
     "margin": ("S - m I > 0 for the matrix S whose least eigenvalue the objective takes", "Lyapunov decrease"),
     "rho-interval": ("S(end) > 0 at both ends, so S(rho) > 0 in between", "Lemma 5"),
     "rate": ("P L + L'P - b P > 0 on the range of L", "Lyapunov decrease"),
+    "dominance": (
+        "P L + L'P - b P > 0 on the range of L: with (g_k - b) P_k for the blocks of leader groups, and the sizes of "
+        "off-diagonal entries taken negative, it takes the vector d to a positive one",
+        "Lyapunov decrease",
+    ),
     "prefactor": ("lowest I < P < highest I", "Rayleigh quotient"),
     "distance": ("(x_k - (Q x)_k)^2 <= c_k V for every agent, ||x - Q x||^2 <= c V", "Schur complement"),
     "rate-limit": ("H B + B'H > 0, B = A - (limit/2) I, H negative on the vectors", "inertia of Lyapunov equations"),

@@ -72,21 +72,20 @@ class OutcomeCheck(StructureCheck):
         balanced = [
             (k, g, s) for k, (g, s) in enumerate(zip(self.closed, self.gauges, strict=True), 1) if s is not None
         ]
-        voices = []
+        grouped = parts["followers"] is None  # no weights of followers: voices of groups alone, and one final state
+        listed = [b for b in balanced if len(b[1]) > 1 or not grouped]
+        voice = {group[0]: [(Fraction(1), Fraction(0))] for _, group, _ in balanced}
         for entry, (_, group, gauge) in zip(
-            entries(parts["components"], "components", len(balanced)), balanced, strict=True
+            entries(parts["components"], "components", len(listed)), listed, strict=True
         ):
             fields(entry, ("nodes", "voices"), "a component")
             need(self._numbers(entry["nodes"], "a component") == group, "another component")
-            voices.append([interval(x) for x in entries(entry["voices"], "voices", len(group))])
-            signed = zip(gauge, voices[-1], strict=True)
+            voice[group[0]] = [interval(x) for x in entries(entry["voices"], "voices", len(group))]
+            signed = zip(gauge, voice[group[0]], strict=True)
             self._voices(group, [(g * x, r) for g, (x, r) in signed])
-        labels = [self.labels[v] for v in self.followers]
-        need(list(fields(parts["followers"], labels, "followers")) == labels, "followers are in another order")
-        pulls = [[interval(x) for x in entries(row, "a row", len(balanced))] for row in parts["followers"].values()]
-        for column, (_, group, gauge) in enumerate(balanced):
-            self._pulls(dict(zip(group, gauge, strict=True)), [row[column] for row in pulls])
-        if not any(r for row in (*voices, *pulls) for _, r in row):
+        voices = [voice[group[0]] for _, group, _ in balanced]
+        pulls = [] if grouped else self._influence(parts["followers"], balanced)
+        if not grouped and not any(r for row in (*voices, *pulls) for _, r in row):
             Q: list[dict[int, Fraction]] = [{} for _ in range(self.n)]
             for k, (_, group, gauge) in enumerate(balanced):
                 weights = {v: Fraction(g) for v, g in zip(group, gauge, strict=True)}
@@ -108,13 +107,45 @@ class OutcomeCheck(StructureCheck):
             for (_, group, gauge), (x, r) in zip(balanced, values, strict=True):
                 for v, g in zip(group, gauge, strict=True):
                     final[v] = (g * x, r)
-            for v, row in zip(self.followers, pulls, strict=True):
+            if grouped:
+                self._followers(final, said["final_state"])
+            for v, row in zip(self.followers, pulls, strict=False):
                 final[v] = combined(row, values)
             self._final_state(said, final)
             need(all(abs(x) > r or r == 0 for x, r in values), "a value that may or may not be 0")
             at_zero = [k for (k, _, _), (x, _) in zip(balanced, values, strict=True) if x == 0]
             need(same(said["degenerate"], at_zero), "which components meet at 0")
         self.done("exact" if self.projection is not None else "enclosed")
+
+    def _influence(self, said: Any, balanced: Sequence[tuple[int, list[int], list[int]]]) -> list[list[Interval]]:
+        """Verify the weights of every follower on the balanced closed components."""
+        labels = [self.labels[v] for v in self.followers]
+        need(list(fields(said, labels, "followers")) == labels, "followers are in another order")
+        pulls = [[interval(x) for x in entries(row, "a row", len(balanced))] for row in said.values()]
+        for column, (_, group, gauge) in enumerate(balanced):
+            self._pulls(dict(zip(group, gauge, strict=True)), [row[column] for row in pulls])
+        return pulls
+
+    def _followers(self, final: list[Interval], said: Any) -> None:
+        """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
+        claimed = fields(said, self.labels, "final_state")
+        known = {v: interval(claimed[self.labels[v]]) for v in self.followers}
+        error = Fraction(0)
+        for v in self.followers:
+            if self.u is None:
+                raise RejectedError("no witness of the enclosure")
+            left = blur = pushed = Fraction(0)
+            for j, x in self.L[v].items():
+                if j in known:
+                    left += x * known[j][0]
+                    pushed += self.u[j] * (x if j == v else -abs(x))
+                else:
+                    left += x * final[j][0]
+                    blur += abs(x) * final[j][1]
+            need(pushed > 0, "u is no witness")
+            error = max(error, (abs(left) + blur) / pushed)
+        for v, (mid, _) in known.items():
+            final[v] = (mid, error * (self.u or [])[v])
 
     def _final_state(self, said: dict[str, Any], final: Sequence[Interval]) -> None:
         """Check that every interval lies within the one that is claimed, here and under ``components``."""
