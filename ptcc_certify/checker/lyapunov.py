@@ -10,7 +10,7 @@ from operator import mul
 from typing import Any
 
 from ptcc_certify.checker.outcome import OutcomeCheck
-from ptcc_certify.checker.reading import entries, exact, fields, need, same, short, shown, triangle
+from ptcc_certify.checker.reading import entries, exact, fields, integers, need, same, short, shown, triangle
 
 Matrix = list[list[int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
@@ -406,12 +406,6 @@ class LyapunovCheck(OutcomeCheck):
         below = product(X, product(H, [list(column) for column in zip(*X, strict=True)]))
         need(self.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
         self.done(f"no rate exceeds {shown(limit['limit'])}")
-
-
-def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[Matrix, int]:
-    """Return rational rows times their common denominator, and that."""
-    scale = math.lcm(*(x.denominator for row in rows for x in row))
-    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
 
 
 def product(A: Matrix, B: Matrix) -> Matrix:

@@ -6,7 +6,18 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, fields, interval, need, same, short
+from ptcc_certify.checker.reading import (
+    Interval,
+    RejectedError,
+    entries,
+    exact,
+    fields,
+    integers,
+    interval,
+    need,
+    same,
+    short,
+)
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.enclosure import decay_integral_below
 
@@ -128,24 +139,29 @@ class OutcomeCheck(StructureCheck):
 
     def _followers(self, final: list[Interval], said: Any) -> None:
         """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
+        if self.u is None:
+            raise RejectedError("no witness of the enclosure")
         claimed = fields(said, self.labels, "final_state")
-        known = {v: interval(claimed[self.labels[v]]) for v in self.followers}
-        error = Fraction(0)
+        known = [x for x, _ in final]
         for v in self.followers:
-            if self.u is None:
-                raise RejectedError("no witness of the enclosure")
-            left = blur = pushed = Fraction(0)
+            known[v], _ = interval(claimed[self.labels[v]])
+        # Everything as integers: middles and radii over one denominator, u over another.
+        (X, R), scale = integers([known, [r for _, r in final]])
+        (U,), _ = integers([self.u])
+        following = set(self.followers)
+        worst, least = 0, 1  # max |r_i| / (M(L_F) u)_i, without the scales
+        for v in self.followers:
+            left = blur = pushed = 0
             for j, x in self.L[v].items():
-                if j in known:
-                    left += x * known[j][0]
-                    pushed += self.u[j] * (x if j == v else -abs(x))
-                else:
-                    left += x * final[j][0]
-                    blur += abs(x) * final[j][1]
+                left += x * X[j]
+                blur += abs(x) * R[j]
+                if j in following:
+                    pushed += x * U[j] if j == v else -abs(x) * U[j]
             need(pushed > 0, "u is no witness")
-            error = max(error, (abs(left) + blur) / pushed)
-        for v, (mid, _) in known.items():
-            final[v] = (mid, error * (self.u or [])[v])
+            if (abs(left) + blur) * least > worst * pushed:
+                worst, least = abs(left) + blur, pushed
+        for v in self.followers:
+            final[v] = (known[v], Fraction(worst * U[v], least * scale))
 
     def _final_state(self, said: dict[str, Any], final: Sequence[Interval]) -> None:
         """Check that every interval lies within the one that is claimed, here and under ``components``."""

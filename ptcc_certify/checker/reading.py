@@ -101,7 +101,8 @@ def exact(text: Any) -> Fraction:
         match = DECIMAL.fullmatch(text)
         if match and (match[1].strip("+-") or match[2]) and abs(int(match[3] or 0)) <= MAX_EXPONENT:
             part = match[2] or ""
-            return Fraction(int(match[1] + part)) * Fraction(10) ** (int(match[3] or 0) - len(part))
+            digits, shift = int(match[1] + part), int(match[3] or 0) - len(part)
+            return Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
     raise RejectedError(f"{short(str(text))} is not an exact number")
 
 
@@ -174,3 +175,9 @@ def interval(said: Any) -> Interval:
     mid, radius = exact(said["mid"]), exact(said["radius"])
     need(radius > 0, "a radius is not positive")
     return mid, radius
+
+
+def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
+    """Return rational rows times their common denominator, and that."""
+    scale = math.lcm(*(x.denominator for row in rows for x in row))
+    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale

@@ -1,0 +1,185 @@
+"""Certificates of large graphs: rates proved row by row, final states enclosed; tried on small graphs, where both are
+known exactly, and on large ones."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph
+from mutations import Json, changed, resealed
+from scipy.sparse.linalg import eigs
+
+from lmi.errors import NoCertificate
+from lmi.iterative import SparseHMatrix
+from ptcc_certify import certificate as certificate_module
+from ptcc_certify import outcomes
+from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.checker import check
+from ptcc_certify.dominance import dominant_members
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import read_graph
+from ptcc_certify.lemmas import laplacian_spectrum
+from ptcc_certify.outcomes import outcome
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.structure import analyse
+
+NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+CLASSES = dict(all_classes())
+
+
+@pytest.fixture
+def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Treat every graph as a large one."""
+    monkeypatch.setattr(certificate_module, "EXACT_NODES", 0)
+    monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
+
+
+def made(name: str, seed: int = 3) -> tuple[Certificate, Json]:
+    rng = np.random.default_rng(seed)
+    graph = random_graph(rng, **{"weights": "decimals", **CLASSES[name]}).graph
+    start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
+    found = certify(graph, NOMINAL, start, simulation=False)
+    return found, json.loads(found.to_json())
+
+
+@pytest.mark.usefixtures("small_is_large")
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_class_is_certified_as_a_large_graph(name: str):
+    """The rate is proved and below the spectral rate; the intervals hold the exact final state."""
+    cert, data = made(name)
+    assert cert.verdict == "certified", cert.notes
+    for stdlib in (True, False):
+        report = check(data, stdlib=stdlib)
+        assert report.accepted, (report.rejected, report.reason)
+    if cert.rate is not None:
+        spectral = laplacian_spectrum(cert.structure).spectral_rate
+        assert spectral is not None and 0 < float(cert.rate) <= spectral * (1 + 1e-9)
+        assert cert.limit is None or cert.rate <= cert.limit.value
+        assert {step["kind"] for step in data["proof"]} >= {"dominance", "outcome"}
+    exact = outcome(cert.structure, cert.start or (), exact=True)
+    for value, said in zip(exact.final_state, data["outcome"]["final_state"].values(), strict=True):
+        if isinstance(said, dict):
+            assert abs(Fraction(value) - Fraction(said["mid"])) <= Fraction(said["radius"]) < Fraction(1, 10**8)
+        else:
+            assert Fraction(value) == Fraction(said)
+    assert data["outcome"]["degenerate"] == list(exact.degenerate)
+
+
+def rejected(data: Json, where: str) -> None:
+    report = check(resealed(data), stdlib=True)
+    assert not report.accepted
+    assert (report.rejected or "").startswith(where), (report.rejected, report.reason)
+
+
+@pytest.mark.usefixtures("small_is_large")
+@pytest.mark.parametrize("name", ["2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 all single"])
+def test_false_rates_and_narrow_intervals_are_rejected(name: str):
+    _, data = made(name, 5)
+    for k, member in enumerate(data["lyapunov"]["members"]):
+        of = f"lyapunov.members[{k}]"
+        step = next(i for i, s in enumerate(data["proof"]) if s["of"] == of and s["kind"] == "dominance")
+        higher = str(Fraction(member["rate"]) * (1 + Fraction(1, 10**6)))
+        forged = changed(
+            changed(data, ("lyapunov", "members", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
+        )
+        rejected(forged, f"dominance of {of}")
+        vector = data["proof"][step]["witness"]["vector"]
+        for new in (f"-{vector[0]}", "0"):
+            rejected(changed(data, ("proof", step, "witness", "vector", 0), new), f"dominance of {of}")
+        for i, g in enumerate(data["proof"][step]["witness"]["groups"]):
+            more = str(Fraction(g) * (1 + Fraction(1, 10**6)))
+            rejected(changed(data, ("proof", step, "witness", "groups", i), more), f"dominance of {of}")
+    for label in data["structure"]["followers"]:
+        ball = data["outcome"]["final_state"][label]
+        for new in ({**ball, "radius": "1e-300"}, {**ball, "mid": str(float(ball["mid"]) + 1e-6)}):
+            rejected(changed(data, ("outcome", "final_state", label), new), "outcome of graph")
+    leader = data["structure"]["leaders"][0]
+    rejected(changed(data, ("outcome", "final_state", leader), "7/3"), "outcome of graph")
+    at = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "outcome")
+    rejected(changed(data, ("proof", at, "witness"), None), "outcome of graph")
+
+
+def random_sparse(n: int, seed: int) -> SignedDigraph:
+    """Every fourth agent listens to nobody, or in a ring of three; the others to five random agents."""
+    rng = np.random.default_rng(seed)
+    edges = {}
+    for i in range(n):
+        if i % 12 in (0, 4, 8):
+            if i % 24 < 12:  # rings of three leaders
+                ring = [i - i % 12 + k for k in (0, 4, 8)]
+                other = ring[(ring.index(i) + 1) % 3]
+                if other < n:
+                    edges[other, i] = float(rng.uniform(0.5, 2))
+        else:
+            for j in rng.choice(n, 5, replace=False).tolist():
+                if j != i:
+                    edges[j, i] = float(rng.choice([-1, 1], p=[0.3, 0.7]) * rng.uniform(0.5, 2))
+    return SignedDigraph.from_edges([(j, i, w) for (j, i), w in edges.items()], nodes=range(n))
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_a_graph_of_two_thousand_nodes(slides: bool, tmp_path: Path):
+    graph = random_sparse(2000, 1)
+    start = np.random.default_rng(2).uniform(-10, 10, 2000).round(2).tolist()
+    protocol = NOMINAL
+    more = {}
+    if slides:
+        protocol = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+        more = {"sigma0": ([1, 0, "-0.5", 2] * 500)}
+    cert = certify(graph, protocol, start, simulation=False, **more)
+    assert cert.verdict == "certified"
+    cert.save(tmp_path / "c.json")
+    assert check(tmp_path / "c.json").accepted
+    followers = cert.structure.followers
+    block = graph.laplacian().tocsr()[followers][:, followers]
+    least = float(eigs(block.tocsc(), k=1, sigma=0, return_eigenvectors=False)[0].real)
+    comparison = SparseHMatrix(block).smallest()[0]
+    assert cert.rate is not None
+    assert float(cert.rate) <= 2 * least * (1 + 1e-9)
+    assert float(cert.rate) >= 0.99 * min(2 * comparison, 2.0)
+
+
+def test_a_leader_group_that_is_large_is_undecided_with_a_note():
+    graph = SignedDigraph.from_edges([(i, (i + 1) % 200, 1 if i else -1) for i in range(200)])
+    cert = certify(graph, NOMINAL, simulation=False)
+    assert cert.verdict == "undecided"
+    assert any("leader group has 200 nodes" in note for note in cert.notes)
+
+
+def test_nobody_listens_to_anybody():
+    graph = SignedDigraph.from_edges([], nodes=range(300))
+    data = json.loads(certify(graph, NOMINAL, [1] * 300).to_json())
+    assert data["verdict"] == "certified" and check(data).accepted
+
+
+def test_no_dominance_where_the_comparison_matrix_is_singular():
+    with pytest.raises(NoCertificate):
+        SparseHMatrix([[1.0, -1.0], [-1.0, 1.0]]).smallest()
+    with pytest.raises(NoCertificate, match="diagonal"):
+        SparseHMatrix([[0.0, -1.0], [-1.0, 1.0]])
+
+
+def test_frontier_of_rate_and_prefactor_is_monotone():
+    found = dominant_members(analyse(random_sparse(600, 3)))
+    rates = [m.rate for m in found]
+    prefactors = [max(m.diagonal) / min(m.diagonal) for m in found]
+    assert rates == sorted(rates, reverse=True)
+    assert prefactors == sorted(prefactors, reverse=True)
+
+
+@pytest.mark.parametrize(("name", "tightness"), [("soc-sign-bitcoinotc.csv.gz", 0.4), ("wiki-elec.txt.gz", 0.99)])
+def test_real_networks_of_thousands_are_certified(name: str, tightness: float, real_data: Path, tmp_path: Path):
+    graph = read_graph(real_data / name, orientation="listens")
+    start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
+    cert = certify(graph, NOMINAL, start, simulation=False)
+    assert cert.verdict == "certified" and cert.rate is not None
+    cert.save(tmp_path / "c.json")
+    assert check(tmp_path / "c.json").accepted
+    followers = cert.structure.followers
+    block = graph.laplacian().tocsc()[followers][:, followers]
+    least = float(eigs(block, k=1, sigma=0, return_eigenvectors=False)[0].real)
+    assert tightness * 2 * least <= float(cert.rate) <= 2 * least * (1 + 1e-9)
