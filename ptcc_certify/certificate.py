@@ -1,8 +1,8 @@
 """Certificates: what is claimed about a graph under a protocol, what was proved, what was only observed.
 
 ``certify`` is the main job: structure -> theorem -> Lyapunov function -> proved rate -> outcome -> comparison with
-CVODES. Everything a certificate says outside ``unverified`` was established in exact arithmetic; a simulation
-corroborates and never proves.
+CVODES. Every claim of a certificate outside ``unverified`` was established in exact or ball arithmetic, and verified
+again by the independent check; a simulation corroborates and never proves.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ import numpy as np
 
 from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
-from ptcc_certify.checker import CheckReport, check
+from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.document import certificate_document, enclosed_witness, outcome_witness, with_side_files
 from ptcc_certify.enclosed import EnclosedOutcome, enclose
+from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
@@ -445,7 +446,7 @@ ReachingTime(0, 1 before T_r)))
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical = _search_and_prove(structure, theorem, notes)
     sharpening = _sharpen(structure, protocol, method, instant, notes)
-    if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and (V is None or V.blocks):
+    if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
         notes.insert(0, _precision_note(graph))
     limit = prove_rate_limit(structure)
     matrix = influence(structure)
@@ -509,7 +510,16 @@ def _reaching(
     if not isinstance(protocol, SlidingModeProtocol):
         return None, None
     start = (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else _start(structure, sigma0, "sigma0")
-    return start, certified_reaching_times(protocol, start)
+    times = certified_reaching_times(protocol, start)
+    # Whatever the check could not confirm is not claimed.
+    asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
+    pole = protocol.mu3 * protocol.kappa
+    known = decay_integrals_below(protocol.T_r, protocol.mu2, pole, asked, REACHING_BITS)
+    push = protocol.mu1 - protocol.delta
+    return start, tuple(
+        r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
+        for r, s in zip(times, start, strict=True)
+    )
 
 
 def _search_and_prove(

@@ -177,9 +177,9 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
 
     signed = None if graph is None else _read(graph, **read)
     report = run(certificate, stdlib=stdlib)
-    if signed is not None and report.sha256 != signed.sha256:
+    if signed is not None and report.accepted and report.sha256 != signed.sha256:
         reason = f"the certificate is about another graph than {graph}"
-        report = replace(report, accepted=False, rejected="graph", reason=reason)
+        report = replace(report, accepted=False, steps=(), rejected="graph", reason=reason)
     if as_json:
         _print_json(report.to_dict())
     else:

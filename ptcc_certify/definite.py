@@ -21,6 +21,8 @@ Rows = Sequence[Sequence[int]]
 BITS = (128, 320, 1024, 4096)
 #: Up to this many rows python-flint decides: by the characteristic polynomial, and by exact solutions.
 FLINT_ROWS = 24
+#: python-flint is not asked about entries longer than these bits over the number of rows.
+FLINT_BITS = 40_000
 #: Above this many rows NumPy, where it is installed, forms factor and remainder.
 NUMPY_ROWS = 150
 
@@ -82,7 +84,7 @@ class Factor:
         return row
 
     def bounds(self, d: Sequence[int], c: int) -> bool:
-        """Prove ``(d'x)^2 <= c x'S x`` for all ``x``: that ``[[S, d], [d', c]]`` is positive semidefinite."""
+        """Prove ``(d'x)^2 < c x'S x`` for all ``x`` but 0: ``[[S, d], [d', c]]`` is definite; or that ``d`` is 0."""
         if not any(d):
             return c >= 0
         if c <= 0:
@@ -100,6 +102,8 @@ class Standard:
     """Definiteness by the standard library."""
 
     name = "standard library"
+    #: Largest matrix that is taken.
+    rows = 400
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is proved positive definite.
@@ -122,7 +126,9 @@ class Standard:
         return None
 
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
-        """Return the first ``k`` for which ``(d_k'x)^2 <= c_k x'S x`` is not proved; None if all are.
+        """Return the first ``k`` for which ``(d_k'x)^2 < c_k x'S x`` is not proved for all ``x``; None if all are.
+
+        Where ``d_k = 0``, nonnegative ``c_k`` will do.
 
         Parameters
         ----------
@@ -155,6 +161,9 @@ class Flint(Standard):
     def __init__(self) -> None:
         self.flint: Any = importlib.import_module("flint")
         self.name = f"python-flint {self.flint.__version__} and the standard library"
+        with contextlib.suppress(ImportError):
+            self.name = f"python-flint {self.flint.__version__}, NumPy {importlib.import_module('numpy').__version__}"
+            self.rows = 1000
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Standard.definite`."""
@@ -162,21 +171,25 @@ class Flint(Standard):
             with contextlib.suppress(ImportError):
                 if dense_definite(S):
                     return True
-        if not 0 < len(S) <= FLINT_ROWS:
+        if not self._short(S):
             return super().definite(S)
         coefficients = self.flint.fmpz_mat([list(row) for row in S]).charpoly().coeffs()  # constant term first
         return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
 
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
         """Return the first form that exceeds its bound, by exact solutions; see :meth:`Standard.bounded`."""
-        if not 0 < len(S) <= FLINT_ROWS or not forms:
+        if not forms or not self._short([*S, *(d for d, _ in forms)]) or len(S) > FLINT_ROWS or not self.definite(S):
             return super().bounded(S, forms)
-        if not self.definite(S):
-            return 0
         columns = self.flint.fmpz_mat([list(column) for column in zip(*(d for d, _ in forms), strict=True)])
         solved, scale = self.flint.fmpz_mat([list(row) for row in S]).solve(columns).numer_denom()
         reached = columns.transpose() * solved
-        return next((k for k, (_, c) in enumerate(forms) if reached[k, k] > c * scale), None)
+        exceeds = (k for k, (d, c) in enumerate(forms) if reached[k, k] >= c * scale and (any(d) or c < 0))
+        return next(exceeds, None)
+
+    def _short(self, rows: Rows) -> bool:
+        """Tell whether a matrix is small, and its entries short, for what python-flint does."""
+        longest = max((x.bit_length() for row in rows for x in row), default=0)
+        return 0 < len(rows[0] if rows else ()) <= FLINT_ROWS and longest * len(rows) <= FLINT_BITS
 
 
 def arithmetic(stdlib: bool = False) -> Standard:

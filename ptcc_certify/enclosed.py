@@ -81,6 +81,6 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
         rows = structure.graph.laplacian().tocsr()[F]
         residual = np.abs(rows @ state) + _ROUNDING * (abs(rows) @ np.abs(state))
         error = float((residual / (matrix.M @ u[F])).max()) * _WIDER
-        for v in F.tolist():
+        for v in F.tolist() if error else ():
             final[v] = (Fraction(float(state[v])), Fraction(float_above(Fraction(error * u[v] * _WIDER + 1e-300))))
     return EnclosedOutcome(tuple(final), tuple(degenerate), tuple(u.tolist()))

@@ -6,6 +6,7 @@ its size.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 from math import isqrt
 from operator import mul
@@ -15,7 +16,7 @@ BITS = 96
 #: Beyond this argument an exponential is not formed.
 LARGEST_EXPONENT = 100_000
 #: Largest ``mu2 T_r + mu3 kappa`` for which :func:`decay_integral_below` gives more than 0.
-LARGEST_PUSH = 20_000
+LARGEST_PUSH = 2000
 
 Enclosure = tuple[Fraction, Fraction]
 
@@ -174,10 +175,6 @@ def rounded(x: Fraction, bits: int, up: bool = False) -> Fraction:
 def decay_integral_below(T_r: Fraction, mu2: Fraction, m: Fraction, z: Fraction, bits: int = BITS) -> Fraction:
     """Bound ``int_0^t dr/psi(r)`` from below, ``psi(r) = e^(-mu2 r) ((T_r - r)/T_r)^m``, ``z = ln(T_r/(T_r - t))``.
 
-    With ``q = (T_r - r)/T_r`` the integrand is ``e^(w (1 - q)) q^(-m)``, ``w = mu2 T_r``. The way of ``q`` from 1 to
-    ``e^(-z)`` is cut into panels; on each the integrand is a product of two power series with positive coefficients, so
-    that cutting them off keeps a lower bound. Where ``w q`` is negligible the rest is elementary.
-
     Parameters
     ----------
     T_r, mu2, m : Fraction
@@ -191,34 +188,64 @@ def decay_integral_below(T_r: Fraction, mu2: Fraction, m: Fraction, z: Fraction,
     >>> abs(float(below) - 2 * (1 - 0.5**0.5)) < 1e-15  # mu2 near 0, m = 1/2, t = T_r/2
     True
     """
+    return decay_integrals_below(T_r, mu2, m, [z], bits)[z]
+
+
+def decay_integrals_below(
+    T_r: Fraction, mu2: Fraction, m: Fraction, instants: Iterable[Fraction], bits: int = BITS
+) -> dict[Fraction, Fraction]:
+    """Bound the integrals up to several instants ``z``; see :func:`decay_integral_below`.
+
+    With ``q = (T_r - r)/T_r`` the integrand is ``e^(w (1 - q)) q^(-m)``, ``w = mu2 T_r``. The way of ``q`` from 1 to
+    ``e^(-z)`` is cut into panels, which all instants share; on each the integrand is a product of two power series with
+    positive coefficients, so that cutting them off keeps a lower bound. Where ``w q`` is negligible the rest is
+    elementary. The bounds are 0 where ``w + m`` is above ``LARGEST_PUSH``.
+    """
     w, total, near = mu2 * T_r, Fraction(0), Fraction(1)
     if w + m > LARGEST_PUSH:
-        return total
-    if m > 1:  # a shorter way gives a lower bound too
-        z = min(z, Fraction(LARGEST_EXPONENT // 4) / (m - 1))
+        return dict.fromkeys(instants, Fraction(0))
     elementary = Fraction(1, 2**bits) / max(w, Fraction(1))
-    left = exp(-min(z, Fraction(4 * bits)), 2 * bits)[1]
-    while near > max(left, elementary):
-        share = min(Fraction(1, 2), 16 / (w * near + m), 1 - left / near)
-        following = rounded(near * (1 - share), 64, up=True) if share != 1 - left / near else left
-        if following >= near:
+    found = {}
+    for z in sorted(set(instants)):
+        # A shorter way gives a lower bound too.
+        short = min(z, Fraction(LARGEST_EXPONENT // 4) / (m - 1)) if m > 1 else z
+        small = short.denominator.bit_length() - short.numerator.bit_length()
+        left = exp(-min(short, Fraction(4 * bits)), 2 * bits + max(small, 0))[1]
+        while near > max(left, elementary):
+            share = min(Fraction(1, 2), 16 / (w * near + m))
+            following = rounded(near * (1 - share), 64, up=True)
+            if following <= left or following >= near:
+                following = left
+            share = rounded(1 - following / near, bits)
+            start = exp(w * (1 - near), bits)[0] * power(1 / near, m, bits)[0]
+            total += rounded(T_r * near * start * _series_below(w * near, m, share, bits), bits)
+            near = following
+        rest = Fraction(0)
+        begin = log(1 / near)[1]
+        if short > begin and near <= elementary:
+            rest = T_r * exp(w * (1 - near), bits)[0] * _power_integral_below(m - 1, begin, short, bits)
+        found[z] = rounded(total + rest, bits)
+    return found
+
+
+def _power_integral_below(a: Fraction, begin: Fraction, end: Fraction, bits: int) -> Fraction:
+    """Bound ``int_begin^end e^(a x) dx`` from below, also for ``a`` near 0 or of either sign."""
+    length = end - begin
+    y = a * length
+    first = exp(max(a * begin, Fraction(-LARGEST_EXPONENT)), bits)[0] if a * begin > -LARGEST_EXPONENT else Fraction(0)
+    if abs(y) > 1:
+        grown = exp(min(y, Fraction(LARGEST_EXPONENT)), bits)[0] if y > 0 else exp(max(y, Fraction(-1000)), bits)[1]
+        return first * (grown - 1) / a if y > 0 else first * (1 - grown) / -a
+    # The mean of e^(y x) over 0 <= x <= 1 is sum y^k / (k + 1)!: it grows with y, and cut after an odd power it is a
+    # lower bound for either sign.
+    y = rounded(y, bits) if y >= 0 else -rounded(-y, bits, up=True)
+    mean = term = Fraction(1)
+    for k in range(1, 2 * bits):
+        term = term * y / (k + 1)
+        mean += term
+        if k % 2 and abs(term) < Fraction(1, 2**bits):
             break
-        share = rounded(1 - following / near, bits)
-        start = exp(w * (1 - near), bits)[0] * power(1 / near, m, bits)[0]
-        total += rounded(T_r * near * start * _series_below(w * near, m, share, bits), bits)
-        near = following
-    begin = log(1 / near)[1]
-    if z > begin and near <= elementary:
-        start = exp(w * (1 - near), bits)[0]
-        if m == 1:
-            rest = z - begin
-        elif m > 1:
-            rest = (exp((m - 1) * z, bits)[0] - exp((m - 1) * begin, bits)[1]) / (m - 1)
-        else:
-            far = exp(-min((1 - m) * z, Fraction(LARGEST_EXPONENT)), bits)[1]
-            rest = (exp(-(1 - m) * begin, bits)[0] - far) / (1 - m)
-        total += T_r * start * max(rest, Fraction(0))
-    return rounded(total, bits)
+    return first * length * max(mean, Fraction(0))
 
 
 def _series_below(w: Fraction, m: Fraction, q: Fraction, bits: int) -> Fraction:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _INT64_LIMIT = 2**62
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
+_SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
 _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 
 Exact = Fraction | int | float | str
@@ -126,6 +127,10 @@ class SignedDigraph:
             raise GraphError("the graph has no nodes; give at least one edge, or a row with one label")
         if len(set(self.labels)) != n:
             raise GraphError("two nodes bear the same label; rename one of them")
+        for label in self.labels:
+            if _SURROGATE_PAIR.search(label):
+                name = shorten(label)
+                raise GraphError(f"label {name} holds a character as two surrogates; write the character itself")
         source, target = np.asarray(source, dtype=np.int64), np.asarray(target, dtype=np.int64)
         order = np.lexsort((source, target))
         self.source, self.target = source[order], target[order]

@@ -95,6 +95,9 @@ def test_false_rates_and_narrow_intervals_are_rejected(name: str):
             rejected(changed(data, ("proof", step, "witness", "groups", i), more), f"dominance of {of}")
     for label in data["structure"]["followers"]:
         ball = data["outcome"]["final_state"][label]
+        if isinstance(ball, str):  # nobody is followed but groups that end at 0
+            rejected(changed(data, ("outcome", "final_state", label), "1e-30"), "outcome of graph")
+            continue
         for new in ({**ball, "radius": "1e-300"}, {**ball, "mid": str(float(ball["mid"]) + 1e-6)}):
             rejected(changed(data, ("outcome", "final_state", label), new), "outcome of graph")
     leader = data["structure"]["leaders"][0]
@@ -140,7 +143,8 @@ def test_a_graph_of_two_thousand_nodes(slides: bool, tmp_path: Path):
     comparison = SparseHMatrix(block).smallest()[0]
     assert cert.rate is not None
     assert float(cert.rate) <= 2 * least * (1 + 1e-9)
-    assert float(cert.rate) >= 0.99 * min(2 * comparison, 2.0)
+    slowest_group = min(dominant_members(cert.structure)[0].group_rates)
+    assert float(cert.rate) >= 0.99 * min(2 * comparison, float(slowest_group))
 
 
 def test_a_leader_group_that_is_large_is_undecided_with_a_note():

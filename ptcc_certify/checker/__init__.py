@@ -10,6 +10,7 @@ specifies the file. The modules, in the order of the proof: ``reading``, ``struc
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,14 +18,17 @@ from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Step
-from ptcc_certify.checker.outcome import SLIDING_BOUND, SLIDING_CLOCK
+from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
 from ptcc_certify.checker.structure import MANY_COMPONENTS
 from ptcc_certify.errors import FormatError
 
+USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]"
+
 __all__ = [
     "MANY_COMPONENTS",
     "OBLIGATIONS",
+    "REACHING_BITS",
     "SCHEMA",
     "SLIDING_BOUND",
     "SLIDING_CLOCK",
@@ -43,7 +47,7 @@ def check(source: str | Path | Mapping[str, Any], *, stdlib: bool = False) -> Ch
     ----------
     source : path, or the parsed JSON object
     stdlib : bool
-        Use the standard library alone, even where python-flint is installed.
+        Use the standard library alone, even where python-flint and NumPy are installed.
 
     Raises
     ------
@@ -106,11 +110,17 @@ class _Check(LyapunovCheck):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the certificate that the command line names; 0 proved, 1 rejected, 2 unreadable, 4 undecided."""
+    for stream in (sys.stdout, sys.stderr):  # labels may hold what the terminal cannot show
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     words = list(sys.argv[1:] if arguments is None else arguments)
     stdlib = "--stdlib" in words
     paths = [word for word in words if word != "--stdlib"]
-    if len(paths) != 1 or paths[0].startswith("-"):
-        print("usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]", file=sys.stderr)
+    if paths in (["-h"], ["--help"]):
+        print(USAGE)
+        return 0
+    if len(paths) != 1 or paths[0].startswith("-") or not paths[0]:
+        print(USAGE, file=sys.stderr)
         return 2
     try:
         report = check(paths[0], stdlib=stdlib)

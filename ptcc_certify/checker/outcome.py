@@ -19,10 +19,14 @@ from ptcc_certify.checker.reading import (
     short,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
-from ptcc_certify.enclosure import decay_integral_below
+from ptcc_certify.enclosure import decay_integrals_below
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
+#: Bits of the bounds that prove reaching times.
+REACHING_BITS = 64
+#: An interval may be wider than twice what is proved by this share of the largest entry of the start.
+WIDEST = Fraction(1, 10**6)
 
 
 class OutcomeCheck(StructureCheck):
@@ -55,14 +59,14 @@ class OutcomeCheck(StructureCheck):
             need(all(not x for x in z), "a reaching time of a variable that is 0 from the start")
             return
         self.open("reaching-time", "reaching_time")
-        g, known = self.gains, {}
+        g = self.gains
+        need(all(end is None or end >= 0 for end in z), "a reaching time before the start")
+        asked = [end for end, s in zip(z, sigma0, strict=True) if s and end is not None]
+        known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)
         for label, size, end in zip(self.labels, map(abs, sigma0), z, strict=True):
             if end is None or not size:
                 need(end is None or end == 0, f"agent {short(label)} starts at 0")
                 continue
-            if end not in known:
-                need(end >= 0, "a reaching time before the start")
-                known[end] = decay_integral_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], end, 64)
             need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {short(label)} need not be there by then")
         self.done(f"{sum(1 for x in z if x is not None)} of {self.n} agents before T_r")
 
@@ -70,7 +74,7 @@ class OutcomeCheck(StructureCheck):
         """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
         start, sigma0 = self._state("initial_state"), self._state("sigma0")
         self.at, said = "outcome", self.data["outcome"]
-        self.projection: list[dict[int, Fraction]] | None = None
+        self.weights_of_leaders: Any = None  # where they are exact
         if said is None:
             need(all(final is None for _, final in self.components), "an outcome of a component alone")
             return
@@ -97,14 +101,7 @@ class OutcomeCheck(StructureCheck):
         voices = [voice[group[0]] for _, group, _ in balanced]
         pulls = [] if grouped else self._influence(parts["followers"], balanced)
         if not grouped and not any(r for row in (*voices, *pulls) for _, r in row):
-            Q: list[dict[int, Fraction]] = [{} for _ in range(self.n)]
-            for k, (_, group, gauge) in enumerate(balanced):
-                weights = {v: Fraction(g) for v, g in zip(group, gauge, strict=True)}
-                weights |= {v: row[k][0] for v, row in zip(self.followers, pulls, strict=True)}
-                for v, weight in weights.items():
-                    if weight:
-                        Q[v] |= {j: weight * x for j, (x, _) in zip(group, voices[k], strict=True)}
-            self.projection = Q
+            self.weights_of_leaders = balanced, voices, pulls
         if start is None:
             need(said["final_state"] is None and said["degenerate"] is None, "a final state without a start")
             need(all(final is None for _, final in self.components), "an outcome without a start")
@@ -122,11 +119,24 @@ class OutcomeCheck(StructureCheck):
                 self._followers(final, said["final_state"])
             for v, row in zip(self.followers, pulls, strict=False):
                 final[v] = combined(row, values)
-            self._final_state(said, final)
+            self._final_state(said, final, WIDEST * max(map(abs, moved)))
             need(all(abs(x) > r or r == 0 for x, r in values), "a value that may or may not be 0")
             at_zero = [k for (k, _, _), (x, _) in zip(balanced, values, strict=True) if x == 0]
             need(same(said["degenerate"], at_zero), "which components meet at 0")
-        self.done("exact" if self.projection is not None else "enclosed")
+        self.done("exact" if self.weights_of_leaders else "enclosed")
+
+    def projection(self) -> list[dict[int, Fraction]]:
+        """Return the rows of ``Q``, which are exact."""
+        need(self.weights_of_leaders is not None, "a distance to an outcome that is not exact")
+        balanced, voices, pulls = self.weights_of_leaders
+        Q: list[dict[int, Fraction]] = [{} for _ in range(self.n)]
+        for k, (_, group, gauge) in enumerate(balanced):
+            weights = {v: Fraction(g) for v, g in zip(group, gauge, strict=True)}
+            weights |= {v: row[k][0] for v, row in zip(self.followers, pulls, strict=True)}
+            for v, weight in weights.items():
+                if weight:
+                    Q[v] |= {j: weight * x for j, (x, _) in zip(group, voices[k], strict=True)}
+        return Q
 
     def _influence(self, said: Any, balanced: Sequence[tuple[int, list[int], list[int]]]) -> list[list[Interval]]:
         """Verify the weights of every follower on the balanced closed components."""
@@ -163,13 +173,14 @@ class OutcomeCheck(StructureCheck):
         for v in self.followers:
             final[v] = (known[v], Fraction(worst * U[v], least * scale))
 
-    def _final_state(self, said: dict[str, Any], final: Sequence[Interval]) -> None:
+    def _final_state(self, said: dict[str, Any], final: Sequence[Interval], spare: Fraction) -> None:
         """Check that every interval lies within the one that is claimed, here and under ``components``."""
         claimed = fields(said["final_state"], self.labels, "final_state")
         need(list(claimed) == self.labels, "agents are in another order")
         for (label, text), (x, r) in zip(claimed.items(), final, strict=True):
             mid, radius = interval(text)
             need(abs(x - mid) + r <= radius, f"agent {short(label)} ends elsewhere")
+            need(radius <= 2 * r + spare, f"the interval of agent {short(label)} is wider than what is proved")
         for nodes, state in self.components:
             own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
             grouped = state is None and len(self.components) > MANY_COMPONENTS

@@ -17,6 +17,8 @@ from ptcc_certify.errors import FormatError
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.
 MAX_BYTES, MAX_CHARACTERS, MAX_EXPONENT, MAX_BINARY_EXPONENT = 200_000_000, 4000, 400, 1400
+#: Longest common denominator that is formed.
+MAX_SCALE_BITS = 100_000
 INTEGER, SIGNED = re.compile(r"[0-9]+", re.ASCII), re.compile(r"[+-]?[0-9]+", re.ASCII)
 DECIMAL = re.compile(r"([+-]?[0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
 HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,5})", re.ASCII)
@@ -179,5 +181,8 @@ def interval(said: Any) -> Interval:
 
 def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
     """Return rational rows times their common denominator, and that."""
-    scale = math.lcm(*(x.denominator for row in rows for x in row))
+    scale = 1
+    for row in rows:
+        scale = math.lcm(scale, *{x.denominator for x in row})
+        need(scale.bit_length() <= MAX_SCALE_BITS, "the numbers have no common denominator of moderate length")
     return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale

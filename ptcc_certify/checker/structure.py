@@ -16,13 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same
+from ptcc_certify.checker.reading import MAX_SCALE_BITS, RejectedError, entries, exact, fields, need, same
 from ptcc_certify.definite import arithmetic
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100
-#: Longest common denominator of all weights that is formed.
-MAX_UNIT_BITS = 100_000
 NOMINAL = ("T", "rho1", "rho2", "kappa")
 SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
 COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
@@ -102,7 +100,7 @@ class StructureCheck:
         unit = 1
         for _, _, w in self.edges:
             unit = math.lcm(unit, w.denominator)
-            need(unit.bit_length() <= MAX_UNIT_BITS, "the weights have no common denominator of moderate length")
+            need(unit.bit_length() <= MAX_SCALE_BITS, "the weights have no common denominator of moderate length")
         return unit * self.scale
 
     @cached_property
@@ -136,8 +134,10 @@ class StructureCheck:
         need(isinstance(name, str) and re.fullmatch(r"[\w.-]{1,200}", name) is not None, "a side file's name is odd")
         try:
             need((self.folder / name).is_file(), f"side file {name} cannot be read")
+            fits = (self.folder / name).stat().st_size <= 8 * count + 1024
+            need(fits, f"side file {name} is not a vector of {count} numbers")
             with (self.folder / name).open("rb") as file:
-                content = file.read(8 * count + 1025)
+                content = file.read()
         except OSError:
             raise RejectedError(f"side file {name} cannot be read") from None
         need(hashlib.sha256(content).hexdigest() == said["sha256"], f"side file {name} is not what its hash says")
