@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ptcc_certify.enclosure import LARGEST_PUSH
 from ptcc_certify.structure import Claim, Structure
 from ptcc_certify.trajectory import SlidingTrajectory
 
@@ -255,8 +256,13 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
             left = f"{_down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
             said.append(f"{'others' if late else 'all'} by t = {_up(last.time, 6)}, {left} (agent {agent})")
         if late:
-            large = certificate.protocol.reaching_gain.pole < 1  # type: ignore[union-attr]
-            why = "mu3 kappa < 1 and sigma(0) is large" if large else "0 is reached nearer to T_r than can be written"
+            p = certificate.protocol
+            pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r  # type: ignore[union-attr]
+            why = "0 is reached nearer to T_r than can be written"
+            if pole < 1:
+                why = "mu3 kappa < 1 and sigma(0) is large"
+            if push + pole > LARGEST_PUSH:
+                why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
             said.append(f"only at T_r for {_listed(late, 40)}: {why}")
         lines.append(_line("sliding", f"sigma_k = 0 proved: {'; '.join(said)}"))
     if isinstance(run, SlidingTrajectory):

@@ -511,6 +511,79 @@ def test_a_matrix_that_is_not_definite():
     )
 
 
+def test_nothing_is_claimed_of_decay_where_nothing_moves():
+    """With no rows every matrix is definite, and its ends could be written in any order."""
+    data = json.loads(certify(SignedDigraph.from_edges([], nodes=["a"]), NOMINAL, simulation=False).to_json())
+    block = {"name": "P", "nodes": [], "lower_triangle": [], "times_rho": False}
+    member = {"class": "full", "coordinates": "E", "blocks": [block], "rho": None, "rate": "1000000", "prefactor": "-5"}
+    texts = {
+        kind: dict(zip(("statement", "lemma"), checker.OBLIGATIONS[kind], strict=True)) for kind in checker.OBLIGATIONS
+    }
+    of = {"of": "lyapunov.members[0]", "witness": None}
+    steps = [
+        {"kind": "rate", **of, **texts["rate"], "numbers": {"b": "1000000"}},
+        {"kind": "prefactor", **of, **texts["prefactor"], "numbers": {"lowest": "1", "highest": "-5"}},
+    ]
+    forged = {
+        **data,
+        "lyapunov": {"members": [{**member, "distance": None}]},
+        "rates": {**data["rates"], "certified": "1000000"},
+        "prefactor": {"value": "-5", "of": "||E||^2"},
+        "proof": [*data["proof"], *steps],
+    }
+    rejected(forged, "lyapunov")
+
+
+def test_both_arithmetics_reject_a_constant_that_is_only_reached():
+    """``c_k = d'V^-1 d`` exactly: strictly more is asked for, by both."""
+    data = json.loads(
+        certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, method="paper", simulation=False).to_json()
+    )
+    for label in ("1", "2"):
+        rejected(changed(data, ("lyapunov", "members", 0, "distance", "agents", label), "1"), "distance of lyap")
+
+
+def test_an_interval_that_says_nothing_is_rejected():
+    data = made("2.1 K>=2", 5)
+    label = data["graph"]["nodes"][0]
+    rejected(changed(data, ("outcome", "final_state", label), {"mid": "0", "radius": "1e400"}), "outcome of graph")
+
+
+def test_one_end_of_rho_without_the_other_is_rejected():
+    data = made("2.2", 5)
+    step = proof_step(data, "rho-interval")
+    for key in ("printed", "exact"):
+        forged = changed(data, ("paper", "rho_interval", key), None)
+        left = {k: v for k, v in data["proof"][step]["numbers"].items() if k != key}
+        rejected(changed(forged, ("proof", step, "numbers"), left), "rho-interval of paper")
+
+
+@pytest.mark.parametrize(
+    ("gains", "size"),
+    [
+        ({"kappa": "2.1", "mu3": 1 / 2.1, "mu2": "1e-9"}, 100),
+        ({"kappa": 3, "mu3": 0.3333333333333333}, 1000),
+        ({}, "1e-30"),
+        ({"mu3": 10**5}, 1),
+        ({"mu2": "1e300"}, 1),
+        ({"mu1": "1e300"}, 1),
+        ({"kappa": "0.5"}, 1000),
+    ],
+)
+def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
+    """Instants that the check cannot confirm are not claimed; those near ``mu3 kappa = 1`` are confirmed."""
+    whole = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, **gains}
+    protocol = SlidingModeProtocol(**whole)
+    graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)])
+    cert = certify(graph, protocol, [1, 2, 3], sigma0=[size, 0, 0], simulation=False)
+    assert cert.verdict == "certified", cert.notes
+    assert cert.reaching is not None
+    provable = (
+        protocol.mu2 * protocol.T_r + protocol.mu3 * protocol.kappa <= 2000 and protocol.mu3 * protocol.kappa > 0.9
+    )
+    assert (cert.reaching[0].z is not None) == provable
+
+
 # ---------------------------------------------------------------------- limits
 
 
@@ -556,6 +629,53 @@ def test_huge_and_hostile_files_are_refused(tmp_path: Path):
     assert 'not a certificate of schema "ptcc-certificate/1"' in one_line(path)
     assert "no such file" in one_line(tmp_path / "missing.json").lower()
     assert "directory" in one_line(tmp_path).lower()
+
+
+def timed(data: Json, seconds: float, **options: bool) -> None:
+    begin = time.monotonic()
+    report = check(resealed(data), **options)
+    assert time.monotonic() - begin < seconds
+    assert report.rejected or report.accepted
+
+
+def test_long_numbers_and_many_rows_take_bounded_time():
+    """Coprime denominators of 1,000 digits, thousands of rows, dozens of distinct reaching times."""
+    data = made("1.2", 5)
+    k = next(i for i, m in enumerate(data["lyapunov"]["members"]) if m["class"] == "full")
+    rows = data["lyapunov"]["members"][k]["blocks"][0]["lower_triangle"]
+    long = [
+        [f"{10**1000 + 7 * (50 * i + j)}/{10**1000 + 2 * (50 * i + j) + 1}" for j in range(i + 1)]
+        for i in range(len(rows))
+    ]
+    for stdlib in (True, False):
+        timed(changed(data, ("lyapunov", "members", k, "blocks", 0, "lower_triangle"), long), 20, stdlib=stdlib)
+    n = 3000
+    ring = [(i, (i + 1) % n, 1) for i in range(n)] + [(i, n + i, 1) for i in range(n)]
+    wide = json.loads(certify(SignedDigraph.from_edges(ring), NOMINAL, method="paper", simulation=False).to_json())
+    timed(wide, 10)
+    nodes = wide["graph"]["nodes"]
+    block = {"name": "P", "nodes": nodes, "diagonal": ["1"] * len(nodes), "times_rho": False}
+    member = {"class": "lmi", "coordinates": "E", "blocks": [block], "rho": None, "rate": "-9", "prefactor": "1"}
+    forged = {**wide, "lyapunov": {"members": [{**member, "distance": None}]}}
+    begin = time.monotonic()
+    assert "rows" in (check(resealed(forged)).reason or "")
+    assert time.monotonic() - begin < 10
+    slow = made("1.1", 5, True)
+    z = {label: f"{k + 1}/1000" for k, label in enumerate(slow["graph"]["nodes"])}
+    slow = changed(slow, ("protocol",), {**slow["protocol"], "mu2": "1900", "mu3": "90"})
+    timed(changed(slow, ("reaching_time", "z"), z), 20)
+
+
+def test_a_label_that_the_terminal_cannot_show(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("\U0001f600", "b", 1), ("b", "\U0001f600", 1)])
+    data = json.loads(certify(graph, NOMINAL, [1, 2], simulation=False).to_json())
+    (tmp_path / "c.json").write_text(json.dumps(changed(data, ("initial_state", "\U0001f600"), "nan")))
+    done = subprocess.run(
+        [sys.executable, "-m", "ptcc_certify.checker", str(tmp_path / "c.json")],
+        capture_output=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": str(PACKAGE.parent)},
+    )
+    assert done.returncode == 1 and b"rejected" in done.stdout and done.stderr == b""
 
 
 @pytest.mark.parametrize("text", ["1e999999999", "1e401", "9" * 10**7, "0x1p99999", "1/0", "1_0", "١", "", "1/-2", "."])

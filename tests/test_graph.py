@@ -340,3 +340,9 @@ def test_one_node_is_a_graph():
 def test_a_weight_that_could_not_be_written_again_is_refused():
     with pytest.raises(GraphError, match="too many digits"):
         SignedDigraph.from_edges([("a", "b", "0." + "3" * 2500)])
+
+
+def test_a_character_in_two_surrogates_is_refused():
+    """Written to JSON and read again it would be another label."""
+    with pytest.raises(GraphError, match="two surrogates"):
+        SignedDigraph.from_edges([("\ud83d\ude00", "b", 1)])

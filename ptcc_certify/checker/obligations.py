@@ -22,8 +22,7 @@ OBLIGATIONS = {
     "rho-interval": ("S(end) > 0 at both ends, so S(rho) > 0 in between", "Lemma 5"),
     "rate": ("P L + L'P - b P > 0 on the range of L", "Lyapunov decrease"),
     "dominance": (
-        "P L + L'P - b P > 0 on the range of L: with (g_k - b) P_k for the blocks of leader groups, and the sizes of "
-        "off-diagonal entries taken negative, it takes the vector d to a positive one",
+        "S = P L + L'P - b P, (g_k - b) P_k for leader groups: S_ii d_i > sum_j |S_ij| d_j for a vector d > 0",
         "Lyapunov decrease",
     ),
     "prefactor": ("lowest I < P < highest I", "Rayleigh quotient"),
