@@ -94,7 +94,7 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     sizes = np.bincount(number)
     diagonal = L.diagonal()
     best = None
-    single = np.flatnonzero((sizes[number] == 1) & (diagonal > 0))
+    single = np.flatnonzero((sizes[number] == 1) & (diagonal > 0) & np.isfinite(diagonal))
     if single.size:
         node = int(single[np.argmin(diagonal[single])])
         best = ((node,), float(diagonal[node]), 1)

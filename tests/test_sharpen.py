@@ -296,4 +296,4 @@ def test_above_the_limit_of_exact_proofs_it_is_said():
     graph = ring(125, (3, 1, -1))
     cert = certify(graph, P, simulation=False)
     assert cert.verdict == "undecided"
-    assert any("searched up to 120 nodes" in note for note in cert.notes)
+    assert any("leader group has 125 nodes" in note for note in cert.notes)
