@@ -26,6 +26,7 @@ from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.outcomes import outcome
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.structure import analyse
+from ptcc_certify.summary import certificate_lines
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLASSES = dict(all_classes())
@@ -187,3 +188,12 @@ def test_real_networks_of_thousands_are_certified(name: str, tightness: float, r
     block = graph.laplacian().tocsc()[followers][:, followers]
     least = float(eigs(block, k=1, sigma=0, return_eigenvectors=False)[0].real)
     assert tightness * 2 * least <= float(cert.rate) <= 2 * least * (1 + 1e-9)
+
+
+def test_the_screen_tells_how_near_the_final_state_is_known():
+    graph = random_sparse(300, 4)
+    cert = certify(graph, NOMINAL, [1] * 300, simulation=False)
+    lines = certificate_lines(cert, "g")
+    (said,) = [line for line in lines if line.startswith("ends at")]
+    assert said.endswith("proved)") and "to within" in said
+    assert lines[-1] == "verdict    certified"
