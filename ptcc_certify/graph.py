@@ -417,10 +417,15 @@ class SignedDigraph:
         with the weight as ``p`` or ``p/q`` in lowest terms, each group sorted; UTF-8, ``\n`` after each line.
         """
         digest = hashlib.sha256()
-        for label in sorted(self.labels):
-            digest.update((json.dumps([label], ensure_ascii=False) + "\n").encode("utf-8", "surrogatepass"))
-        for s, t, w in sorted(self._edges()):
-            line = json.dumps([s, t, format_exact(w)], ensure_ascii=False) + "\n"
+        quoted = [json.dumps(label, ensure_ascii=False) for label in self.labels]
+        order = sorted(range(self.n_nodes), key=self.labels.__getitem__)
+        rank = np.empty(self.n_nodes, dtype=np.int64)
+        rank[order] = np.arange(self.n_nodes)
+        digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
+        edges = np.lexsort((rank[self.target], rank[self.source])).tolist()
+        sources, targets = self.source.tolist(), self.target.tolist()
+        for i in edges:
+            line = f'[{quoted[sources[i]]}, {quoted[targets[i]]}, "{format_exact(self._weights.fraction(i))}"]\n'
             digest.update(line.encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
 

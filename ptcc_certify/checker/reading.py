@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -91,21 +92,27 @@ def exact(text: Any) -> Fraction:
     >>> exact("-3/4"), exact("2.5e-1"), exact("0x1.8p-1")
     (Fraction(-3, 4), Fraction(1, 4), Fraction(3, 4))
     """
-    if isinstance(text, str) and len(text) <= MAX_CHARACTERS:
-        top, slash, bottom = text.partition("/")
-        if SIGNED.fullmatch(top) and (not slash or (INTEGER.fullmatch(bottom) and int(bottom))):
-            return Fraction(int(top), int(bottom or 1))
-        if match := HEXADECIMAL.fullmatch(text):
-            part, exponent = match[3] or "", int(match[4])
-            value = Fraction(int(match[1] + match[2] + part, 16))
-            if abs(exponent) <= MAX_BINARY_EXPONENT:
-                return value * Fraction(2) ** (exponent - 4 * len(part))
-        match = DECIMAL.fullmatch(text)
-        if match and (match[1].strip("+-") or match[2]) and abs(int(match[3] or 0)) <= MAX_EXPONENT:
-            part = match[2] or ""
-            digits, shift = int(match[1] + part), int(match[3] or 0) - len(part)
-            return Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
+    if isinstance(text, str) and len(text) <= MAX_CHARACTERS and (value := _parsed(text)) is not None:
+        return value
     raise RejectedError(f"{short(str(text))} is not an exact number")
+
+
+@lru_cache(maxsize=10_000)
+def _parsed(text: str) -> Fraction | None:
+    top, slash, bottom = text.partition("/")
+    if SIGNED.fullmatch(top) and (not slash or (INTEGER.fullmatch(bottom) and int(bottom))):
+        return Fraction(int(top), int(bottom or 1))
+    if match := HEXADECIMAL.fullmatch(text):
+        part, exponent = match[3] or "", int(match[4])
+        value = Fraction(int(match[1] + match[2] + part, 16))
+        if abs(exponent) <= MAX_BINARY_EXPONENT:
+            return value * Fraction(2) ** (exponent - 4 * len(part))
+    match = DECIMAL.fullmatch(text)
+    if match and (match[1].strip("+-") or match[2]) and abs(int(match[3] or 0)) <= MAX_EXPONENT:
+        part = match[2] or ""
+        digits, shift = int(match[1] + part), int(match[3] or 0) - len(part)
+        return Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
+    return None
 
 
 def short(text: str, limit: int = 40) -> str:

@@ -81,11 +81,13 @@ class StructureCheck:
         need(all(0 <= s < self.n and 0 <= t < self.n and s != t for t, s in ends), "an edge of a node to itself")
         need(all(weights), "an edge of weight 0")
         hashed = hashlib.sha256()
-        for label in sorted(self.labels):
-            hashed.update((json.dumps([label], ensure_ascii=False) + "\n").encode("utf-8", "surrogatepass"))
-        rows = zip((self.labels[s] for s in sources), (self.labels[t] for t in targets), weights, strict=True)
-        for s, t, w in sorted(rows):
-            line = json.dumps([s, t, str(Fraction(w) / scale)], ensure_ascii=False) + "\n"
+        quoted = [json.dumps(label, ensure_ascii=False) for label in self.labels]
+        order = sorted(range(self.n), key=self.labels.__getitem__)
+        rank = {v: i for i, v in enumerate(order)}
+        hashed.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
+        for k in sorted(range(len(weights)), key=lambda k: (rank[sources[k]], rank[targets[k]])):
+            w = weights[k] if scale == 1 else Fraction(weights[k]) / scale
+            line = f'[{quoted[sources[k]]}, {quoted[targets[k]]}, "{w}"]\n'
             hashed.update(line.encode("utf-8", "surrogatepass"))
         self.sha256 = hashed.hexdigest()
         need(said["sha256"] == self.sha256, "the SHA-256 of the edge list is another")
