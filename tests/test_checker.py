@@ -341,27 +341,26 @@ def test_edges_dropped_doubled_turned_or_of_another_sign_are_rejected():
 
 
 def test_a_rate_beyond_the_slack_is_rejected():
-    """Rates of all members and of the paper, raised by 1e-9 beyond what was left to the best provable one."""
+    """The rate of every sharper member, raised by a part in 10^9: nothing of that is left to be proved."""
+    count = 0
     for name, slides in SAMPLE:
         data = made(name, 5, slides)
+        rates = [member["rate"] for member in data["lyapunov"]["members"]]
         for k, member in enumerate(data["lyapunov"]["members"]):
-            if member["class"] == "paper":
+            of = f"lyapunov.members[{k}]"
+            # A rate that two members share may be the smaller one of both, which leaves the other a part in 10^6.
+            if member["class"] == "paper" or rates.count(member["rate"]) > 1:
                 continue
-            step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"].endswith(f"[{k}]"))
-            rate = Fraction(member["rate"])
-            for more in (Fraction(1, 10**2), Fraction(1, 10**5)):
-                higher = str(rate + abs(rate) * more)
-                forged = changed(
-                    changed(data, ("lyapunov", "members", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
-                )
-                if data["rates"]["certified"] == member["rate"]:
-                    forged = changed(forged, ("rates", "certified"), higher)
-                if data["rates"]["diagonal"] == member["rate"]:
-                    forged = changed(forged, ("rates", "diagonal"), higher)
-                report = check(resealed(forged), stdlib=True)
-                # A full matrix may have been found for a lower rate than its own best: then a little more is true.
-                if more > Fraction(1, 10**4) or not report.accepted:
-                    assert report.rejected == f"rate of lyapunov.members[{k}]", (name, k, member["class"])
+            step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"] == of)
+            higher = str(Fraction(member["rate"]) + abs(Fraction(member["rate"])) / 10**9)
+            forged = changed(data, ("lyapunov", "members", k, "rate"), higher)
+            forged = changed(forged, ("proof", step, "numbers"), {"b": higher})
+            for key in ("certified", "diagonal"):
+                if data["rates"][key] == member["rate"]:
+                    forged = changed(forged, ("rates", key), higher)
+            rejected(forged, rf"rate of lyapunov\.members\[{k}\]")
+            count += 1
+    assert count >= 15
 
 
 @pytest.mark.parametrize(("name", "slides"), SAMPLE[:2])
