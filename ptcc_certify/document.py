@@ -390,7 +390,10 @@ def graph_section(graph: SignedDigraph) -> dict[str, Any]:
     read = graph.read
     return {
         "nodes": list(graph.labels),
-        "edges": [[s, t, format_exact(w)] for s, t, w in graph.edges],
+        "edges": [
+            [graph.labels[s], graph.labels[t], w]
+            for s, t, w in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True)
+        ],
         "read": {key: read[key] for key in ("orientation", "duplicates", "self_loops", "undirected")},
         "sha256": graph.sha256,
     }

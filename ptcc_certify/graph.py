@@ -343,6 +343,16 @@ class SignedDigraph:
         """
         return (None if self._weights.kind == "fraction" else self._weights.table), self._weights.scale
 
+    @cached_property
+    def weight_texts(self) -> list[str]:
+        """The weights as exact texts, in the order of the edges."""
+        table = self._weights.table
+        if table.dtype == object:
+            return [format_exact(self._weights.fraction(i)) for i in range(self.n_edges)]
+        _, first, which = np.unique(table, return_index=True, return_inverse=True)
+        texts = [format_exact(self._weights.fraction(int(i))) for i in first]
+        return [texts[k] for k in which.tolist()]
+
     def equal_weights(self, other: np.ndarray) -> np.ndarray:
         """Tell for each edge ``i`` whether its weight equals that of edge ``other[i]``, exactly."""
         return np.asarray(self._weights.table == self._weights.table[other], dtype=bool)
@@ -422,10 +432,9 @@ class SignedDigraph:
         rank = np.empty(self.n_nodes, dtype=np.int64)
         rank[order] = np.arange(self.n_nodes)
         digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
-        edges = np.lexsort((rank[self.target], rank[self.source])).tolist()
-        sources, targets = self.source.tolist(), self.target.tolist()
-        for i in edges:
-            line = f'[{quoted[sources[i]]}, {quoted[targets[i]]}, "{format_exact(self._weights.fraction(i))}"]\n'
+        sources, targets, texts = self.source.tolist(), self.target.tolist(), self.weight_texts
+        for i in np.lexsort((rank[self.target], rank[self.source])).tolist():
+            line = f'[{quoted[sources[i]]}, {quoted[targets[i]]}, "{texts[i]}"]\n'
             digest.update(line.encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
 

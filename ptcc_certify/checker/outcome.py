@@ -179,8 +179,10 @@ class OutcomeCheck(StructureCheck):
         need(list(claimed) == self.labels, "agents are in another order")
         for (label, text), (x, r) in zip(claimed.items(), final, strict=True):
             mid, radius = interval(text)
-            need(abs(x - mid) + r <= radius, f"agent {short(label)} ends elsewhere")
-            need(radius <= 2 * r + spare, f"the interval of agent {short(label)} is wider than what is proved")
+            if not (x == mid and r == radius) and abs(x - mid) + r > radius:
+                raise RejectedError(f"agent {short(label)} ends elsewhere")
+            if r != radius and radius > 2 * r + spare:
+                raise RejectedError(f"the interval of agent {short(label)} is wider than what is proved")
         for nodes, state in self.components:
             own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
             grouped = state is None and len(self.components) > MANY_COMPONENTS

@@ -144,9 +144,11 @@ def fields(value: Any, keys: Sequence[str], what: str) -> dict[str, Any]:
         raise RejectedError(f"{what} is not an object")
     known = set(keys)
     for key in keys:
-        need(key in value, f'the key "{short(key)}" is missing')
+        if key not in value:
+            raise RejectedError(f'the key "{short(key)}" is missing')
     for key in value:
-        need(key in known, f'the key "{short(str(key))}" is not known')
+        if key not in known:
+            raise RejectedError(f'the key "{short(str(key))}" is not known')
     return value
 
 
