@@ -1,4 +1,4 @@
-"""Certificates of large sparse H-matrices by Krylov solves, judged by their witnesses; seldom by a factor.
+"""Certificates of sparse H-matrices by Krylov solves (a factor up to 2,000 rows), judged by their witnesses.
 
 The comparison matrix ``M`` of an H-matrix with positive diagonal is a nonsingular M-matrix. For ``t`` below its
 smallest eigenvalue, ``u = (M - t I)^-1 1`` and ``v = (M - t I)^-T 1`` are positive, and ``Omega = diag(v / u)`` has

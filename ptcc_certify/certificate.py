@@ -24,7 +24,7 @@ from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.document import certificate_document, enclosed_witness, outcome_witness, with_side_files
-from ptcc_certify.enclosed import EnclosedOutcome, enclose
+from ptcc_certify.enclosed import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
@@ -51,6 +51,8 @@ SEARCH_NODES = 150
 SETTLED = 1e-6
 #: Largest strong component whose dense spectrum is computed.
 SPECTRUM_NODES = 1500
+#: From so many decades between weights on, they are named as the reason that nothing was proved.
+MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
 
@@ -455,9 +457,10 @@ ReachingTime(0, 1 before T_r)))
     enclosed = None
     if not matrix.exact:
         moved = None if start is None else [x - s for x, s in zip(start, gone, strict=True)]
-        enclosed = enclose(structure, matrix, moved)
-        if enclosed is None:
-            notes.append(f"the outcome is floating point only: a leader group has more than {EXACT_NODES} nodes")
+        try:
+            enclosed = enclose(structure, matrix, moved)
+        except NotEnclosedError as error:
+            notes.append(f"the outcome is floating point only: {error}")
     if trajectory is not None and result is not None:
         gap = float(np.abs(trajectory.final_state - result.values).max())
         if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
@@ -545,7 +548,7 @@ def _search_and_prove(
         notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
         return None, nothing, None
     if n > EXACT_NODES:
-        notes.append(f"exact proofs stop at {EXACT_NODES} nodes; the graph has {n}")
+        notes.append(f"the paper's certificate is proved up to {EXACT_NODES} nodes; the graph has {n}")
         return V, nothing, numerical
     with np.errstate(all="ignore"):
         proof = theorem.prove(structure, V)
@@ -577,6 +580,8 @@ def _sharpen(
         if method not in ("perron", "best"):
             notes.append(f"above {EXACT_NODES} nodes only the class perron is proved; the graph has {n}")
             return Sharpening()
+        if at is not None:
+            clocks.append(float(gain.clock_at_remaining(float(1 - at / protocol.T))))
         found = sharpen_large(structure, clocks)
         notes.extend(found.notes)
         return found
@@ -591,6 +596,8 @@ def _precision_note(graph: SignedDigraph) -> str:
     sizes = [abs(graph.exact_weight(i)) for i in range(graph.n_edges)]
     ratio = max(sizes) / min(sizes)
     decades = len(str(ratio.numerator // ratio.denominator)) - 1
+    if decades < MANY_DECADES:
+        return "no rate was proved"
     return f"no rate was proved; the weights span {decades} decades, of which float64 resolves less than 16"
 
 

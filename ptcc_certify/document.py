@@ -17,7 +17,7 @@ from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.rationals import format_exact, writable
+from ptcc_certify.rationals import MAX_EXPONENT, format_exact, writable
 from ptcc_certify.structure import Claim, Structure
 from ptcc_certify.theorems import Obligation
 from ptcc_certify.trajectory import SlidingTrajectory
@@ -127,6 +127,24 @@ def _ball_text(interval: Interval) -> dict[str, str]:
     return {"mid": f"{mid}e-{_DECIMALS}", "radius": f"{wide}e-{_DECIMALS}"}
 
 
+def decimal_text(value: Fraction) -> str:
+    """Write a rational whose denominator divides a power of ten as digits and an exponent.
+
+    Examples
+    --------
+    >>> decimal_text(Fraction(-3, 80)), decimal_text(Fraction(12))
+    ('-375e-4', '12')
+    """
+    places, left = 0, value.denominator
+    while left > 1:
+        left //= math.gcd(left, 10)
+        places += 1
+    if places > MAX_EXPONENT:
+        return format_exact(value)
+    digits = value.numerator * (10**places // value.denominator)
+    return f"{digits}e-{places}" if places else str(digits)
+
+
 def _text(value: Fraction | None) -> str | None:
     return None if value is None else format_exact(value)
 
@@ -225,7 +243,7 @@ def _enclosed_section(certificate: Certificate, enclosed: EnclosedOutcome) -> di
     labels, final = certificate.graph.labels, None
     if enclosed.final is not None:
         final = {
-            label: exact_or_ball(x) if r == 0 else {"mid": repr(float(x)), "radius": repr(float(r))}
+            label: exact_or_ball(x) if r == 0 else {"mid": decimal_text(x), "radius": decimal_text(r)}
             for label, (x, r) in zip(labels, enclosed.final, strict=True)
         }
     groups = [
@@ -338,7 +356,8 @@ def _unverified_section(certificate: Certificate) -> dict[str, Any]:
     }
     floats = None
     if certificate.outcome is not None and not certificate.outcome.exact:
-        floats = dict(zip(certificate.graph.labels, certificate.outcome.values.tolist(), strict=True))
+        values = map(_finite, certificate.outcome.values.tolist())
+        floats = dict(zip(certificate.graph.labels, values, strict=True))
     return {
         "spectral": _finite(certificate.spectral_rate),
         "tightness": _finite(certificate.tightness),

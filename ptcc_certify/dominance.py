@@ -1,4 +1,4 @@
-"""Lyapunov functions of large graphs, proved row by row: no matrix is factored, searched or even formed.
+"""Lyapunov functions of large graphs, proved row by row: no matrix of all agents is searched or formed densely.
 
 ``V = E' P E`` with ``P = diag(w)`` on the rows of ``E`` that move. Leader groups are small, and each has its own proof
 
@@ -23,18 +23,20 @@ from typing import Any
 import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact import round_to_bits
+from lmi.exact import prove_generalized_margin, round_to_bits
 from lmi.iterative import SparseHMatrix
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import EXACT_NODES, left_vector
 from ptcc_certify.rationals import format_exact
 from ptcc_certify.structure import Structure
+from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 
 #: Relative distances of ``t`` below the smallest eigenvalue: the larger, the smaller the prefactor.
-LOSSES = (1e-5, 1e-2, 0.1, 0.5)
+LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
 #: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
 _BITS, _SLACK = 40, 1e-9
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,8 @@ class DominantMember:
 def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> list[DominantMember]:
     """Return Lyapunov functions from the fastest to the one of the smallest prefactor.
 
-    Their inequality holds in floating point with some slack; the check of the certificate establishes it.
+    The rates of leader groups are proved. The inequality of all rows holds in floating point with some slack; the check
+    of the certificate establishes it.
 
     Raises
     ------
@@ -79,7 +82,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> 
     >>> from ptcc_certify.structure import analyse
     >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 2), (2, 3, -1)])
     >>> [round(float(m.rate), 3) for m in dominant_members(analyse(g))]
-    [2.0, 1.99, 1.9, 1.5]
+    [2.0, 1.99, 1.9, 1.5, 1.1, 1.01, 1.0]
     """
     if not structure.graph.n_edges:
         return []
@@ -112,16 +115,25 @@ class _Composite:
         self.pull: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
         self.followers = SparseHMatrix(rows[:, self.F]) if self.F.size else None
         self.smallest = self.followers.smallest()[0] if self.followers is not None else np.inf
-        self.p, self.g = np.zeros(self.K.size), np.zeros(len(self.groups))
-        for k, (group, component) in enumerate(zip(self.groups, system.leaders, strict=True)):
-            self.p[self.place == k], self.g[k] = _group(L[group][:, group].toarray(), component.balanced)
+        self.p: list[Fraction] = []
+        self.group_rates: list[Fraction] = []
+        several = structure.graph.subgraph(self.K) if self.K.size else structure.graph
+        first = 0
+        for group, component in zip(self.groups, system.leaders, strict=True):
+            own = several.subgraph(np.arange(first, first + len(group)))
+            p, g = _group(own, component.balanced)
+            self.p += p
+            self.group_rates.append(g)
+            first += len(group)
+        self.g = np.array([float(g) for g in self.group_rates])
         if not min(2 * self.smallest, self.g.min(initial=np.inf)) > 0:
             raise NoCertificate("a block has no positive rate in floating point")
 
     def member(self, loss: float) -> DominantMember:
         """Return the composite whose followers are taken at ``(1 - loss)`` times their smallest eigenvalue."""
-        if self.followers is None or self.F.size == 0:
-            w, d = self.p, np.ones(self.K.size)
+        p = np.array([float(x) for x in self.p])
+        if self.followers is None:
+            w, d = p, np.ones(self.K.size)
         else:
             t = min(self.smallest, self.g.min(initial=np.inf) / 2) * (1 - loss)
             u, v = self.followers.certificate(t).witness or ()
@@ -136,18 +148,19 @@ class _Composite:
                 least = np.full(self.K.size, np.inf)
                 np.minimum.at(least, entries.col, budget[entries.row])
                 own = np.where(np.isfinite(least), least, 1.0)
-                own = np.array([own[self.place == k].min() for k in range(len(self.groups))])[self.place]
+                firsts = np.flatnonzero(np.diff(self.place, prepend=-1))
+                own = np.minimum.reduceat(own, firsts)[self.place]
                 push = self.pull.T @ (w * u)
-                scale = 2 * push / ((self.g[self.place] - b) * self.p * own)
-                scale = np.array([scale[self.place == k].max() for k in range(len(self.groups))])
-                scale = np.where(scale > 0, scale, 1.0)[self.place]
-                w, d = np.concatenate([self.p * scale, w]), np.concatenate([own, d])
-        w, d = w / w.max(), d / d.max()
+                scale = np.maximum.reduceat(2 * push / ((self.g[self.place] - b) * p * own), firsts)
+                # Powers of two keep the weights of a group the multiples for which its rate is proved.
+                scale = np.exp2(np.ceil(np.log2(np.where(scale > 0, scale, 1.0))))[self.place]
+                w, d = np.concatenate([p * scale, w]), np.concatenate([own, d])
+        w, d = w / np.exp2(np.ceil(np.log2(w.max()))), d / d.max()
         if not (np.isfinite(w).all() and np.isfinite(d).all() and w.min() > 1e-280 and d.min() > 1e-280):
             raise NoCertificate("the weights span more than float64 holds")
         diagonal = tuple(round_to_bits(float(x), _BITS) for x in w)
         vector = tuple(round_to_bits(float(x), _BITS) for x in d)
-        g = tuple(round_to_bits(float(x) * (1 - _SLACK), 53) for x in self.g)
+        g = tuple(self.group_rates)
         rate = self._rate(np.array([float(x) for x in diagonal]), np.array([float(x) for x in vector]), g)
         if not rate > 0:
             raise NoCertificate("no positive rate is left")
@@ -162,15 +175,27 @@ class _Composite:
         w_F, d_F = w[k:], d[k:]
         M, Mt = self.followers.M, self.followers.Mt
         bound = (M @ d_F) * w_F + Mt @ (w_F * d_F)
+        # What floats may have lost where the terms of a row cancel.
+        both = 4 * self.followers.diagonal * w_F * d_F
+        bound = bound - _ROUNDING * (2 * both - bound)
         if self.pull is not None:
             bound = bound - w_F * (self.pull @ d[:k])
             own = own - (self.pull.T @ (w_F * d_F)) / (w[:k] * d[:k])
         return float(min((bound / (w_F * d_F)).min(), own.min(initial=np.inf)))
 
 
-def _group(L: np.ndarray, balanced: bool) -> tuple[np.ndarray, float]:
-    """Return the left null vector of ``M(L)`` and the decay of its Lyapunov function on the range of ``L``."""
-    p = left_vector(SignedDigraph.from_matrix(np.diag(np.diag(L)) - L))
-    half = np.sqrt(p)
-    S = half[:, None] * L / half
-    return p / p.max(), float(np.linalg.eigvalsh(S + S.T)[int(balanced)])
+def _group(graph: SignedDigraph, balanced: bool) -> tuple[list[Fraction], Fraction]:
+    """Return the left null vector of ``M(L)``, rounded, and the proved decay of its Lyapunov function."""
+    p = left_vector(graph)
+    weights = tuple(round_to_bits(float(x), _BITS) for x in p / p.max())
+    half = np.sqrt([float(x) for x in weights])
+    S = half[:, None] * graph.laplacian().toarray() / half
+    guess = float(np.linalg.eigvalsh(S + S.T)[int(balanced)])
+    if balanced:
+        proved = prove_connectivity(graph, weights, guess)
+    else:
+        form = symmetric_product(weights, graph.exact_laplacian())
+        proved = prove_generalized_margin(form, diagonal_matrix(weights), guess)
+    if proved is None or proved <= 0:
+        raise NoCertificate(f"the rate of a leader group of {graph.n_nodes} nodes was not proved")
+    return list(weights), proved

@@ -157,9 +157,12 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
         voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
     if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
         return Influence(structure, tuple(voices), None, False)
-    weights: Sequence[Sequence[Number]] = (
-        exact_containment_weights(structure) if exact else containment_weights(structure).tolist()
-    )
+    try:
+        weights: Sequence[Sequence[Number]] = (
+            exact_containment_weights(structure) if exact else containment_weights(structure).tolist()
+        )
+    except RuntimeError:  # a factor of floats that is exactly singular
+        return Influence(structure, tuple(voices), None, False)
     return Influence(structure, tuple(voices), tuple(tuple(row) for row in weights), exact)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -197,3 +198,72 @@ def test_the_screen_tells_how_near_the_final_state_is_known():
     (said,) = [line for line in lines if line.startswith("ends at")]
     assert said.endswith("proved)") and "to within" in said
     assert lines[-1] == "verdict    certified"
+
+
+def chain(weights: list[Any]) -> SignedDigraph:
+    """A leader and followers in a row, each listening to the one before it."""
+    labels = ["a", *(f"f{i}" for i in range(len(weights)))]
+    return SignedDigraph.from_edges([(labels[i], labels[i + 1], w) for i, w in enumerate(weights)])
+
+
+def tied(weight: str) -> SignedDigraph:
+    """Two agents that listen to each other, and hardly to the leader; 130 more listen to one of them."""
+    pair = [("a", "x", weight), ("x", "y", 1), ("y", "x", 1)]
+    return SignedDigraph.from_edges([*pair, *(("x", f"f{i}", 1) for i in range(130))])
+
+
+def fan() -> SignedDigraph:
+    rows = [("a", f"f{i}", 10.0 ** (i % 20 - 10)) for i in range(130)]
+    rows += [(f"f{i}", f"f{(7 * i + 1) % 130}", 1) for i in range(130) if i != (7 * i + 1) % 130]
+    return SignedDigraph.from_edges(rows)
+
+
+@pytest.mark.parametrize(
+    ("graph", "start"),
+    [
+        (chain([10**9] * 130), "1e300"),
+        (chain([1] * 130), "1e-300"),
+        (chain([1] * 130), "1e-400"),
+        (chain([1] * 130), "0"),
+        (chain([10.0 ** (i % 13 - 6) for i in range(130)]), "2.5"),
+        (chain(["1/3", "-2/7"] * 65), "2.5"),
+        (tied("1e-9"), "1.5"),
+        (fan(), "3"),
+    ],
+)
+def test_weights_and_starts_of_any_size_are_certified(graph: SignedDigraph, start: str):
+    cert = certify(graph, NOMINAL, [start] * graph.n_nodes, simulation=False)
+    assert cert.verdict == "certified", cert.notes
+
+
+@pytest.mark.parametrize(
+    "graph",
+    [
+        chain([Fraction(1, 10**17) if i == 60 else 1 for i in range(130)]),
+        tied("1e-17"),
+        SignedDigraph.from_edges(
+            [("a", "f0", 1)] + [e for i in range(149) for e in ((f"f{i}", f"f{i + 1}", 1), (f"f{i + 1}", f"f{i}", 2))]
+        ),
+    ],
+)
+def test_what_floats_cannot_solve_is_undecided_and_says_so(graph: SignedDigraph):
+    cert = certify(graph, NOMINAL, [1] * graph.n_nodes)
+    assert cert.verdict == "undecided"
+    assert not any("leader group" in note for note in cert.notes)
+    assert not any("span 0 decades" in note for note in cert.notes)
+    assert check(json.loads(cert.to_json())).accepted
+
+
+def test_a_leader_group_over_many_decades():
+    """Its rate is proved by itself; floats alone would claim a little too much."""
+    rng = np.random.default_rng(0)
+    edges = {(i, (i + 1) % 40): float(10 ** rng.uniform(-4, 4)) for i in range(40)}
+    edges |= {(int(rng.integers(0, 40)), 40 + k): 1.0 for k in range(130)}
+    cert = certify(SignedDigraph.from_edges([(i, j, w) for (i, j), w in edges.items()]), NOMINAL, simulation=False)
+    assert cert.verdict == "certified", cert.notes
+
+
+def test_long_chains_have_a_bound_that_says_something():
+    """The fastest member has an astronomical prefactor; the slowest one bounds the first instants."""
+    found = certify(chain([1] * 141), NOMINAL, simulation=False).sharpening.members
+    assert min(m.prefactor for m in found) < 10**5

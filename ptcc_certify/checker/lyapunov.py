@@ -247,8 +247,9 @@ class LyapunovCheck(OutcomeCheck):
 
     def _weighted(self, weights: Mapping[int, Fraction]) -> tuple[Matrix, Fraction]:
         """Return ``E'W E`` as a form of the state, times a scale, and the scale."""
-        scale = math.lcm(*(w.denominator for w in weights.values()))
-        return self._state_form({v: {v: int(w * scale)} for v, w in weights.items()}), Fraction(scale * self.unit**2)
+        (scaled,), scale = integers([list(weights.values())])
+        form = self._state_form({v: {v: x} for v, x in zip(weights, scaled, strict=True)})
+        return form, Fraction(scale * self.unit**2)
 
     def _sharp(self, member: dict[str, Any], of: str) -> tuple[Matrix, Fraction]:
         """Verify rate and prefactor of a sharper Lyapunov matrix; return its form in the state and the scale."""
@@ -308,10 +309,9 @@ class LyapunovCheck(OutcomeCheck):
             S = self._group_decrease(group, [w[v] for v in group], g, kept)
             need(self.exact.definite(S), "a leader group is not proved")
             known.update(dict.fromkeys(group, g))
-        scale_w = math.lcm(*{x.denominator for x in w.values()})
-        scale_d = math.lcm(*{x.denominator for x in d.values()})
-        W = {v: int(x * scale_w) for v, x in w.items()}
-        D = {v: int(x * scale_d) for v, x in d.items()}
+        (weights,), _ = integers([list(w.values())])
+        (vector,), _ = integers([list(d.values())])
+        W, D = dict(zip(nodes, weights, strict=True)), dict(zip(nodes, vector, strict=True))
         left: dict[int, Fraction | int] = {}
         p, q = (rate * self.unit).as_integer_ratio()
         for v in nodes:
@@ -335,11 +335,9 @@ class LyapunovCheck(OutcomeCheck):
         """Return ``F L_k + L_k'F - g F`` with ``F = L_k'W L_k`` on some rows, times a positive integer."""
         self._bounded_size(len(group))
         A = self._block(group)
-        scale = math.lcm(*(x.denominator for x in weights))
-        F = product(
-            [list(column) for column in zip(*A, strict=True)],
-            [[int(x * scale) * y for y in row] for x, row in zip(weights, A, strict=True)],
-        )
+        (scaled,), _ = integers([list(weights)])
+        columns = [list(column) for column in zip(*A, strict=True)]
+        F = product(columns, [[x * y for y in row] for x, row in zip(scaled, A, strict=True)])
         FL = product(F, A)
         p, q = (g * self.unit).as_integer_ratio()
         return [[q * (FL[i][j] + FL[j][i]) - p * F[i][j] for j in kept] for i in kept]

@@ -17,6 +17,7 @@ from ptcc_certify.checker.reading import (
     need,
     same,
     short,
+    shown,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.enclosure import decay_integrals_below
@@ -123,7 +124,12 @@ class OutcomeCheck(StructureCheck):
             need(all(abs(x) > r or r == 0 for x, r in values), "a value that may or may not be 0")
             at_zero = [k for (k, _, _), (x, _) in zip(balanced, values, strict=True) if x == 0]
             need(same(said["degenerate"], at_zero), "which components meet at 0")
-        self.done("exact" if self.weights_of_leaders else "enclosed")
+        if self.weights_of_leaders is not None:
+            self.done("exact")
+        elif start is None:
+            self.done("influence of leader groups")
+        else:
+            self.done(f"enclosed, radius at most {shown(max(r for _, r in final))}")
 
     def projection(self) -> list[dict[int, Fraction]]:
         """Return the rows of ``Q``, which are exact."""
