@@ -291,7 +291,7 @@ def test_a_large_graph_is_undecided():
     name = save("ring.csv", ring(121))
     run = ptcc("certify", name)
     assert run.code == 4
-    assert "exact proofs stop at 120 nodes" in run.out
+    assert "the paper's certificate is proved up to 120 nodes" in run.out
     assert "not proved; numerically" in run.out
     assert ptcc("certify", name, "--min-rate", "0.001").code == 4
     assert ptcc("certify", name, "--min-rate", "1000").code == 3
