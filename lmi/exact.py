@@ -1,7 +1,7 @@
 """Proofs in exact arithmetic that a symmetric matrix is positive definite, each with a witness.
 
 Nothing here trusts a float: floats only suggest what to prove. Matrices are exact: a float is the dyadic number that it
-is. Three kinds of witness, checked without solver and without this package by :mod:`ptcc_certify.sparse_definite`:
+is. Three kinds of witness, each to be checked without a solver and without this package:
 
 - a rounded Cholesky factor, dense or sparse: ``S - R R'``, formed in integers, is strictly diagonally dominant;
 - two positive vectors for a matrix that dominates (an H-matrix): ``Omega A + A' Omega >= b Omega``;
@@ -708,7 +708,7 @@ def _rounded_vector(x: Any, n: int, bits: int) -> np.ndarray:
 def dyadic_integers(values: Any) -> tuple[list[int], int]:
     """Return floats or ints as integers over one power of two: ``values = integers * 2^power``, exactly.
 
-    So a matrix of floats is handed to :mod:`ptcc_certify.sparse_definite`.
+    So a matrix of floats is handed to whoever checks its proof in integers.
 
     Examples
     --------

@@ -114,7 +114,7 @@ class _Composite:
         rows = L[self.F]
         self.pull: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
         self.followers = SparseHMatrix(rows[:, self.F]) if self.F.size else None
-        self.smallest = self.followers.smallest()[0] if self.followers is not None else np.inf
+        self.smallest = self.followers.smallest() if self.followers is not None else np.inf
         self.p: list[Fraction] = []
         self.group_rates: list[Fraction] = []
         several = structure.graph.subgraph(self.K) if self.K.size else structure.graph

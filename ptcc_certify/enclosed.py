@@ -19,7 +19,7 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.iterative import SparseHMatrix, solve
-from ptcc_certify.outcomes import Influence
+from ptcc_certify.outcomes import Influence, follower_state
 from ptcc_certify.structure import Structure
 
 #: Decimals of a middle and of a radius, in units of the largest entry of the start.
@@ -112,7 +112,7 @@ def _enclose_followers(
     state = np.array([float(x / unit) for x, _ in final])
     block = rows[:, F].tocsr()
     with np.errstate(all="ignore"):
-        solved = solve(block, -(rows @ state), block.diagonal())
+        solved = follower_state(structure, state)
         if not np.isfinite(solved).all():
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
         middles = [Fraction(round(x * 10**_DIGITS), 10**_DIGITS) for x in solved.tolist()]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
-from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Step
+from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
 from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
 from ptcc_certify.checker.structure import MANY_COMPONENTS
@@ -33,6 +33,7 @@ __all__ = [
     "SLIDING_BOUND",
     "SLIDING_CLOCK",
     "CheckReport",
+    "Statement",
     "Step",
     "check",
     "digest",

@@ -35,22 +35,28 @@ OBLIGATIONS = {
 
 
 @dataclass(frozen=True)
-class Step:
-    """One obligation that was verified: its kind, what it is about, and what was verified."""
+class Statement:
+    """What an obligation states: its kind, and the part of the certificate that it is about."""
 
     kind: str
     of: str
-    detail: str
 
     @property
     def statement(self) -> str:
-        """What the obligation states."""
+        """What is stated."""
         return OBLIGATIONS[self.kind][0]
 
     @property
     def lemma(self) -> str:
         """What makes the statement part of the claim."""
         return OBLIGATIONS[self.kind][1]
+
+
+@dataclass(frozen=True)
+class Step(Statement):
+    """One obligation that was verified, and what was verified."""
+
+    detail: str
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 
 import lmi
 from lmi.exact import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
-from ptcc_certify.checker import OBLIGATIONS
+from ptcc_certify.checker import Statement
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
 from ptcc_certify.structure import ClosedComponent, Structure
@@ -111,7 +111,7 @@ class LyapunovFunction:
 
 
 @dataclass(frozen=True)
-class Obligation:
+class Obligation(Statement):
     """One statement that was proved, and that the independent check verifies again.
 
     Attributes
@@ -126,20 +126,8 @@ class Obligation:
         What makes the statement easy to verify; need not be trusted.
     """
 
-    kind: str
-    of: str
     numbers: Mapping[str, Fraction] = field(default_factory=dict)
     witness: Mapping[str, Any] | None = None
-
-    @property
-    def statement(self) -> str:
-        """What is stated."""
-        return OBLIGATIONS[self.kind][0]
-
-    @property
-    def lemma(self) -> str:
-        """What makes the statement part of the claim."""
-        return OBLIGATIONS[self.kind][1]
 
 
 @dataclass(frozen=True)
