@@ -1,4 +1,4 @@
-"""The search for diagonal Lyapunov matrices with cvxpy and Clarabel; larger best rates with :mod:`lmi.interior_point`.
+"""The search for diagonal Lyapunov matrices, with cvxpy and Clarabel or, for larger ones, :mod:`lmi.interior_point`.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
 certificate is proved elsewhere (:mod:`lmi.exact`).
@@ -7,6 +7,7 @@ certificate is proved elsewhere (:mod:`lmi.exact`).
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,8 +30,13 @@ if TYPE_CHECKING:
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
-#: Up to this many rows Clarabel climbs to the best rate; above, and on a subspace, :mod:`lmi.interior_point` does.
+#: Up to this many rows Clarabel climbs to the best rate, about as fast; above, and on a subspace,
+#: :mod:`lmi.interior_point` does.
 CLARABEL_ROWS = 20
+#: Up to this many rows Clarabel finds the best margin, as the paper does; above, :mod:`lmi.interior_point`.
+CLARABEL_MARGIN_ROWS = 60
+#: Solvers of the margin that may be asked for by name.
+SOLVERS = ("clarabel", "interior-point", "sdpa")
 #: Share of the smallest block rate that is given up when blocks are coupled.
 COUPLING_LOSS = 5e-7
 
@@ -43,6 +49,7 @@ def diagonal_lyapunov(
     basis: Any = None,
     start: Any = None,
     tolerance: float = 1e-9,
+    solver: str | None = None,
 ) -> DiagonalCertificate:
     """Find the diagonal ``Omega > 0`` of the best margin or of the best rate.
 
@@ -79,6 +86,9 @@ def diagonal_lyapunov(
         ``log_omega`` of a faster one.
     tolerance : float
         Relative gap asked of the solver.
+    solver : {"clarabel", "interior-point", "sdpa"}, optional
+        Margin only; by default Clarabel up to 60 rows and :mod:`lmi.interior_point` above. SDPA needs the package
+        sdpa-python.
 
     Returns
     -------
@@ -115,24 +125,33 @@ def diagonal_lyapunov(
     if max_condition is not None and not max_condition >= 1:
         raise MatrixError(f"max_condition = {max_condition} is below 1")
     max_condition = None if max_condition == math.inf else max_condition
+    if solver is not None and solver not in SOLVERS:
+        raise MatrixError(f'solver "{solver}" is unknown; use one of {", ".join(SOLVERS)}')
+    if solver == "sdpa" and importlib.util.find_spec("sdpap") is None:
+        raise LMIError('solver "sdpa" needs the package sdpa-python: pip install sdpa-python')
     if n == 0:
         raise MatrixError("A has no rows")
     if objective == "rate":
+        if solver is not None:
+            raise MatrixError('solver belongs to objective="margin"')
         if start is not None and (np.shape(start) != (n,) or not np.isfinite(np.asarray(start, dtype=float)).all()):
             raise MatrixError(f"start is not a finite vector of {n} entries")
         return _rate_optimum(A, max_condition, _basis(basis, n), tolerance, start)
     if basis is not None or start is not None:
         raise MatrixError('basis and start belong to objective="rate"')
-    if n == 1:
-        return _margin_certificate(A, np.ones(1))
+    if n == 1 or max_condition == 1:
+        return _margin_certificate(A, np.ones(n))
     scale, least = _scale(A), 0.0 if max_condition is None else 1 / max_condition
+    solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS else "interior-point")
+    if solver == "interior-point":
+        return _margin_certificate(A, maximise_margin(A / scale, np.ones(n), tolerance=tolerance, least=least).omega)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
         omega, t = cp.Variable(n), cp.Variable()
         S = _symmetric_product(cp, omega, A / scale)
         return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= least, omega <= 1]), omega
 
-    omega = _positive(_solve(problem, tolerance))
+    omega = _positive(_solve(problem, tolerance, solver))
     return _margin_certificate(A, np.maximum(omega, least * omega.max()))
 
 
@@ -740,8 +759,13 @@ def _symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
     return product + product.T
 
 
-def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance: float, dual: bool = False) -> Any:
-    """Solve with Clarabel and return the value of the expression; its status is not trusted, only its absence.
+def _solve(
+    problem: Callable[[Any], tuple[cp.Problem, cp.Expression]],
+    tolerance: float,
+    solver: str = "clarabel",
+    dual: bool = False,
+) -> Any:
+    """Solve with cvxpy and return the value of the expression; the status is not trusted, only its absence.
 
     With ``dual`` the dual matrix of the first constraint comes with it.
     """
@@ -750,11 +774,13 @@ def _solve(problem: Callable[[Any], tuple[cp.Problem, cp.Expression]], tolerance
     import cvxpy as cp
 
     built, expression = problem(cp)
-    options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
+    options = {}  # SDPA stops where its own precision ends, whatever it is asked for
+    if solver == "clarabel":
+        options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
         try:
-            built.solve(solver=cp.CLARABEL, **options)
+            built.solve(solver=solver.upper(), **options)
         except cp.SolverError as error:
             raise NoCertificate(f"the solver failed: {str(error).splitlines()[0]}") from None
     if expression.value is None or not np.isfinite(expression.value).all():

@@ -1,36 +1,53 @@
 """The search for diagonal matrices by a primal-dual interior-point method that knows its constraints.
 
-    maximise t   subject to   sum_i omega_i F_i >= t W,    omega >= 0,    sum_i omega_i = n,
-                              low <= scale_i omega_i <= c low    (if a largest condition c is given),
+    maximise t   subject to   sum_i omega_i F_i >= t W   and one of
+
+    - low <= omega_i <= 1 (a box),
+    - omega >= 0, sum_i omega_i = n (a simplex),
+    - sum_i omega_i = n and low <= scale_i omega_i <= c low for some low (a largest condition c),
 
     F_i = U'(e_i c_i' + c_i e_i')U,    W = U' diag(weight) U,
 
 where ``c_i'`` are the rows of a matrix ``C`` and ``U`` is orthonormal (or the identity). With ``C = A - (b/2) D`` the
 sum is ``Omega A + A' Omega - b Omega D``, restricted. Each ``F_i`` has rank 2, so that the Schur complement of the
-Newton system is a few matrix products,
+Newton system takes a few products with ``C``, nearly free where ``C`` is sparse,
 
     M = B + B' + (C X C') o G + X o (C G C'),    B = (C X) o (C G)',    G = U S^-1 U',
 
-instead of the dense block of order ``n^2/2`` that a general solver factors. Predictor and corrector of Mehrotra in the
-direction of Helmberg, Kojima and Monteiro.
+instead of the dense block of order ``n^2/2`` that a general solver factors. An iteration is left with three dense
+products, three Cholesky factors and an inverse of ``n`` rows. Predictor and corrector of Mehrotra in the direction of
+Helmberg, Kojima and Monteiro; step lengths by Lanczos' method.
 
 References
 ----------
 Helmberg, Rendl, Vanderbei, Wolkowicz, An interior-point method for semidefinite programming, SIAM J. Optim. 6 (1996).
+Toh, A note on the calculation of step-lengths in interior-point methods for semidefinite programming, Comput. Optim.
+Appl. 21 (2002).
 """
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
+from scipy.linalg import blas, eigh_tridiagonal, lapack
 
 from lmi.errors import NoCertificate
 
 #: Share of the way to the boundary that a step goes.
-_STEP = 0.98
+_STEP = 0.95
 _MOST_ITERATIONS = 60
+#: Gaps are relative to the optimum or to this, if that is larger; the entries of ``C`` should be about 1.
+_SMALL = 1e-3
+#: Below this relative gap, :data:`_PATIENCE` iterations that do not quarter it are the end: rounding has taken over.
+_NEAR, _PATIENCE = 1e-7, 2
+#: Up to this share of nonzeros ``C`` is kept sparse.
+_SPARSE_SHARE = 0.05
+#: Above this many rows Lanczos' method gives step lengths, to this relative accuracy, in so many steps at most.
+_LANCZOS_ROWS, _LANCZOS_ACCURACY, _LANCZOS_STEPS = 100, 0.02, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +58,11 @@ class Solution:
     ----------
     omega : (n,) array
     t : float
+        ``sum_i omega_i F_i - t W`` has a Cholesky factor in floating point.
     X : (r, r) array
-        Dual matrix: ``<X, W> = 1`` and ``<X, F_i> + z_i = value / n`` with ``z >= 0``, up to the tolerance.
+        Dual matrix, positive semidefinite up to rounding: ``<X, W> = 1``.
     value : float
-        Dual objective; ``t <= value`` up to the tolerance.
+        What ``X`` proves up to rounding, however inexact it is: no admissible ``omega`` has a larger ``t``.
     iterations : int
     """
 
@@ -56,28 +74,32 @@ class Solution:
 
 
 def maximise_margin(
-    C: np.ndarray,
+    C: Any,
     weight: np.ndarray,
     basis: np.ndarray | None = None,
     tolerance: float = 1e-9,
     scale: np.ndarray | None = None,
     max_condition: float | None = None,
+    least: float | None = None,
 ) -> Solution:
     """Solve the program of the module.
 
     Parameters
     ----------
-    C : (n, n) array
+    C : (n, n) array or sparse matrix
+        In units in which its entries are about 1.
     weight : (n,) array
         Positive.
     basis : (n, r) array, optional
         Orthonormal columns ``U``.
     tolerance : float
-        Relative gap and residual at which to stop.
+        Relative gap at which to stop.
     scale : (n,) array, optional
         Of the condition: positive, ``max(scale) <= max_condition min(scale)``.
     max_condition : float, optional
         ``c``, above 1.
+    least : float, optional
+        ``low`` of the box, below 1; without it and without a condition the simplex is searched.
 
     Returns
     -------
@@ -91,205 +113,373 @@ def maximise_margin(
     Examples
     --------
     >>> found = maximise_margin(np.array([[2.0, -1.0], [-1.0, 2.0]]), np.ones(2))
-    >>> round(found.t, 7), found.omega.round(6)
+    >>> round(found.t, 7), found.omega.round(3)
     (2.0, array([1., 1.]))
+    >>> found = maximise_margin(np.array([[2.0, -1.0], [0.0, 4.0]]), np.ones(2), least=0.0)
+    >>> round(found.t, 7), found.omega.round(6), found.value - found.t < 1e-8
+    (3.763932, array([1., 1.]), True)
     """
     with np.errstate(all="ignore"):
-        problem = _Problem(np.asarray(C, dtype=float), np.asarray(weight, dtype=float), basis)
-        n = len(problem.C)
-        if max_condition is None or scale is None:
-            rows, start = np.eye(n, n + 1), np.ones(n)
-            extra = np.zeros(0)
+        problem = _Problem(C, np.asarray(weight, dtype=float), basis)
+        n = len(problem.weight)
+        if least is not None:
+            weights = _box(n, least)
+        elif max_condition is None or scale is None:
+            weights = _simplex(n)
         else:
-            rows = np.block(
-                [
-                    [np.diag(scale), np.zeros((n, 1)), -np.ones((n, 1))],
-                    [-np.diag(scale), np.zeros((n, 1)), np.full((n, 1), max_condition)],
-                ]
-            )
-            # Strictly inside: the exponents are drawn in by a tenth, and low lies between.
-            relative = scale / scale.max()
-            start = relative**-0.1
-            extra = np.array([max_condition**-0.95 * scale.max()]) * n / start.sum()
-            start = start * n / start.sum()
+            weights = _cone(scale, max_condition)
         try:
-            return _iterate(problem, rows, start, extra, tolerance)
+            return _iterate(problem, weights, tolerance)
         except (ZeroDivisionError, OverflowError, ValueError, np.linalg.LinAlgError):
             raise NoCertificate("the entries lie too far apart for floating point") from None
 
 
+# ---------------------------------------------------------------------- what omega may be
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """A set of admissible ``omega``: slacks ``own omega + shared low + offset >= 0``; ``fixed``: their sum is n.
+
+    Each kind of inequality is a row of ``own``. ``low`` is a variable of its own, the last of ``y``, if ``start``,
+    the first ``y`` without ``t``, has one more entry than there are weights. ``bound(pull)`` is the maximum of
+    ``pull' omega`` over the set.
+    """
+
+    own: np.ndarray
+    shared: np.ndarray
+    offset: np.ndarray
+    fixed: bool
+    start: np.ndarray
+    bound: Callable[[np.ndarray], float]
+
+    def slacks(self, y: np.ndarray, offset: float = 1.0) -> np.ndarray:
+        return self.own * y[: self.own.shape[1]] + self.shared * y[-1] + offset * self.offset
+
+    def adjoint(self, z: np.ndarray, size: int) -> np.ndarray:
+        """Return the derivative of ``<z, slacks(y)>`` by ``y``, of that many entries."""
+        pull = np.zeros(size)
+        pull[: self.own.shape[1]] = (self.own * z).sum(axis=0)
+        pull[-1] += (self.shared * z).sum()
+        return pull
+
+    def add_to(self, K: np.ndarray, ratio: np.ndarray) -> None:
+        """Add the second derivative of ``<ratio, slacks(y)^2> / 2``."""
+        n = self.own.shape[1]
+        K[np.arange(n), np.arange(n)] += (self.own**2 * ratio).sum(axis=0)
+        mixed = (self.own * self.shared * ratio).sum(axis=0)
+        K[:n, -1] += mixed
+        K[-1, :n] += mixed
+        K[-1, -1] += (self.shared**2 * ratio).sum()
+
+
+def _box(n: int, low: float) -> _Weights:
+    own, none, offset = np.repeat([[1.0], [-1.0]], n, axis=1), np.zeros((2, 1)), np.array([[-low], [1.0]])
+
+    def bound(pull: np.ndarray) -> float:
+        return float(np.where(pull > 0, pull, low * pull).sum())
+
+    return _Weights(own, none, offset, False, np.full(n, (1 + low) / 2), bound)
+
+
+def _simplex(n: int) -> _Weights:
+    none = np.zeros((1, 1))
+    return _Weights(np.ones((1, n)), none, none, True, np.ones(n), lambda pull: n * float(pull.max()))
+
+
+def _cone(scale: np.ndarray, c: float) -> _Weights:
+    # Strictly inside: the exponents are drawn in by a tenth, and low lies between.
+    start = np.append((scale / scale.max()) ** -0.1, c**-0.95 * scale.max())
+    start *= len(scale) / start[:-1].sum()
+
+    def bound(pull: np.ndarray) -> float:
+        """Dinkelbach's method: the weights that gain most on a mean have the next, larger mean."""
+        mean = -np.inf
+        while True:
+            omega = np.where(pull > mean, c, 1.0) / scale
+            last, mean = mean, float(pull @ omega / omega.sum())
+            if not mean > last:
+                return len(scale) * last
+
+    return _Weights(np.array([scale, -scale]), np.array([[-1.0], [c]]), np.zeros((2, 1)), True, start, bound)
+
+
+# ---------------------------------------------------------------------- the constraint matrices
+
+
 class _Problem:
-    """The constraint matrices, by their products."""
+    """The constraint matrices, by their products. ``X``, ``G`` and steps of ``X`` are kept in n rows: ``U X U'``."""
 
-    def __init__(self, C: np.ndarray, weight: np.ndarray, U: np.ndarray | None):
-        self.C, self.weight, self._U = C, weight, U
+    def __init__(self, C: Any, weight: np.ndarray, U: np.ndarray | None):
+        entries = sparse.coo_array(C, dtype=float)
+        n = len(weight)
+        self.C: Any = sparse.csr_array(entries) if entries.nnz <= _SPARSE_SHARE * n * n else entries.toarray()
+        self.weight, self._U = weight, U
+        self._rows, self._columns, self._data = entries.row, entries.col, entries.data
 
-    def restrict(self, form: np.ndarray) -> np.ndarray:
-        form = (form + form.T) / 2
-        return form if self._U is None else self._U.T @ form @ self._U
+    def combine(self, y: np.ndarray) -> Any:
+        """Return ``sum_i omega_i F_i - t W`` in n rows, not yet restricted; sparse if ``C`` is."""
+        n = len(self.weight)
+        if isinstance(self.C, np.ndarray):
+            product = y[:n, None] * self.C
+            return product + product.T - np.diag(y[n] * self.weight)
+        product = sparse.diags_array(y[:n]) @ self.C
+        return sparse.csr_array(product + product.T - sparse.diags_array(y[n] * self.weight))
+
+    def restrict(self, form: Any) -> Any:
+        return form if self._U is None else self._U.T @ (form @ self._U)
 
     def lift(self, form: np.ndarray) -> np.ndarray:
         return form if self._U is None else self._U @ form @ self._U.T
 
-    def combine(self, omega: np.ndarray, t: float) -> np.ndarray:
-        """Return ``sum_i omega_i F_i - t W``."""
-        product = omega[:, None] * self.C
-        return self.restrict(product + product.T - t * np.diag(self.weight))
-
     def inner(self, form: np.ndarray) -> np.ndarray:
-        """Return ``<F_i, form>`` for every i and ``-<W, form>``."""
-        lifted = self.lift(form)
-        return np.append(2 * np.einsum("ij,ji->i", self.C, lifted), -self.weight @ np.diag(lifted))
+        """Return ``<F_i, form>`` for every i and ``-<W, form>``; ``form`` need not be symmetric."""
+        i, j = self._rows, self._columns
+        pull = np.bincount(i, self._data * (form[i, j] + form[j, i]), len(self.weight))
+        return np.append(pull, -self.weight @ np.diag(form))
 
-    def schur(self, X: np.ndarray, G: np.ndarray) -> np.ndarray:
-        """Return ``<F_i, X F_j G>`` for all pairs, ``-W`` the last; see the module."""
-        C, weight, Xl, Gl = self.C, self.weight, self.lift(X), self.lift(G)
-        n = len(C)
-        CX, CG = C @ Xl, C @ Gl
-        B = CX * CG.T
-        XWG = Xl * weight @ Gl
-        M = np.zeros((n + 1, n + 1))
-        M[:n, :n] = B + B.T + (CX @ C.T) * Gl + Xl * (CG @ C.T)
-        M[:n, n] = M[n, :n] = -np.einsum("ij,ji->i", C, XWG + XWG.T)
-        M[n, n] = weight @ (Xl * Gl) @ weight
+    def schur(self, X: np.ndarray, G: np.ndarray, size: int) -> np.ndarray:
+        """Return ``<F_i, X F_j G>`` for all pairs, ``-W`` the last, in the corner of a matrix of zeros."""
+        C, weight, n = self.C, self.weight, len(self.weight)
+        CX, CG = C @ X, C @ G
+        XC, GC = np.ascontiguousarray(CX.T), np.ascontiguousarray(CG.T)
+        M = np.zeros((size, size))
+        M[:n, :n] = CX * GC + CG * XC + (C @ XC) * G + (C @ GC) * X
+        M[:n, n] = M[n, :n] = -np.einsum("ij,ij,j->i", CX, G, weight) - np.einsum("ij,ij,j->i", CG, X, weight)
+        M[n, n] = weight @ (X * G) @ weight
         return M
 
 
-def _iterate(problem: _Problem, rows: np.ndarray, omega: np.ndarray, extra: np.ndarray, tolerance: float) -> Solution:
-    """Iterate on ``y = (omega, t, extra)`` with ``rows y >= 0`` and multipliers ``z`` of these inequalities."""
-    n = len(omega)
-    size = n + 1 + len(extra)
-    W, start = problem.combine(np.zeros(n), -1.0), problem.combine(omega, 0.0)
-    t = float(np.linalg.eigvalsh(start)[0])
-    t = min(t / float(x) for x in np.linalg.eigvalsh(W)[[0, -1]])
-    t -= 0.1 * abs(t) + 0.1 * float(np.abs(start).max())
-    y = np.concatenate([omega, [t], extra])
-    X = np.eye(len(W)) / float(np.trace(W))
-    pull = problem.inner(X)
-    z = np.full(len(rows), float(np.abs(pull[:n]).max()) or 1.0) / np.maximum(np.abs(rows).max(axis=1), 1e-300)
-    equality, gain = np.append(np.ones(n), np.zeros(size - n)), np.zeros(size)
-    gain[n] = 1.0
-    best: Solution | None = None
-    for iteration in range(1, _MOST_ITERATIONS + 1):
-        S, s = problem.combine(y[:n], float(y[n])), rows @ y
-        try:
-            factor, own = np.linalg.cholesky(S), np.linalg.cholesky(X)
-        except np.linalg.LinAlgError:
-            break
-        half = np.linalg.inv(factor)
-        G = half.T @ half
-        pull = np.append(problem.inner(X), np.zeros(len(extra)))
-        level = (pull + rows.T @ z + gain)[:n]
-        value = float(level.mean()) * n
-        mu = (float(np.tensordot(X, S)) + float(z @ s)) / (len(S) + len(s))
-        best = Solution(y[:n].copy(), float(y[n]), X, value, iteration)
-        scale = max(abs(y[n]), abs(value), 1e-12)
-        if mu * (len(S) + len(s)) <= tolerance * 1e-3 * scale:
-            break
-        K = np.zeros((size + 1, size + 1))
-        K[: n + 1, : n + 1] = problem.schur(X, G)
-        K[:size, :size] += rows.T @ ((z / s)[:, None] * rows)
-        K[:size, size] = K[size, :size] = equality
-        # Rows and columns to unit size: the weights of the blocks lie far apart near the end.
-        unit = 1 / np.sqrt(np.maximum(np.abs(np.diag(K)), 1e-300))
-        unit[size] = 1 / max(float(np.abs(K[size, :size] * unit[:size]).max()), 1e-300)
-        try:
-            system = _Factored(unit[:, None] * K * unit)
-        except np.linalg.LinAlgError:
-            break
-        newton = _Newton(problem, rows, X, G, S, y, z, s, system, unit, gain, equality)
-        predicted = newton.step(0.0)
-        primal = min(_reach(own, predicted.X), _reach_plain(z, predicted.z), 1.0)
-        dual = min(_reach(factor, predicted.S), _reach_plain(s, predicted.s), 1.0)
-        after = float(np.tensordot(X + primal * predicted.X, S + dual * predicted.S))
-        after += float((z + primal * predicted.z) @ (s + dual * predicted.s))
-        sigma = min(max(after / (len(S) + len(s)) / mu, 0.0) ** 3, 1.0)
-        step = newton.step(max(sigma, 1e-6) * mu, predicted)
-        primal = min(1.0, _STEP * min(_reach(own, step.X), _reach_plain(z, step.z)))
-        dual = min(1.0, _STEP * min(_reach(factor, step.S), _reach_plain(s, step.s)))
-        if not (np.isfinite(step.X).all() and np.isfinite(step.y).all()) or max(primal, dual) < 1e-8:
-            break
-        X = X + primal * step.X
-        X, z, y = (X + X.T) / 2, z + primal * step.z, y + dual * step.y
-    if best is None:
+# ---------------------------------------------------------------------- the iteration
+
+
+def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution:
+    """Iterate on ``y = (omega, t, extra)`` with slacks ``s`` of the weights and their multipliers ``z``."""
+    n = len(problem.weight)
+    y = np.insert(weights.start, n, _first_t(problem, weights.start[:n]))
+    X = problem.lift(np.eye(len(problem.restrict(np.eye(n)))))
+    X /= problem.weight @ np.diag(X)
+    z = (float(np.abs(problem.inner(X)[:n]).max()) or 1.0) / np.maximum(np.abs(weights.own), np.abs(weights.shared))
+    own, factor = _cholesky(problem.restrict(X)), _cholesky(_dense(problem.restrict(problem.combine(y))))
+    if own is None or factor is None:
         raise NoCertificate("the interior-point method broke down at its start")
-    return best
+    lower, upper, idle, iteration = y, (np.inf, X), 0, 0
+    while iteration < _MOST_ITERATIONS:
+        iteration += 1
+        before = upper[0] - float(lower[n])
+        pull = problem.inner(X)
+        value = weights.bound(pull[:n] / -pull[n])
+        if value < upper[0]:
+            upper = value, X / -pull[n]
+        if y[n] > lower[n]:
+            lower = y
+        gap, size = upper[0] - float(lower[n]), max(abs(upper[0]), _SMALL)
+        idle = idle + 1 if 4 * gap > before and gap <= _NEAR * size else 0
+        if gap <= tolerance * size or idle >= _PATIENCE:
+            break
+        step = _Newton(problem, weights, X, y, z, own, factor).step()
+        if step is None:
+            break
+        X, y, z, own, factor = step
+    return Solution(lower[:n], float(lower[n]), problem.restrict(upper[1]), upper[0], iteration)
 
 
-@dataclass(frozen=True)
-class _Step:
+def _first_t(problem: _Problem, omega: np.ndarray) -> float:
+    """Return a ``t`` at which the form is well inside the cone."""
+    form = _dense(problem.restrict(problem.combine(np.append(omega, 0.0))))
+    low = float(np.linalg.eigvalsh(form)[0])
+    t = min(low / problem.weight.min(), low / problem.weight.max())
+    return t - 0.1 * abs(t) - 0.1 * float(np.abs(form).max())
+
+
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    """Steps of all variables, ``moved`` is ``dS G``; how far ``X, z`` (primal) and ``S, s`` (dual) stay positive."""
+
     y: np.ndarray
-    S: np.ndarray
     X: np.ndarray
     z: np.ndarray
     s: np.ndarray
+    moved: np.ndarray
+    primal: float
+    dual: float
 
 
-@dataclass(frozen=True)
 class _Newton:
-    """One linearisation, solved for several right-hand sides."""
+    """One linearisation, solved for a predictor and a corrector."""
 
-    problem: _Problem
-    rows: np.ndarray
-    X: np.ndarray
-    G: np.ndarray
-    S: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-    s: np.ndarray
-    system: _Factored
-    unit: np.ndarray
-    gain: np.ndarray
-    equality: np.ndarray
+    def __init__(
+        self,
+        problem: _Problem,
+        weights: _Weights,
+        X: np.ndarray,
+        y: np.ndarray,
+        z: np.ndarray,
+        own: np.ndarray,
+        factor: np.ndarray,
+    ):
+        self.problem, self.weights, self.X, self.y, self.z = problem, weights, X, y, z
+        self.own, self.factor = own, factor
+        self.s = weights.slacks(y)
+        self.G = problem.lift(_inverse(factor))
+        K = problem.schur(X, self.G, len(y))
+        weights.add_to(K, z / self.s)
+        n = len(problem.weight)
+        border = np.append(np.ones(n), np.zeros(len(y) - n)) if weights.fixed else None
+        self.system = _System(K, border, n - float(y[:n].sum()))
 
-    def step(self, target: float, predicted: _Step | None = None) -> _Step:
+    def step(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """Return the next ``X``, ``y``, ``z`` and the factors of ``X`` and ``S``; None where precision ends."""
+        X, y, z, s, problem = self.X, self.y, self.z, self.s, self.problem
+        order = len(self.factor) + s.size
+        mu = (self._pair(X, y) + float(np.vdot(z, s))) / order
+        first = self._direction(0.0, None)
+        if first is None:
+            return None
+        primal, dual = min(first.primal, 1.0), min(first.dual, 1.0)
+        after = self._pair(X + primal * first.X, y + dual * first.y)
+        after += float(np.vdot(z + primal * first.z, s + dual * first.s))
+        sigma = min(max(after / (order * mu), 1e-3) ** 2, 1.0)
+        last = self._direction(sigma * mu, first)
+        if last is None or not np.isfinite(last.X).all() or max(last.primal, last.dual) < 1e-8:
+            return None
+        primal, dual = min(1.0, _STEP * last.primal), min(1.0, _STEP * last.dual)
+        # Lanczos' method can overestimate a step, and all ends at the boundary: shorter until there are factors.
+        for _ in range(20):
+            own = _cholesky(problem.restrict(X + primal * last.X))
+            factor = _cholesky(_dense(problem.restrict(problem.combine(y + dual * last.y))))
+            if own is not None and factor is not None:
+                return X + primal * last.X, y + dual * last.y, z + primal * last.z, own, factor
+            primal, dual = (0.8 * primal if own is None else primal), (0.8 * dual if factor is None else dual)
+        return None
+
+    def _pair(self, X: np.ndarray, y: np.ndarray) -> float:
+        """Return ``<X, sum_i omega_i F_i - t W>``."""
+        pull = self.problem.inner(X)
+        return float(pull @ y[: len(pull)])
+
+    def _direction(self, target: float, predicted: _Direction | None) -> _Direction | None:
         """Aim at ``X S = target I``, ``z s = target``, with the second-order terms of a predicted step."""
-        n, size = len(self.problem.C), len(self.y)
-        centre, plain = target * self.G, target / self.s
+        problem, X, z, s = self.problem, self.X, self.z, self.s
+        centre, plain = target * self.G, target / s
+        second: Any = 0.0
         if predicted is not None:
-            second = predicted.X @ predicted.S @ self.G
-            centre = centre - (second + second.T) / 2
-            plain = plain - predicted.z * predicted.s / self.s
-        pull = np.append(self.problem.inner(centre), np.zeros(size - n - 1))
-        rhs = np.append(pull + self.rows.T @ plain + self.gain, n - self.equality @ self.y)
-        dy = (self.unit * self.system.solve(self.unit * rhs))[:size]
-        dS, ds = self.problem.combine(dy[:n], float(dy[n])), self.rows @ dy
-        product = self.X @ dS @ self.G
-        dX = centre - self.X - (product + product.T) / 2
-        return _Step(dy, dS, dX, plain - self.z - self.z * ds / self.s, ds)
+            second = predicted.X @ predicted.moved
+            plain = plain - predicted.z * predicted.s / s
+        pull = problem.inner(centre - second)
+        rhs = self.weights.adjoint(plain, len(self.y))
+        rhs[: len(pull)] += pull
+        rhs[len(pull) - 1] += 1.0
+        dy = self.system.solve(rhs)
+        if dy is None or not np.isfinite(dy).all():
+            return None
+        dS, ds = problem.combine(dy), self.weights.slacks(dy, 0.0)
+        moved = dS @ self.G
+        product = X @ moved + second
+        dX = centre - X - (product + product.T) / 2
+        dz = plain - z - z * ds / s
+        primal = min(_reach(self.own, problem.restrict(dX)), _reach_plain(z, dz))
+        dual = min(_reach(self.factor, problem.restrict(dS)), _reach_plain(s, ds))
+        return _Direction(dy, dX, dz, ds, moved, primal, dual)
 
 
-class _Factored:
-    """An indefinite bordered system, factored once; one step of iterative refinement."""
+class _System:
+    """A positive definite system, factored once, with an optional condition ``border' dy = defect``.
 
-    def __init__(self, K: np.ndarray):
-        from scipy.linalg import lu_factor
+    Rows and columns are scaled to a unit diagonal: the weights of the blocks lie far apart near the end.
+    """
 
-        if not np.isfinite(K).all():
-            raise np.linalg.LinAlgError
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a singular system ends the iteration, which needs no word
-            self._K, self._factor = K, lu_factor(K, check_finite=False)
+    def __init__(self, K: np.ndarray, border: np.ndarray | None, defect: float):
+        self._unit = 1 / np.sqrt(np.maximum(np.diag(K), 1e-300))
+        K *= self._unit
+        K *= self._unit[:, None]
+        self._K, self._plain = K, _solver(K)
+        self._border, self._defect = (None if border is None else self._unit * border), defect
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        from scipy.linalg import lu_solve
+    def solve(self, rhs: np.ndarray) -> np.ndarray | None:
+        """Solve with two steps of iterative refinement; None if the system is singular."""
+        if self._plain is None:
+            return None
+        rhs = self._unit * rhs
+        x, multiplier = np.zeros(len(rhs)), 0.0
+        border = np.zeros(len(rhs)) if self._border is None else self._border
+        answer = self._plain(border)
+        for _ in range(3):
+            x = x + self._plain(rhs - self._K @ x - multiplier * border)
+            if self._border is not None:
+                more = float(border @ x - self._defect) / float(border @ answer)
+                x, multiplier = x - more * answer, multiplier + more
+        return self._unit * x
 
-        x = lu_solve(self._factor, rhs, check_finite=False)
-        return x + lu_solve(self._factor, rhs - self._K @ x, check_finite=False)
+
+# ---------------------------------------------------------------------- linear algebra
 
 
-def _reach(factor: np.ndarray, step: np.ndarray) -> float:
+def _dense(form: Any) -> np.ndarray:
+    return form.toarray() if sparse.issparse(form) else form
+
+
+def _cholesky(S: np.ndarray) -> np.ndarray | None:
+    """Return the lower factor, in Fortran's order; None if there is none."""
+    factor, info = lapack.dpotrf(S.T, lower=1, clean=1)
+    return factor if info == 0 and np.isfinite(np.diag(factor)).all() else None
+
+
+def _solver(K: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return what solves with ``K``: Cholesky's factor, or pivots where rounding has cost it its definiteness."""
+    factor = _cholesky(K)
+    if factor is not None:
+        return lambda rhs: lapack.dpotrs(factor, rhs, lower=1)[0]
+    lu, pivots, singular = lapack.dgetrf(K)
+    if singular or not np.isfinite(lu).all():
+        return None
+    return lambda rhs: lapack.dgetrs(lu, pivots, rhs)[0]
+
+
+def _inverse(factor: np.ndarray) -> np.ndarray:
+    half, _ = lapack.dpotri(factor, lower=1)
+    half[np.diag_indices_from(half)] /= 2
+    return half + half.T
+
+
+def _reach(factor: np.ndarray, step: Any) -> float:
     """Return how far ``L L' + alpha step`` stays positive semidefinite, at most 1 / _STEP."""
-    from scipy.linalg import solve_triangular
+    if len(factor) > _LANCZOS_ROWS:
 
-    half = solve_triangular(factor, step, lower=True, check_finite=False)
-    whole = solve_triangular(factor, half.T, lower=True, check_finite=False)
-    if not np.isfinite(whole).all():
-        return 0.0
-    low = float(np.linalg.eigvalsh((whole + whole.T) / 2)[0])
+        def apply(v: np.ndarray) -> np.ndarray:
+            return blas.dtrsv(factor, step @ blas.dtrsv(factor, v, lower=1, trans=1), lower=1)
+
+        low = _least_eigenvalue(apply, len(factor))
+    else:
+        half = blas.dtrsm(1.0, factor, _dense(step), lower=1)
+        whole = blas.dtrsm(1.0, factor, half.T, lower=1)
+        low = float(np.linalg.eigvalsh((whole + whole.T) / 2)[0]) if np.isfinite(whole).all() else -np.inf
     return 1 / _STEP if low >= -_STEP else -1 / low
 
 
 def _reach_plain(value: np.ndarray, step: np.ndarray) -> float:
     low = float((step / value).min())
     return 1 / _STEP if low >= -_STEP else -1 / low
+
+
+def _least_eigenvalue(apply: Callable[[np.ndarray], np.ndarray], n: int) -> float:
+    """Estimate the smallest eigenvalue of a symmetric operator from below, by Lanczos' method."""
+    Q = np.zeros((_LANCZOS_STEPS + 1, n))
+    Q[0] = np.random.default_rng(n).standard_normal(n)
+    Q[0] /= np.linalg.norm(Q[0])
+    diagonal, off = np.zeros(_LANCZOS_STEPS), np.zeros(_LANCZOS_STEPS)
+    for k in range(_LANCZOS_STEPS):
+        w = apply(Q[k])
+        if not np.isfinite(w).all():
+            return -np.inf
+        diagonal[k] = Q[k] @ w
+        for _ in range(2):
+            w = w - (Q[: k + 1] @ w) @ Q[: k + 1]
+        off[k] = np.linalg.norm(w)
+        if k % 4 == 3:
+            values, vectors = eigh_tridiagonal(diagonal[: k + 1], off[:k], select="i", select_range=(0, 0))
+            error = off[k] * abs(float(vectors[-1, 0]))
+            if error <= _LANCZOS_ACCURACY * max(abs(float(values[0])), 1.0):
+                break
+        Q[k + 1] = w / off[k]
+    return float(values[0]) - error

@@ -115,7 +115,9 @@ class Member:
     @classmethod
     def of_sharp(cls, member: SharpMember, **more: Any) -> Member:
         """Build the member of a sharper Lyapunov function, rounded to the safe side."""
-        if member.diagonal is not None:
+        if member.dominance is not None:
+            weights = member.dominance.weights
+        elif member.diagonal is not None:
             weights = np.array([float(w) for w in member.diagonal])
         else:
             weights = np.array([[float(x) for x in row] for row in member.matrix or ()])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import html
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -23,14 +23,14 @@ from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
-from ptcc_certify.document import certificate_document, enclosed_witness, outcome_witness, with_side_files
+from ptcc_certify.document import Writer, certificate_document, outcome_witness
 from ptcc_certify.enclosed import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import write_atomically
-from ptcc_certify.lemmas import EXACT_NODES, laplacian_spectrum
+from ptcc_certify.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
@@ -45,12 +45,19 @@ from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theor
 from ptcc_certify.trajectory import Trajectory
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
+#: What :func:`certify` does, in this order.
+STEPS = (
+    "simulation",
+    "the paper's certificate",
+    "sharper certificates",
+    "limit of rates",
+    "outcome",
+    "independent check",
+)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: A simulated end state is settled when it is this near to the outcome, relative to the start.
 SETTLED = 1e-6
-#: Largest strong component whose dense spectrum is computed.
-SPECTRUM_NODES = 1500
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
@@ -178,7 +185,7 @@ class Certificate:
         if self.influence.exact:
             found.append(Obligation("outcome", "graph", witness=outcome_witness(self.structure, self.influence)))
         elif self.enclosed is not None:
-            found.append(Obligation("outcome", "graph", witness=enclosed_witness(self.graph, self.enclosed)))
+            found.append(Obligation("outcome", "graph", witness=self.enclosed))
         found += self.proof.obligations if self.proof.rate is not None else ()
         sharp = iter(self.sharpening.members)
         for k, bound in enumerate(self.envelope.members):
@@ -186,7 +193,7 @@ class Certificate:
             if bound.kind != "paper":
                 member = next(sharp)
                 if member.dominance is not None:
-                    found.append(Obligation("dominance", of, {"b": member.rate}, member.dominance.witness))
+                    found.append(Obligation("dominance", of, {"b": member.rate}, member.dominance))
                 else:
                     found.append(Obligation("rate", of, {"b": member.rate}))
                 if member.matrix is not None:
@@ -208,13 +215,16 @@ class Certificate:
         """What the independent check says of the certificate as it would be written; None if nothing was proved."""
         proved = self.constant or self.rate is not None
         ended = self.influence.exact or self.enclosed is not None
-        return check(self._document(CERTIFIED)) if proved and ended else None
+        if not (proved and ended):
+            return None
+        document, written = self._document(CERTIFIED)
+        return check(document, files=written.files)
 
-    def _document(self, verdict: str) -> dict[str, Any]:
-        """Return the JSON of a verdict, made once."""
+    def _document(self, verdict: str) -> tuple[dict[str, Any], Writer]:
+        """Return the JSON of a verdict and its side files, made once."""
         kept = self.__dict__.setdefault("_documents", {})
         if verdict not in kept:
-            kept[verdict] = certificate_document(self, verdict)
+            kept[verdict] = certificate_document(self, verdict, files=True)
         return kept[verdict]
 
     @property
@@ -333,8 +343,9 @@ class Certificate:
         return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining) / 2)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``."""
-        return dict(self._document(self.verdict))
+        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``, without side files."""
+        document, written = self._document(self.verdict)
+        return dict(document if not written.files else certificate_document(self, self.verdict)[0])
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
@@ -343,11 +354,11 @@ class Certificate:
     def save(self, path: str | Path) -> None:
         """Write the certificate to ``path``; the file appears whole or not at all.
 
-        An edge list of more than 100,000 edges goes to ``.npy`` files beside it, which are written first.
+        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
         """
-        document = self.to_dict()
-        for file, content in with_side_files(document, self.graph, Path(path)).items():
-            write_atomically(file, content)
+        document, written = self._document(self.verdict)
+        for name, content in written.files.items():
+            write_atomically(Path(path).parent / name, content)
         # What UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape.
         write_atomically(path, _json(document).encode("utf-8", "backslashreplace"))
 
@@ -371,6 +382,7 @@ def certify(
     simulation: bool = True,
     method: str = "best",
     at: Any = None,
+    progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
 
@@ -392,6 +404,8 @@ def certify(
         Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.sharpen`.
     at : number, optional
         An instant before the deadline at which the bound should be smallest.
+    progress : callable, optional
+        Is told each of :data:`STEPS` as it begins.
 
     Returns
     -------
@@ -440,23 +454,28 @@ ReachingTime(0, 1 before T_r)))
     trajectory = comparison = None
     notes: list[str] = []
     if simulation and start is not None:
+        progress(STEPS[0])
         more = {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance} if sliding else {}
         try:
             trajectory = simulate(graph, protocol, [float(x) for x in start], **more)
         except SimulationError as error:
             notes.append(f"simulation: {error}")
+    progress(STEPS[1])
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical = _search_and_prove(structure, theorem, notes)
+    progress(STEPS[2])
     sharpening = _sharpen(structure, protocol, method, instant, notes)
     if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
         notes.insert(0, _precision_note(graph))
+    progress(STEPS[3])
     limit = prove_rate_limit(structure)
+    progress(STEPS[4])
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
-    result = None if start is None else outcome(structure, [x - s for x, s in zip(start, gone, strict=True)])
+    moved = None if start is None else [x - s if s else x for x, s in zip(start, gone, strict=True)]
+    result = None if moved is None else outcome(structure, moved, matrix=matrix)
     enclosed = None
     if not matrix.exact:
-        moved = None if start is None else [x - s for x, s in zip(start, gone, strict=True)]
         try:
             enclosed = enclose(structure, matrix, moved)
         except NotEnclosedError as error:
@@ -489,6 +508,7 @@ ReachingTime(0, 1 before T_r)))
     )
     if trajectory is not None and (certificate.envelope.members or sliding):
         certificate = replace(certificate, comparison=certificate.envelope.compare(trajectory))
+    progress(STEPS[5])
     report = certificate.checked
     if report is not None and not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
@@ -602,8 +622,8 @@ def _precision_note(graph: SignedDigraph) -> str:
 
 
 def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], notes: list[str]) -> float | None:
-    if int(np.bincount(structure.strong_component).max()) > SPECTRUM_NODES:
-        notes.append(f"the spectral rate is not computed for strong components above {SPECTRUM_NODES} nodes")
+    if int(np.bincount(structure.strong_component).max()) > FACTOR_NODES:
+        notes.append(f"the spectral rate is not computed for strong components above {FACTOR_NODES} nodes")
         return None
     try:
         rate = laplacian_spectrum(structure).spectral_rate

@@ -11,7 +11,8 @@ import io
 import json
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 OK, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 2, 3, 4
 VIOLATED = REJECTED = 1
-#: From this size on the search may take more than a second, which a terminal is told.
-SLOW_NODES = 40
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
@@ -80,6 +79,21 @@ _SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": 
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
+@contextmanager
+def _progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
+    """Show on a terminal which of some steps is at work; the line goes when they are done."""
+    if not sys.stderr.isatty():
+        yield lambda step: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=len(steps))
+        yield lambda step: bar.update(task, completed=steps.index(step), description=step)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ptcc-certify", prog_name="ptcc")
 def cli() -> None:
@@ -122,6 +136,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     help="Lyapunov functions searched beside the paper's.",
 )
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
+@click.option("--no-simulation", is_flag=True, help="Do not compare with a CVODES run.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @_json_option
 def certify(
@@ -133,11 +148,13 @@ def certify(
     min_rate: str | None,
     method: str,
     at: str | None,
+    no_simulation: bool,
     output: str | None,
     as_json: bool,
     **options: Any,
 ) -> int:
     """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
+    from ptcc_certify.certificate import STEPS
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.summary import certificate_lines
 
@@ -146,10 +163,18 @@ def certify(
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
     start = _start(x0, seed, signed)
-    if signed.n_nodes > SLOW_NODES and sys.stderr.isatty():
-        click.echo(f"searching a Lyapunov matrix of {signed.n_nodes} rows ...", err=True)
     sliding = _sliding_options(protocol, options, seed, signed)
-    certificate = run(signed, protocol, start, method=method, at=instant, **sliding)
+    with _progress(STEPS) as begin:
+        certificate = run(
+            signed,
+            protocol,
+            start,
+            method=method,
+            at=instant,
+            simulation=not no_simulation,
+            progress=begin,
+            **sliding,
+        )
     if output:
         certificate.save(output)
     if as_json:
@@ -176,7 +201,9 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
     from ptcc_certify.checker import check as run
 
     signed = None if graph is None else _read(graph, **read)
-    report = run(certificate, stdlib=stdlib)
+    with _progress(("independent check",)) as begin:
+        begin("independent check")
+        report = run(certificate, stdlib=stdlib)
     if signed is not None and report.accepted and report.sha256 != signed.sha256:
         reason = f"the certificate is about another graph than {graph}"
         report = replace(report, accepted=False, steps=(), rejected="graph", reason=reason)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +24,11 @@ if TYPE_CHECKING:
 # Beyond this many agents the Newton steps are solved by GMRES: a sparse factor of a random graph fills up
 # (N = 1,000: 3.4 s against 0.05 s), whereas below it a factor copes with weights over many decades.
 _DIRECT_UP_TO = 200
+# With CasADi's 10, GMRES fails where in-weights span three decades, and the steps shrink (Bitcoin OTC: 30 s, not 3 s).
+_KRYLOV = 30
 _MAX_STEPS = 5000
+# No tolerance is made finer than this on the way to the state at T.
+_FINEST = 1e-13
 # A disturbance may be fast: so many steps between two instants of the reaching phase.
 _MAX_SLIDING_STEPS = 500_000
 # The state at T is given up beyond this s max(D): the roundings of float64 weights act there like slow modes.
@@ -41,7 +48,7 @@ _CAUSES = {
 class _Motion:
     """What every motion shares: CVODES with its options, and its failures with their causes."""
 
-    def __init__(self, graph: SignedDigraph, rtol: float, atol: float):
+    def __init__(self, graph: SignedDigraph, columns: int, rtol: float, atol: float):
         self.laplacian = graph.laplacian()
         self.in_weight = graph.in_weight()
         self.stats = {"steps": 0, "rhs": 0}
@@ -54,7 +61,10 @@ class _Motion:
             "show_eval_warnings": False,
         }
         if graph.n_nodes > _DIRECT_UP_TO:
-            self._options |= {"newton_scheme": "gmres", "use_preconditioner": False}
+            self._options |= {"newton_scheme": "gmres", "use_preconditioner": False, "max_krylov": _KRYLOV}
+            self._product = _product_without_pattern(self.laplacian, columns)
+        else:
+            self._product = _product(self.laplacian, columns)
 
     def imbalance(self, states: np.ndarray) -> float:
         """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
@@ -69,7 +79,8 @@ class _Motion:
                 f"the integrator was not started: {_TOO_LARGE} (gain x weight x span = {stiffness:.1e})"
             )
         try:
-            reached = np.array(integrator(x0=state, p=parameters)["xf"])
+            with _interruptible():
+                reached = np.array(integrator(x0=state, p=parameters)["xf"])
         except RuntimeError as error:
             flag = re.search(r"CV_\w+", str(error))
             name = flag[0] if flag else "no CVODES flag"
@@ -79,7 +90,7 @@ class _Motion:
             raise SimulationError(f"the integrator returned numbers that are not finite: {_TOO_LARGE}")
         counts = integrator.stats()
         self.stats["steps"] += counts["nsteps"]
-        self.stats["rhs"] += counts["nfevals"]
+        self.stats["rhs"] += counts["nfevals"] + counts.get("n_call_jtimesF", 0)
         return reached
 
 
@@ -87,7 +98,7 @@ class NominalMotion(_Motion):
     """One start, or several, moved along ``dX/dz = -(a e^(-c z) + b) L X``."""
 
     def __init__(self, graph: SignedDigraph, state: np.ndarray, rtol: float, atol: float):
-        super().__init__(graph, rtol, atol)
+        super().__init__(graph, state.shape[1], rtol, atol)
         self.state = state
         self._leap: Any = None
 
@@ -97,7 +108,7 @@ class NominalMotion(_Motion):
         states = np.empty((later.size + 1, *self.state.shape))
         states[0] = self.state
         if later.size:
-            states[1:] = self._integrate(self._integrator(later), a, b, c, later[-1])
+            states[1:] = self._integrate(self._integrator(later, self._options), a, b, c, later[-1])
             self.state = states[-1]
         return states[np.searchsorted(later, z, side="right")]
 
@@ -112,7 +123,7 @@ class NominalMotion(_Motion):
         while True:
             span = max(tau, 20.0)
             previous = self.state
-            self._leap = self._leap or self._integrator(np.ones(1))
+            self._leap = self._leap or self._integrator(np.ones(1), self._finer())
             try:
                 # One unit of the integrator's clock is the whole span.
                 self.state = self._integrate(self._leap, a * math.exp(-tau) * span, b * span, span, 1.0)[0]
@@ -125,14 +136,25 @@ class NominalMotion(_Motion):
             if residual <= goal or b * tau * largest > _MAX_CLOCK or tau > _MAX_TAU:
                 return residual
 
-    def _integrator(self, z: np.ndarray) -> Any:
+    def _finer(self) -> dict[str, Any]:
+        """Return the options of a run that settles to within the tolerances in every agent of a large graph.
+
+        CVODES bounds the root of the mean square of the errors; that of one agent can be sqrt(N) times as large.
+        """
+        if len(self.state) <= _DIRECT_UP_TO:
+            return self._options
+        given = {name: self._options[name] for name in ("reltol", "abstol")}
+        share = math.sqrt(len(self.state))
+        return self._options | {name: min(tol, max(tol / share, _FINEST)) for name, tol in given.items()}
+
+    def _integrator(self, z: np.ndarray, options: dict[str, Any]) -> Any:
         import casadi as ca
 
         x = ca.MX.sym("x", self.state.size)
         columns = ca.reshape(x, *self.state.shape)
         clock, p = ca.MX.sym("z"), ca.MX.sym("p", 3)
-        ode = -(p[0] * ca.exp(-p[2] * clock) + p[1]) * ca.vec(ca.mtimes(_to_casadi(self.laplacian), columns))
-        return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), self._options)
+        ode = -(p[0] * ca.exp(-p[2] * clock) + p[1]) * ca.vec(self._product(columns))
+        return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
 
     def _integrate(self, integrator: Any, a: float, b: float, c: float, end: float) -> np.ndarray:
         """Return the (instants, N, S) states that the integrator reaches from the present one, the last at ``end``."""
@@ -215,7 +237,7 @@ class SlidingMotion(_Motion):
         disturbance: Callable[[Any, Any, Any], Any],
         layer: float | None = None,
     ):
-        super().__init__(graph, rtol, atol)
+        super().__init__(graph, 1, rtol, atol)
         self._options["max_num_steps"] = _MAX_SLIDING_STEPS
         self.state = state
         self._unit, self._mu1, self._disturbance, self._layer = unit, mu1, disturbance, layer
@@ -236,7 +258,7 @@ class SlidingMotion(_Motion):
         s = sign if self._layer is None else ca.tanh(sigma * (self._unit / self._layer))
         d = self._disturbance(t, p[n:], s)
         ode = ca.vertcat(
-            -phase.nominal(R) * ca.mtimes(_to_casadi(self.laplacian), y + sigma),
+            -phase.nominal(R) * self._product(y + sigma),
             -R / self._unit * (self._mu1 * s - ca.fabs(sign) * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
         )
         problem = {"x": x, "t": clock, "p": p, "ode": ode}
@@ -246,6 +268,94 @@ class SlidingMotion(_Motion):
         reached = self._call(integrator, self.state, [*signs, *linear[0], *linear[1]], stiffness)
         self.state = reached[:, -1].copy()
         return reached
+
+
+def _product(laplacian: sparse.csr_array, columns: int) -> Any:
+    """Return the CasADi function ``X -> L X`` of (N, columns) matrices."""
+    import casadi as ca
+
+    X = ca.MX.sym("X", laplacian.shape[0], columns)
+    return ca.Function("product", [X], [ca.densify(ca.mtimes(_to_casadi(laplacian), X))])
+
+
+def _product_without_pattern(laplacian: sparse.csr_array, columns: int) -> Any:
+    """Return the same function, its dependencies kept from CasADi; it must outlive the integrators that call it.
+
+    CasADi prepares the Jacobian of every right-hand side, which takes long (N = 100,000: 9 s) and which GMRES without
+    a preconditioner never evaluates: it takes the exact derivatives in single directions, products with ``L`` again.
+    So the Jacobian is declared diagonal.
+    """
+    import casadi as ca
+
+    product = _product(laplacian, columns)
+    shape = product.size_in(0)
+
+    class Product(ca.Callback):
+        def __init__(self) -> None:
+            super().__init__()
+            self._buffer, self._evaluate = product.buffer()
+            self.construct("product", {"enable_fd": False})
+
+        def get_sparsity_in(self, _: int) -> Any:
+            return ca.Sparsity.dense(*shape)
+
+        def get_sparsity_out(self, _: int) -> Any:
+            return ca.Sparsity.dense(*shape)
+
+        def has_jac_sparsity(self, *_: int) -> bool:
+            return True
+
+        def get_jac_sparsity(self, *_: int) -> Any:
+            return ca.Sparsity.diag(shape[0] * shape[1])
+
+        def has_eval_buffer(self) -> bool:
+            return True
+
+        def eval_buffer(self, arg: Any, res: Any) -> int:
+            self._buffer.set_arg(0, arg[0])
+            self._buffer.set_res(0, res[0])
+            self._evaluate()
+            return 0
+
+        def has_forward(self, _: int) -> bool:
+            return True
+
+        def get_forward(
+            self, directions: int, name: str, inputs: Sequence[str], outputs: Sequence[str], options: Any
+        ) -> Any:
+            X, Y = ca.MX.sym("X", *shape), ca.MX.sym("Y", ca.Sparsity(*shape))
+            seeds = ca.MX.sym("seeds", shape[0], shape[1] * directions)
+            moved = _product(laplacian, shape[1] * directions)(seeds)
+            return ca.Function(name, [X, Y, seeds], [moved], inputs, outputs, options)
+
+    return Product()
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let what a signal handler raises (KeyboardInterrupt) pass, which CasADi turns into a failure of CVODES."""
+    previous = signal.getsignal(signal.SIGINT)
+    if not callable(previous) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    raised: list[BaseException] = []
+
+    def handler(number: int, frame: Any) -> None:
+        try:
+            previous(number, frame)
+        except BaseException as error:
+            raised.append(error)
+            raise
+
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    except RuntimeError:
+        if raised:
+            raise raised[0] from None
+        raise
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def _to_casadi(matrix: sparse.csr_array) -> Any:

@@ -102,8 +102,10 @@ class Standard:
     """Definiteness by the standard library."""
 
     name = "standard library"
-    #: Largest matrix that is taken.
-    rows = 400
+    #: Largest matrix that is taken, and largest sum of squared column lengths of a sparse factor.
+    rows, products = 400, 300_000_000
+    #: Whether NumPy is used.
+    numpy = False
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is proved positive definite.
@@ -163,7 +165,7 @@ class Flint(Standard):
         self.name = f"python-flint {self.flint.__version__} and the standard library"
         with contextlib.suppress(ImportError):
             self.name = f"python-flint {self.flint.__version__}, NumPy {importlib.import_module('numpy').__version__}"
-            self.rows = 1000
+            self.rows, self.products, self.numpy = 1000, 10_000_000_000, True
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Standard.definite`."""

@@ -6,13 +6,13 @@ import hashlib
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.checker import MANY_COMPONENTS, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, digest
+from ptcc_certify.dominance import DominantMember
 from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
@@ -25,32 +25,100 @@ from ptcc_certify.trajectory import SlidingTrajectory
 if TYPE_CHECKING:
     from ptcc_certify.certificate import Certificate
 
-#: Edge lists above this length go to side files.
-MANY_EDGES = 100_000
+#: Vectors above this length go to side files.
+LONG = 50_000
 #: Decimals of the middle of a ball, and its radius, where an exact number would be too long.
 _DECIMALS, _RADIUS = 120, Fraction(1, 10**60)
 
 Interval = tuple[Fraction, Fraction]
 
 
-def certificate_document(certificate: Certificate, verdict: str) -> dict[str, Any]:
-    """Return the certificate as JSON-ready data."""
+class Writer:
+    """Writes the vectors of a document: in the JSON, or the long ones to side files.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Of the nodes.
+    files : bool
+        Whether vectors of more than ``LONG`` entries go to side files.
+
+    Attributes
+    ----------
+    files : dict of str to bytes
+        Names and contents of the side files, ``.npy`` vectors of 64-bit numbers.
+    """
+
+    def __init__(self, labels: Sequence[str], files: bool = False):
+        self.labels, self._aside = labels, files
+        self.files: dict[str, bytes] = {}
+
+    def aside(self, length: int) -> bool:
+        """Tell whether a vector of this length goes to a side file."""
+        return self._aside and length > LONG
+
+    def file(self, name: str, values: np.ndarray) -> dict[str, Any]:
+        """Put int64 or float64 numbers into a side file; return its name and hash."""
+        kind = "<f8" if values.dtype.kind == "f" else "<i8"
+        head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': ({values.size},), }}".ljust(117) + "\n"
+        content = b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode() + values.astype(kind).tobytes()
+        sha256 = hashlib.sha256(content).hexdigest()
+        file = f"{sha256[:16]}-{name}.npy"
+        self.files[file] = content
+        return {"file": file, "sha256": sha256}
+
+    def vector(self, name: str, values: np.ndarray) -> dict[str, Any]:
+        """Put int64 or float64 numbers into a side file; return what stands for the vector."""
+        return {**self.file(name, values), "count": values.size}
+
+    def nodes(self, nodes: Sequence[int] | np.ndarray) -> Any:
+        """Write node indices as labels, or as a side file of indices."""
+        if self.aside(len(nodes)):
+            return self.vector("nodes", np.asarray(nodes, dtype=np.int64))
+        return [self.labels[v] for v in np.asarray(nodes, dtype=np.int64).tolist()]
+
+    def floats(self, name: str, values: np.ndarray) -> Any:
+        """Write floats as the dyadic numbers that they are."""
+        if self.aside(values.size):
+            return self.vector(name, values)
+        return [x.hex() for x in values.tolist()]
+
+    def integers(self, name: str, values: np.ndarray) -> Any:
+        """Write int64 numbers."""
+        return self.vector(name, values.astype(np.int64)) if self.aside(values.size) else values.tolist()
+
+    def state(self, name: str, state: Sequence[Fraction] | None) -> Any:
+        """Write one number of each agent: by label, or as a side file of integers over a common denominator."""
+        if state is None:
+            return None
+        if self.aside(len(state)):
+            scale = math.lcm(*{x.denominator for x in state})
+            if scale.bit_length() < 63:
+                whole = [x.numerator * (scale // x.denominator) for x in state]
+                if max(map(abs, whole)) < 2**63:
+                    return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
+        return dict(zip(self.labels, map(format_exact, state), strict=True))
+
+
+def certificate_document(certificate: Certificate, verdict: str, files: bool = False) -> tuple[dict[str, Any], Writer]:
+    """Return the certificate as JSON-ready data, and what holds its side files."""
     graph, structure = certificate.graph, certificate.structure
-    claim, outcome = certificate.claim, outcome_section(certificate)
+    out = Writer(graph.labels, files)
+    claim, outcome = certificate.claim, outcome_section(certificate, out)
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": _producer(),
-        "graph": graph_section(graph),
-        "structure": structure_section(structure),
+        "graph": graph_section(graph, out),
+        "structure": structure_section(structure, out),
         "claim": None if claim is None else claim_section(claim),
     }
     if claim is None:
         final = outcome and outcome["final_state"]
-        document["components"] = components_section(structure, certificate.claims, final)
+        document["components"] = components_section(structure, certificate.claims, final, out)
     document |= {
         "protocol": _protocol_section(certificate),
         "paper": _paper_section(certificate),
-        "lyapunov": {"members": _members_section(certificate)},
+        "lyapunov": {"members": _members_section(certificate, out)},
         "rates": {
             "paper": _text(certificate.proof.rate),
             "diagonal": _text(certificate.diagonal_rate),
@@ -58,44 +126,25 @@ def certificate_document(certificate: Certificate, verdict: str) -> dict[str, An
             "limit": _text(None if certificate.limit is None else certificate.limit.value),
         },
         "prefactor": _prefactor_section(certificate),
-        "initial_state": _state_section(graph, certificate.start),
-        "sigma0": _state_section(graph, certificate.sigma0),
+        "initial_state": out.state("start", certificate.start),
+        "sigma0": out.state("sigma", certificate.sigma0),
         "outcome": outcome,
         "reaching_time": _reaching_section(certificate),
         "effort": None,
-        "proof": [obligation_section(o) for o in certificate.obligations],
+        "proof": [obligation_section(o, certificate, out) for o in certificate.obligations],
         "verdict": verdict,
     }
-    return document | {"digest": digest(document), "unverified": _unverified_section(certificate)}
+    return document | {"digest": digest(document), "unverified": _unverified_section(certificate)}, out
 
 
 def structure_document(structure: Structure) -> dict[str, Any]:
     """Return graph, structure and claim as JSON-ready data, in the keys of a certificate."""
-    data = {"graph": graph_section(structure.graph), "structure": structure_section(structure)}
+    out = Writer(structure.graph.labels)
+    data = {"graph": graph_section(structure.graph, out), "structure": structure_section(structure, out)}
     if structure.claim is not None:
         return {**data, "claim": claim_section(structure.claim)}
     claims = [component.claim for component in structure.components]
-    return {**data, "claim": None, "components": components_section(structure, claims, None)}
-
-
-def with_side_files(document: dict[str, Any], graph: SignedDigraph, path: Path) -> dict[Path, bytes]:
-    """Move a long edge list out of a document, to files beside ``path``; return their contents."""
-    table, scale = graph.weight_table()
-    if graph.n_edges <= MANY_EDGES or table is None:
-        return {}
-    files: dict[Path, bytes] = {}
-    edges: dict[str, Any] = {"count": graph.n_edges, "scale": str(scale)}
-    for name, values in (("source", graph.source), ("target", graph.target), ("weight", table)):
-        kind = "<f8" if values.dtype.kind == "f" else "<i8"
-        head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': ({values.size},), }}".ljust(117) + "\n"
-        content = b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode() + values.astype(kind).tobytes()
-        sha256 = hashlib.sha256(content).hexdigest()
-        file = f"{sha256[:16]}-{name}.npy"
-        files[path.parent / file] = content
-        edges[name] = {"file": file, "sha256": sha256}
-    document["graph"] = {**document["graph"], "edges": edges}
-    document["digest"] = digest(document)
-    return files
+    return {**data, "claim": None, "components": components_section(structure, claims, None, out)}
 
 
 # ---------------------------------------------------------------------- numbers
@@ -156,11 +205,6 @@ def _finite(value: float | None) -> float | None:
 # ---------------------------------------------------------------------- outcome
 
 
-def enclosed_witness(graph: SignedDigraph, enclosed: EnclosedOutcome) -> dict[str, Any]:
-    """Return ``u`` by agent."""
-    return {"u": {label: repr(x) for label, x in zip(graph.labels, enclosed.witness, strict=True)}}
-
-
 def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:
     """Return voices and pulls as intervals: of radius 0, but for those of a component that are too long to write."""
     voices = [_balls([Fraction(w) for w in voice]) for voice in matrix.voices]
@@ -200,11 +244,11 @@ def outcome_witness(structure: Structure, matrix: Influence) -> dict[str, Any] |
     return {"u": {label: format_exact(Fraction(float(x))) for label, x in zip(structure.graph.labels, u, strict=True)}}
 
 
-def outcome_section(certificate: Certificate) -> dict[str, Any] | None:
+def outcome_section(certificate: Certificate, out: Writer) -> dict[str, Any] | None:
     """Return the outcome with the influence of every leader, exact or in balls; None if it is floating point."""
     matrix, structure = certificate.influence, certificate.structure
     if not matrix.exact:
-        return None if certificate.enclosed is None else _enclosed_section(certificate, certificate.enclosed)
+        return None if certificate.enclosed is None else _enclosed_section(certificate, certificate.enclosed, out)
     labels = certificate.graph.labels
     voices, pulls = influence_balls(matrix)
     section: dict[str, Any] = {"final_state": None, "degenerate": None}
@@ -238,21 +282,61 @@ def outcome_section(certificate: Certificate) -> dict[str, Any] | None:
     return section
 
 
-def _enclosed_section(certificate: Certificate, enclosed: EnclosedOutcome) -> dict[str, Any]:
+def _enclosed_section(certificate: Certificate, enclosed: EnclosedOutcome, out: Writer) -> dict[str, Any]:
     """Return the outcome of a large graph: voices of leader groups, and the final state in intervals."""
-    labels, final = certificate.graph.labels, None
-    if enclosed.final is not None:
-        final = {
-            label: exact_or_ball(x) if r == 0 else {"mid": decimal_text(x), "radius": decimal_text(r)}
-            for label, (x, r) in zip(labels, enclosed.final, strict=True)
-        }
-    groups = [
-        {"nodes": [labels[v] for v in c.nodes], "voices": [exact_or_ball(Fraction(w)) for w in voice]}
-        for c, voice in zip(certificate.influence.balanced, certificate.influence.voices, strict=True)
-        if len(c.nodes) > 1
-    ]
+    labels = certificate.graph.labels
+    final: dict[str, Any] | None = None
+    if enclosed.middle is not None and enclosed.radius is not None:
+        if out.aside(len(labels)) and enclosed.unit == 1:
+            final = {"mid": out.vector("mid", enclosed.middle), "radius": out.vector("radius", enclosed.radius)}
+        else:
+            unit = enclosed.unit
+            text = repr if unit == 1 else lambda x: format_exact(Fraction(x) * unit)
+            pairs = zip(enclosed.middle.tolist(), enclosed.radius.tolist(), strict=True)
+            final = {
+                label: {"mid": text(x), "radius": text(r)} if r else format_exact(Fraction(x) * unit)
+                for label, (x, r) in zip(labels, pairs, strict=True)
+            }
+            final.update((labels[v], exact_or_ball(x)) for v, x in enclosed.exact.items())
+    groups = []
+    for k, (component, voice) in enumerate(
+        zip(certificate.influence.balanced, certificate.influence.voices, strict=True)
+    ):
+        if k in enclosed.voices:
+            pairs = zip(*(x.tolist() for x in enclosed.voices[k]), strict=True)
+            voices: list[Any] = [{"mid": repr(x), "radius": repr(r)} for x, r in pairs]
+        else:
+            voices = [exact_or_ball(Fraction(w)) for w in voice]
+        if len(component.nodes) > 1:
+            groups.append({"nodes": [labels[v] for v in component.nodes], "voices": voices})
     degenerate = None if enclosed.degenerate is None else list(enclosed.degenerate)
     return {"final_state": final, "degenerate": degenerate, "influence": {"components": groups, "followers": None}}
+
+
+def _dominance_witness(member: DominantMember, out: Writer) -> dict[str, Any]:
+    """Return the vector, and the proof of every leader group."""
+    groups: list[Any] = []
+    first = 0
+    for proof in member.groups:
+        rate = format_exact(proof.rate)
+        if proof.factor is None:
+            groups.append(rate)
+        else:
+            # The factor is that of the group's own weights, of which those of the member are a power of two.
+            times = member.weights[first] / proof.weights[0]
+            factor = {
+                key: out.integers(key, getattr(proof.factor, key))
+                for key in ("order", "indptr", "indices", "data", "exponents")
+            }
+            weights = proof.factor.weights
+            factor |= {
+                "bits": proof.factor.bits,
+                "power": 1 - math.frexp(times)[1],
+                "weights": None if weights is None else out.integers("weights", weights),
+            }
+            groups.append({"rate": rate, "factor": factor})
+        first += proof.weights.size
+    return {"vector": out.floats("vector", member.vector), "groups": groups}
 
 
 # ---------------------------------------------------------------------- sections
@@ -301,15 +385,17 @@ def _paper_section(certificate: Certificate) -> dict[str, Any] | None:
     }
 
 
-def _members_section(certificate: Certificate) -> list[dict[str, Any]]:
+def _members_section(certificate: Certificate, out: Writer) -> list[dict[str, Any]]:
     labels, sections = certificate.graph.labels, []
     if certificate.lyapunov is not None and certificate.proof.rate is not None:
         paper = _paper_section(certificate) or {}
         keys = ("coordinates", "blocks", "rho", "rate", "prefactor")
         sections.append({"class": "paper", **{key: paper[key] for key in keys}})
     for member in certificate.sharpening.members:
-        block: dict[str, Any] = {"name": "P", "nodes": [labels[v] for v in member.nodes]}
-        if member.diagonal is not None:
+        block: dict[str, Any] = {"name": "P", "nodes": out.nodes(member.nodes)}
+        if member.dominance is not None:
+            block["diagonal"] = out.floats("diagonal", member.dominance.weights)
+        elif member.diagonal is not None:
             block["diagonal"] = [format_exact(w) for w in member.diagonal]
         else:
             rows = member.matrix or []
@@ -394,31 +480,38 @@ def _sliding_run_section(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def _state_section(graph: SignedDigraph, state: Sequence[Fraction] | None) -> dict[str, str] | None:
-    return None if state is None else dict(zip(graph.labels, map(format_exact, state), strict=True))
-
-
 def _producer() -> str:
     from importlib.metadata import version
 
     return f"ptcc-certify {version('ptcc-certify')}"
 
 
-def graph_section(graph: SignedDigraph) -> dict[str, Any]:
+def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
     """Return nodes, edges and how they were read."""
-    read = graph.read
-    return {
-        "nodes": list(graph.labels),
-        "edges": [
+    read, (table, scale) = graph.read, graph.weight_table()
+    edges: Any
+    if out.aside(graph.n_edges) and table is not None:
+        edges = {
+            "count": graph.n_edges,
+            "scale": str(scale),
+            "source": out.file("source", graph.source),
+            "target": out.file("target", graph.target),
+            "weight": out.file("weight", table),
+        }
+    else:
+        edges = [
             [graph.labels[s], graph.labels[t], w]
             for s, t, w in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True)
-        ],
+        ]
+    return {
+        "nodes": list(graph.labels),
+        "edges": edges,
         "read": {key: read[key] for key in ("orientation", "duplicates", "self_loops", "undirected")},
         "sha256": graph.sha256,
     }
 
 
-def structure_section(structure: Structure) -> dict[str, Any]:
+def structure_section(structure: Structure, out: Writer) -> dict[str, Any]:
     """Return components with the witnesses of their balance."""
     labels = structure.graph.labels
     closed = []
@@ -432,8 +525,8 @@ def structure_section(structure: Structure) -> dict[str, Any]:
     return {
         "connectivity": structure.connectivity,
         "closed_components": closed,
-        "leaders": [labels[v] for v in structure.leaders.tolist()],
-        "followers": [labels[v] for v in structure.followers.tolist()],
+        "leaders": out.nodes(structure.leaders),
+        "followers": out.nodes(structure.followers),
         "balanced": structure.balanced,
         "sign_symmetric": structure.sign_symmetric,
     }
@@ -444,12 +537,15 @@ def claim_section(claim: Claim) -> dict[str, Any]:
     return {"theorem": claim.theorem, "behaviour": claim.behaviour, "corollaries": list(claim.corollaries)}
 
 
-def components_section(structure: Structure, claims: Sequence[Claim], final: dict[str, Any] | None) -> Any:
+def components_section(structure: Structure, claims: Sequence[Claim], final: dict[str, Any] | None, out: Writer) -> Any:
     """Return connectivity, claim and outcome of every weak component, in arrays if there are many."""
     components, labels = structure.components, structure.graph.labels
+    by_label = final is not None and len(final) == len(labels)  # not in side files
     if len(components) > MANY_COMPONENTS:
         return {
-            "nodes": [[labels[v] for v in c.nodes] for c in components],
+            "nodes": out.vector("component", structure.weak_component)
+            if out.aside(len(labels))
+            else [[labels[v] for v in c.nodes] for c in components],
             "connectivity": [c.connectivity for c in components],
             "theorem": [claim.theorem for claim in claims],
             "behaviour": [claim.behaviour for claim in claims],
@@ -460,19 +556,26 @@ def components_section(structure: Structure, claims: Sequence[Claim], final: dic
             "nodes": [labels[v] for v in c.nodes],
             "connectivity": c.connectivity,
             "claim": claim_section(claim),
-            "outcome": final and {labels[v]: final[labels[v]] for v in c.nodes},
+            "outcome": final and {labels[v]: final[labels[v]] for v in c.nodes} if by_label else None,
         }
         for c, claim in zip(components, claims, strict=True)
     ]
 
 
-def obligation_section(obligation: Obligation) -> dict[str, Any]:
+def obligation_section(obligation: Obligation, certificate: Certificate, out: Writer) -> dict[str, Any]:
     """Return one step of the proof."""
+    witness = obligation.witness
+    if isinstance(witness, DominantMember):
+        witness = _dominance_witness(witness, out)
+    elif isinstance(witness, EnclosedOutcome):
+        u = witness.witness
+        by_label = zip(certificate.graph.labels, map(repr, u.tolist()), strict=True)
+        witness = {"u": out.vector("u", u) if out.aside(u.size) else dict(by_label)}
     return {
         "kind": obligation.kind,
         "of": obligation.of,
         "statement": obligation.statement,
         "lemma": obligation.lemma,
         "numbers": {name: format_exact(value) for name, value in obligation.numbers.items()},
-        "witness": obligation.witness,
+        "witness": witness,
     }

@@ -1,10 +1,11 @@
 """Lyapunov functions of large graphs, proved row by row: no matrix of all agents is searched or formed densely.
 
-``V = E' P E`` with ``P = diag(w)`` on the rows of ``E`` that move. Leader groups are small, and each has its own proof
+``V = E' P E`` with ``P = diag(w)`` on the rows of ``E`` that move. Each leader group has its own proof
 
-    L_k'(P_k L_k + L_k' P_k - g_k P_k)L_k > 0    modulo the kernel of L_k.
+    P_k L_k + L_k' P_k - g_k P_k > 0    on the range of L_k,
 
-With ``(g_k - b) P_k`` in place of these blocks, ``S = P L + L' P - b P`` is positive definite if some ``d > 0`` has
+of a dense matrix, or above ``EXACT_NODES`` nodes by a sparse factor. With ``(g_k - b) P_k`` in place of these blocks,
+``S = P L + L' P - b P`` is positive definite if some ``d > 0`` has
 
     S_ii d_i > sum_j |S_ij| d_j    for every row i.
 
@@ -23,12 +24,10 @@ from typing import Any
 import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact import prove_generalized_margin, round_to_bits
+from lmi.exact import SparseDefinitenessProof, prove_generalized_margin, prove_sparse_positive_definite, round_to_bits
 from lmi.iterative import SparseHMatrix
-from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.lemmas import EXACT_NODES, left_vector
-from ptcc_certify.rationals import format_exact
+from ptcc_certify.lemmas import EXACT_NODES, FILL_NODES, fill_core, left_vector
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 
@@ -37,6 +36,27 @@ LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
 #: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
 _BITS, _SLACK = 40, 1e-9
 _ROUNDING = 1e-14
+#: Losses of its rate that are tried for a leader group that is proved by a sparse factor.
+_GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class GroupProof:
+    """The decay of a leader group by itself.
+
+    Attributes
+    ----------
+    weights : (n,) array
+        ``P_k``, each of at most 40 significant bits.
+    rate : Fraction
+        ``g_k``.
+    factor : SparseDefinitenessProof or None
+        What proves it for a group of more than ``EXACT_NODES`` nodes.
+    """
+
+    weights: np.ndarray
+    rate: Fraction
+    factor: SparseDefinitenessProof | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,25 +65,30 @@ class DominantMember:
 
     Attributes
     ----------
-    nodes : tuple of int
+    nodes : (n,) int array
         The rows of ``E`` that move, leader groups first.
-    diagonal, vector : tuple of Fraction
-        ``w`` and ``d``.
+    weights, vector : (n,) arrays
+        ``w`` and ``d``; every entry is the dyadic number that it is, of at most 40 significant bits.
     rate : Fraction
-    group_rates : tuple of Fraction
-        ``g_k`` of every leader group that moves.
+    groups : tuple of GroupProof
+        Of every leader group that moves.
     """
 
-    nodes: tuple[int, ...]
-    diagonal: tuple[Fraction, ...]
-    vector: tuple[Fraction, ...]
+    nodes: np.ndarray
+    weights: np.ndarray
+    vector: np.ndarray
     rate: Fraction
-    group_rates: tuple[Fraction, ...]
+    groups: tuple[GroupProof, ...]
 
     @property
-    def witness(self) -> dict[str, Any]:
-        """What the check needs besides the diagonal, JSON-ready."""
-        return {"vector": list(map(format_exact, self.vector)), "groups": list(map(format_exact, self.group_rates))}
+    def lowest(self) -> Fraction:
+        """Smallest weight."""
+        return Fraction(float(self.weights.min()))
+
+    @property
+    def highest(self) -> Fraction:
+        """Largest weight."""
+        return Fraction(float(self.weights.max()))
 
 
 def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> list[DominantMember]:
@@ -75,7 +100,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> 
     Raises
     ------
     NoCertificate
-        A leader group is large, or no positive rate was found.
+        A leader group is too large, or no positive rate was found.
 
     Examples
     --------
@@ -102,11 +127,8 @@ class _Composite:
     """Leader groups and followers of one graph, in floats."""
 
     def __init__(self, structure: Structure):
-        system = ErrorSystem(structure)
-        self.nodes, self.groups = system.nodes, [list(c.nodes) for c in system.leaders]
-        largest = max(map(len, self.groups), default=0)
-        if largest > EXACT_NODES:
-            raise NoCertificate(f"a leader group has {largest} nodes; groups are treated up to {EXACT_NODES}")
+        leaders = [c for c in structure.closed_components if len(c.nodes) > 1]
+        self.groups = [list(c.nodes) for c in leaders]
         L = structure.graph.laplacian().tocsr()
         self.F = structure.followers
         self.K = np.array([v for group in self.groups for v in group], dtype=np.int64)
@@ -115,23 +137,23 @@ class _Composite:
         self.pull: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
         self.followers = SparseHMatrix(rows[:, self.F]) if self.F.size else None
         self.smallest = self.followers.smallest() if self.followers is not None else np.inf
-        self.p: list[Fraction] = []
-        self.group_rates: list[Fraction] = []
+        self.nodes = np.concatenate([self.K, self.F])
+        proofs = []
         several = structure.graph.subgraph(self.K) if self.K.size else structure.graph
         first = 0
-        for group, component in zip(self.groups, system.leaders, strict=True):
+        for group, component in zip(self.groups, leaders, strict=True):
             own = several.subgraph(np.arange(first, first + len(group)))
-            p, g = _group(own, component.balanced)
-            self.p += p
-            self.group_rates.append(g)
+            proofs.append(prove_group(own, component.balanced))
             first += len(group)
-        self.g = np.array([float(g) for g in self.group_rates])
+        self.proofs = tuple(proofs)
+        self.p = np.concatenate([proof.weights for proof in proofs]) if proofs else np.zeros(0)
+        self.g = np.array([float(proof.rate) for proof in proofs])
         if not min(2 * self.smallest, self.g.min(initial=np.inf)) > 0:
             raise NoCertificate("a block has no positive rate in floating point")
 
     def member(self, loss: float) -> DominantMember:
         """Return the composite whose followers are taken at ``(1 - loss)`` times their smallest eigenvalue."""
-        p = np.array([float(x) for x in self.p])
+        p = self.p
         if self.followers is None:
             w, d = p, np.ones(self.K.size)
         else:
@@ -158,18 +180,16 @@ class _Composite:
         w, d = w / np.exp2(np.ceil(np.log2(w.max()))), d / d.max()
         if not (np.isfinite(w).all() and np.isfinite(d).all() and w.min() > 1e-280 and d.min() > 1e-280):
             raise NoCertificate("the weights span more than float64 holds")
-        diagonal = tuple(round_to_bits(float(x), _BITS) for x in w)
-        vector = tuple(round_to_bits(float(x), _BITS) for x in d)
-        g = tuple(self.group_rates)
-        rate = self._rate(np.array([float(x) for x in diagonal]), np.array([float(x) for x in vector]), g)
+        w, d = round_array(w), round_array(d)
+        rate = self._rate(w, d)
         if not rate > 0:
             raise NoCertificate("no positive rate is left")
-        return DominantMember(self.nodes, diagonal, vector, round_to_bits(rate * (1 - _SLACK), 53), g)
+        return DominantMember(self.nodes, w, d, round_to_bits(rate * (1 - _SLACK), 53), self.proofs)
 
-    def _rate(self, w: np.ndarray, d: np.ndarray, g: Sequence[Fraction]) -> float:
+    def _rate(self, w: np.ndarray, d: np.ndarray) -> float:
         """Return the largest ``b`` for which every row of the inequality holds."""
         k = self.K.size
-        own = np.array([float(x) for x in g])[self.place] if k else np.zeros(0)
+        own = self.g[self.place] if k else np.zeros(0)
         if self.followers is None:
             return float(own.min(initial=np.inf))
         w_F, d_F = w[k:], d[k:]
@@ -184,18 +204,98 @@ class _Composite:
         return float(min((bound / (w_F * d_F)).min(), own.min(initial=np.inf)))
 
 
-def _group(graph: SignedDigraph, balanced: bool) -> tuple[list[Fraction], Fraction]:
-    """Return the left null vector of ``M(L)``, rounded, and the proved decay of its Lyapunov function."""
+def round_array(x: np.ndarray) -> np.ndarray:
+    """Round every entry to 40 significant bits.
+
+    Examples
+    --------
+    >>> float(round_array(np.array([1 / 3]))[0]).hex()
+    '0x1.5555555556000p-2'
+    """
+    mantissa, exponent = np.frexp(x)
+    return np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS)
+
+
+def prove_group(graph: SignedDigraph, balanced: bool) -> GroupProof:
+    """Prove the decay of a strongly connected group: the left null vector of ``M(L)``, rounded, and its rate.
+
+    Raises
+    ------
+    NoCertificate
+        The rate was not proved; the message tells the numerical one.
+
+    Examples
+    --------
+    >>> round(float(prove_group(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -3)]), False).rate), 6)
+    2.0
+    """
     p = left_vector(graph)
-    weights = tuple(round_to_bits(float(x), _BITS) for x in p / p.max())
-    half = np.sqrt([float(x) for x in weights])
-    S = half[:, None] * graph.laplacian().toarray() / half
+    weights = round_array(p / p.max())
+    if graph.n_nodes > EXACT_NODES:
+        return _prove_large_group(graph, balanced, weights)
+    exact = tuple(Fraction(x) for x in weights.tolist())
+    half = np.sqrt(weights)
+    S = half[:, None] * graph.dense_laplacian() / half
     guess = float(np.linalg.eigvalsh(S + S.T)[int(balanced)])
     if balanced:
-        proved = prove_connectivity(graph, weights, guess)
+        proved = prove_connectivity(graph, exact, guess)
     else:
-        form = symmetric_product(weights, graph.exact_laplacian())
-        proved = prove_generalized_margin(form, diagonal_matrix(weights), guess)
+        form = symmetric_product(exact, graph.exact_laplacian())
+        proved = prove_generalized_margin(form, diagonal_matrix(exact), guess)
     if proved is None or proved <= 0:
         raise NoCertificate(f"the rate of a leader group of {graph.n_nodes} nodes was not proved")
-    return list(weights), proved
+    return GroupProof(weights, proved)
+
+
+def _prove_large_group(graph: SignedDigraph, balanced: bool, weights: np.ndarray) -> GroupProof:
+    """Prove a rate just below the smallest generalized eigenvalue by a sparse factor."""
+    from scipy import sparse
+
+    L = sparse.csr_array(graph.laplacian())
+    P = sparse.diags_array(weights)
+    half = P @ L
+    form = sparse.csc_array(half + half.T)
+    n, short = graph.n_nodes, fill_core(L) <= FILL_NODES
+    guess = _smallest_eigenvalue(form, weights, balanced, short)
+    if not short:
+        raise NoCertificate(
+            f"the rate {guess:.6g} of a leader group of {n} nodes is numerical: a proof would take long"
+        )
+    for loss in _GROUP_LOSSES:
+        g = float(round_to_bits(guess * (1 - loss), 24))
+        S = sparse.csc_array(form - g * P)
+        size = abs(half) + abs(half.T) + abs(g) * P
+        if balanced:  # modulo the kernel of L
+            S, size = (sparse.csc_array((R.T @ X @ R)[1:, 1:]) for R, X in ((L, S), (abs(L), size)))
+        # What rounding may have changed in a row is taken off the diagonal.
+        spare = _ROUNDING * np.asarray(size.sum(axis=1)).ravel()
+        S = sparse.csc_array((S + S.T) / 2 - sparse.diags_array(spare))
+        factor = prove_sparse_positive_definite(S)
+        if factor is not None:
+            return GroupProof(weights, Fraction(g), factor)
+    raise NoCertificate(f"the rate {guess:.6g} of a leader group of {n} nodes is numerical: it was not proved")
+
+
+def _smallest_eigenvalue(form: Any, weights: np.ndarray, balanced: bool, factor: bool) -> float:
+    """Return the smallest positive eigenvalue of ``(form, diag(weights))``, by a sparse factor or by products alone."""
+    from scipy import sparse
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    half = sparse.diags_array(1 / np.sqrt(weights))
+    scaled = sparse.csc_array(half @ form @ half)
+    top = float(abs(scaled).max())
+    try:
+        if factor:
+            found = float(eigsh(scaled, k=1 + balanced, sigma=-1e-3 * top, return_eigenvectors=False).max())
+        elif balanced:  # the spectrum of the comparison matrix, whose kernel is known and moved to the other end
+            M = sparse.csc_array(2 * sparse.diags_array(scaled.diagonal()) - abs(scaled))
+            kernel = np.sqrt(weights / weights.sum())
+            moved = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
+            found = float(eigsh(moved, k=1, which="SA", tol=1e-6, return_eigenvectors=False)[0])
+        else:
+            found = float(eigsh(scaled, k=1, which="SA", tol=1e-6, return_eigenvectors=False)[0])
+    except (ArpackError, RuntimeError):
+        found = 0.0
+    if not found > 0:
+        raise NoCertificate(f"no positive rate of a leader group of {weights.size} nodes was found")
+    return found

@@ -1,31 +1,38 @@
-"""The final state of a large graph in intervals: exact leaders, followers by one solve and its residual.
+"""The final state of a large graph in intervals: leaders from their voices, followers by one solve and its residual.
 
 With ``u > 0`` and ``M(L_F) u > 0``, any approximation ``y`` of the followers' end has
 
-    |x_F - y|  <=  max_i(|r_i| / (M(L_F) u)_i) u,      r = L_F y + L_FL x_L.
+    |x_F - y|  <=  max_i((|r_i| + s_i) / (M(L_F) u)_i) u,      r = L_F y + L_FL x_L,
 
-The residual is taken in floats with room for their rounding, or in rationals where that room is too wide; the check of
-the certificate forms it exactly.
+``s`` what the radii of the leaders add. The voices of a large leader group are enclosed in the same way. Residuals are
+taken in floats with room for their rounding, or in rationals where that room is too wide; the check of the certificate
+forms them exactly.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from lmi.errors import LMIError
 from lmi.iterative import SparseHMatrix, solve
 from ptcc_certify.outcomes import Influence, follower_state
-from ptcc_certify.structure import Structure
+from ptcc_certify.structure import ClosedComponent, Structure
 
-#: Decimals of a middle and of a radius, in units of the largest entry of the start.
-_DIGITS, _RADIUS_DIGITS = 17, 30
 #: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
 _ROUNDING, _NARROW = 1e-12, 4e-7
+#: Residual of a witness in every row, relatively.
+_LOOSE = 0.05
+#: Room for the rounding of a radius, and of texts and floats of a middle.
+_MORE, _ULP = 1 + 1e-6, 2.0**-52
+#: Starts below this size leave no room for radii in float64, and are taken in another unit.
+_SMALLEST = Fraction(1, 10**290)
+
+Interval = tuple[Fraction, Fraction]
 
 
 class NotEnclosedError(ArithmeticError):
@@ -38,16 +45,27 @@ class EnclosedOutcome:
 
     Attributes
     ----------
-    final : tuple of N (middle, radius), or None without a start
+    middle, radius : (N,) arrays, or None without a start
+        In units of ``unit``. What is exact has radius 0 or the rounding of its float.
+    unit : Fraction
+        1, or a power of 2 for tiny starts.
+    exact : mapping of node to Fraction
+        The ends that are known exactly.
     degenerate : tuple of int, or None without a start
         1-based numbers of the balanced closed components that meet at 0.
-    witness : tuple of N float
-        ``u``; 1 for leaders.
+    voices : mapping of k to (middle, radius)
+        Of those of ``Influence.balanced`` whose voices are not rational.
+    witness : (N,) array
+        ``u``; 1 for leaders, but for those of ``voices``.
     """
 
-    final: tuple[tuple[Fraction, Fraction], ...] | None
+    middle: np.ndarray | None
+    radius: np.ndarray | None
+    unit: Fraction
+    exact: dict[int, Fraction]
     degenerate: tuple[int, ...] | None
-    witness: tuple[float, ...]
+    voices: dict[int, tuple[np.ndarray, np.ndarray]]
+    witness: np.ndarray
 
 
 def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction] | None) -> EnclosedOutcome:
@@ -56,7 +74,7 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
     Raises
     ------
     NotEnclosedError
-        A leader group is too large for exact voices, or the followers' equations are too ill-conditioned for floats.
+        The equations of followers or voices are too ill-conditioned for floats, or a consensus value may be 0.
 
     Examples
     --------
@@ -65,84 +83,137 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
     >>> from ptcc_certify.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
     >>> found = enclose(st, influence(st, exact=False), [Fraction(1), Fraction(0), Fraction(1)])
-    >>> middle, radius = found.final[1]
-    >>> abs(middle + Fraction(1, 3)) <= radius < 1e-9  # the follower c ends at -1/3
+    >>> abs(found.middle[1] + 1 / 3) <= found.radius[1] < 1e-9  # the follower c ends at -1/3
     True
     """
     n, F = structure.graph.n_nodes, structure.followers
-    if not all(isinstance(w, Fraction | int) for voice in influence.voices for w in voice):
-        largest = max(len(c.nodes) for c in influence.balanced)
-        raise NotEnclosedError(f"a balanced leader group has {largest} nodes")
-    u, matrix = np.ones(n), None
+    u = np.ones(n)
     if F.size:
-        with np.errstate(all="ignore"):
-            try:
-                matrix = SparseHMatrix(structure.graph.laplacian().tocsr()[F][:, F])
-                u[F] = solve(matrix.M, matrix.diagonal, matrix.diagonal)  # rows of every size weigh alike
-                u /= u.max()
-                pushed = matrix.M @ u[F]
-            except LMIError as error:
-                raise NotEnclosedError(str(error)) from None
-        if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(pushed).all() and (pushed > 0).all()):
-            raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
+        u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
+    voices = {}
+    for k, (component, voice) in enumerate(zip(influence.balanced, influence.voices, strict=True)):
+        if not all(isinstance(w, Fraction | int) for w in voice):
+            voices[k] = _enclosed_voices(structure, component, np.array(voice, dtype=float), u)
     if start is None:
-        return EnclosedOutcome(None, None, tuple(u.tolist()))
-    final = [(Fraction(0), Fraction(0))] * n
+        return EnclosedOutcome(None, None, Fraction(1), {}, None, voices, u)
+    size = max(map(abs, start))
+    unit = Fraction(1)
+    if 0 < size < _SMALLEST:
+        unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
+        start = [x / unit for x in start]
+    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, Fraction]()
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     degenerate = []
-    for k, component, voice in zip(numbers, influence.balanced, influence.voices, strict=True):
-        value = sum((Fraction(w) * start[v] for v, w in zip(component.nodes, voice, strict=True)), Fraction(0))
-        degenerate += [k] if value == 0 else []
-        for v, sign in zip(component.nodes, component.gauge or (), strict=True):
-            final[v] = (sign * value, Fraction(0))
-    top = max((abs(x) for x, _ in final), default=Fraction(0))
-    if F.size and top:
-        _enclose_followers(structure, final, u, top)
-    return EnclosedOutcome(tuple(final), tuple(degenerate), tuple(u.tolist()))
+    for k, (number, component) in enumerate(zip(numbers, influence.balanced, strict=True)):
+        signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
+        if k in voices:
+            own = np.array([float(start[v]) for v in component.nodes])
+            value, spread = float(voices[k][0] @ own), float(voices[k][1] @ np.abs(own))
+            spread = (spread + _ROUNDING * float(np.abs(voices[k][0]) @ np.abs(own))) * _MORE
+            if abs(value) <= 2 * spread:
+                raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
+            middle[nodes], radius[nodes] = signs * value, spread
+            continue
+        known = sum((Fraction(w) * start[v] for v, w in zip(component.nodes, influence.voices[k], strict=True)), 0)
+        known = Fraction(known)
+        degenerate += [number] if known == 0 else []
+        exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
+        middle[nodes] = signs * float(known)
+        radius[nodes] = 0.0 if Fraction(float(known)) == known else _spacing(float(known))
+    exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
+    if F.size and middle.any():
+        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, u)
+    exact = {v: x * unit for v, x in exact.items()} if unit != 1 else exact
+    return EnclosedOutcome(middle, radius, unit, exact, tuple(degenerate), voices, u)
 
 
-def _enclose_followers(
-    structure: Structure, final: list[tuple[Fraction, Fraction]], u: np.ndarray, top: Fraction
-) -> None:
-    """Fill in the followers, in a unit near to the largest leader."""
+def _spacing(x: float | np.ndarray) -> Any:
+    """Bound the rounding of a float or of its decimal text."""
+    return 2 * _ULP * np.abs(x) + 5e-324
+
+
+def _witness(block: Any) -> np.ndarray:
+    """Return ``u > 0`` with ``M(block) u > 0``, its largest entry 1."""
+    with np.errstate(all="ignore"):
+        try:
+            matrix = SparseHMatrix(block)
+        except LMIError as error:
+            raise NotEnclosedError(str(error)) from None
+        ones = np.ones(matrix.diagonal.size)
+        rows = matrix.M.multiply(1 / matrix.diagonal[:, None]).tocsr()  # rows of every size weigh alike
+        u = solve(rows, ones, ones, _LOOSE / np.sqrt(ones.size))
+        u /= u.max()
+        pushed = matrix.M @ u
+    if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(pushed).all() and (pushed > 0).all()):
+        raise NotEnclosedError("the equations are too ill-conditioned for floats")
+    return u
+
+
+def _enclosed_voices(
+    structure: Structure, component: ClosedComponent, voice: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
+    nodes = np.array(component.nodes)
+    block = structure.graph.laplacian().tocsr()[nodes][:, nodes].tocsr()
+    signs = np.array(component.gauge or (), dtype=float)
+    eta = signs * voice
+    top = int(np.argmax(eta))
+    rest = np.delete(np.arange(nodes.size), top)
+    own = _witness(block[rest][:, rest].T.tocsr())
+    u[nodes[rest]] = own
+    columns = block.T.tocsr()[rest]  # of the comparison matrix, but for signs
+    z = eta / eta[top]
+    pushed = 2 * block.diagonal()[rest] * own - abs(columns[:, rest]) @ own
+    total = abs(columns) @ z
+    residual = np.abs(2 * block.diagonal()[rest] * z[rest] - total)
+    with np.errstate(all="ignore"):
+        error = float(((residual + _ULP * (np.diff(columns.indptr) + 4) * total) / pushed).max()) * _MORE
+    weights = np.zeros(nodes.size)
+    weights[rest] = own
+    low, high = z.sum() - error * weights.sum(), z.sum() + error * weights.sum()
+    if not low > 0.5 * high:
+        raise NotEnclosedError(f"the voices of a leader group of {nodes.size} nodes are too ill-conditioned for floats")
+    ends = np.abs((z - error * weights) / high - eta), np.abs((z + error * weights) / low - eta)
+    return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
+
+
+def _enclosed_followers(
+    structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return middles and radii of the followers, in a unit near to the largest leader."""
     F = structure.followers
-    exponent = len(str(top.numerator)) - len(str(top.denominator))
-    unit = Fraction(10) ** exponent
+    unit = float(np.exp2(np.floor(np.log2(np.abs(middle).max()))))
     rows = structure.graph.laplacian().tocsr()[F]
-    state = np.array([float(x / unit) for x, _ in final])
+    state, blur = middle / unit, abs(rows) @ (radius / unit)
     block = rows[:, F].tocsr()
     with np.errstate(all="ignore"):
         solved = follower_state(structure, state)
         if not np.isfinite(solved).all():
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
-        middles = [Fraction(round(x * 10**_DIGITS), 10**_DIGITS) for x in solved.tolist()]
-        state[F] = [float(x) for x in middles]
+        state[F] = solved
         comparison = 2 * block.diagonal() * u[F] - abs(block) @ u[F]
-        residual = np.abs(rows @ state) + _ROUNDING * (abs(rows) @ np.abs(state))
+        residual = np.abs(rows @ state) + blur + _ROUNDING * (abs(rows) @ np.abs(state))
         error = float((residual / comparison).max()) * 1.01
-    if error * u[F].max() <= _NARROW:
-        ratio = Fraction(error)
-    else:
-        known = [x / unit for x, _ in final]
-        for v, x in zip(F.tolist(), middles, strict=True):
-            known[v] = x
-        ratio = _exact_ratio(structure, known, u)
-    for v, x in zip(F.tolist(), middles, strict=True):
-        radius = math.ceil(ratio * Fraction(float(u[v])) * 10**_RADIUS_DIGITS)
-        final[v] = (x * unit, Fraction(radius, 10**_RADIUS_DIGITS) * unit)
+    if not error * u[F].max() <= _NARROW:
+        error = _exact_error(structure, exact, state, blur + _ULP * (abs(rows) @ np.abs(state)), u, unit)
+    found = solved * unit
+    return found, (error * u[F] * unit + _spacing(found)) * _MORE
 
 
-def _exact_ratio(structure: Structure, state: Sequence[Fraction], u: np.ndarray) -> Fraction:
-    """Return ``max_i |r_i| / (M(L_F) u)_i`` in rationals."""
-    following = set(structure.followers.tolist())
-    weights = [Fraction(float(x)) for x in u]
-    ratio = Fraction(0)
-    rows = structure.graph.exact_rows(structure.followers.tolist())
-    for v, row in zip(structure.followers.tolist(), rows, strict=True):
-        left = sum((x * state[j] for j, x in row.items()), Fraction(0))
-        signs = ((weights[j] * (x if j == v else -abs(x))) for j, x in row.items() if j in following)
+def _exact_error(
+    structure: Structure, exact: dict[int, Fraction], state: np.ndarray, blur: np.ndarray, u: np.ndarray, unit: float
+) -> float:
+    """Return ``max_i (|r_i| + s_i) / (M(L_F) u)_i``, the residual in rationals."""
+    F = structure.followers.tolist()
+    following = set(F)
+    known = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
+    weights = [Fraction(x) for x in u.tolist()]
+    error = Fraction(0)
+    for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
+        left = sum((x * known[j] for j, x in row.items()), Fraction(0))
+        signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
         pushed = sum(signs, Fraction(0))
         if pushed <= 0:
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
-        ratio = max(ratio, abs(left) / pushed)
-    return ratio
+        error = max(error, (abs(left) + Fraction(more)) / pushed)
+    return float(error) * _MORE

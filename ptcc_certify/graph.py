@@ -86,6 +86,10 @@ class Weights:
         return np.where(self.table > 0, 1, -1).astype(np.int8)
 
 
+#: Edges whose lines are hashed at a time.
+_HASHED = 65_536
+
+
 class SignedDigraph:
     """A signed digraph with exact weights.
 
@@ -380,6 +384,13 @@ class SignedDigraph:
 
         return sparse.csr_array(sparse.diags_array(self.in_weight()) - self.adjacency())
 
+    def dense_laplacian(self) -> np.ndarray:
+        """(N, N) dense float64 signed Laplacian, for small graphs."""
+        L = np.zeros((self.n_nodes, self.n_nodes))
+        L[self.target, self.source] = -self.weights
+        np.fill_diagonal(L, self.in_weight())
+        return L
+
     def in_weight(self) -> np.ndarray:
         """(N,) float64 array: ``D_k = sum_l |w_kl|``, how much node k listens in total."""
         return np.bincount(self.target, np.abs(self.weights), minlength=self.n_nodes).astype(np.float64)
@@ -432,10 +443,12 @@ class SignedDigraph:
         rank = np.empty(self.n_nodes, dtype=np.int64)
         rank[order] = np.arange(self.n_nodes)
         digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
-        sources, targets, texts = self.source.tolist(), self.target.tolist(), self.weight_texts
-        for i in np.lexsort((rank[self.target], rank[self.source])).tolist():
-            line = f'[{quoted[sources[i]]}, {quoted[targets[i]]}, "{texts[i]}"]\n'
-            digest.update(line.encode("utf-8", "surrogatepass"))
+        names, texts = np.array(quoted, dtype=object), np.array(self.weight_texts, dtype=object)
+        edges = np.lexsort((rank[self.target], rank[self.source]))
+        for some in np.split(edges, range(_HASHED, edges.size, _HASHED)):
+            columns = names[self.source[some]], names[self.target[some]], texts[some]
+            lines = [f'[{s}, {t}, "{w}"]\n' for s, t, w in zip(*(c.tolist() for c in columns), strict=True)]
+            digest.update("".join(lines).encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:

@@ -7,9 +7,10 @@ component, Lemma 8 the same for Lemma 9.2.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +21,12 @@ from ptcc_certify.structure import Structure, analyse
 
 #: Up to this many nodes null vectors, outcomes and proofs are computed in exact rationals.
 EXACT_NODES = 120
-#: Above this many nodes a left null vector is computed by a sparse factor.
-DENSE_NODES = 3000
+#: Above this many nodes null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
+DENSE_NODES, FACTOR_NODES = 500, 20_000
+#: A sparse factor is made where at most so many nodes fill in; see :func:`fill_core`.
+FILL_NODES = 4000
+#: Eigenvalues nearest to 0 that are computed, and products spent on an inverse.
+_NEAREST, _PRODUCTS = 8, 2000
 
 
 def gauge(graph: SignedDigraph) -> np.ndarray | None:
@@ -74,7 +79,8 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
     Parameters
     ----------
     structure : Structure
-        Of a graph whose strong components are small enough for dense eigenvalues.
+        Of strong components above ``DENSE_NODES`` nodes only the eigenvalues nearest to 0 are computed, by Arnoldi's
+        method; above ``FACTOR_NODES`` that takes too long.
 
     Returns
     -------
@@ -86,26 +92,115 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
     >>> laplacian_spectrum(analyse(g)).nonzero.real.round(6).tolist()
     [2.0, 4.0]
     """
-    L = structure.graph.laplacian()
     balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
-    order = np.argsort(structure.strong_component, kind="stable")
-    parts = np.split(order, np.cumsum(np.bincount(structure.strong_component))[:-1])
-    diagonal = L.diagonal()
     values: list[np.ndarray] = []
-    for nodes in parts:
-        block = L[nodes][:, nodes].toarray() if nodes.size > 1 else diagonal[nodes][:, None]
-        found = np.linalg.eigvals(block).astype(complex)
+    for nodes, block in component_blocks(structure):
+        if nodes.size > DENSE_NODES:
+            found = _nearest_eigenvalues(block)
+        else:
+            found = np.linalg.eigvals(block.toarray()).astype(complex)
         if int(nodes[0]) in balanced:
             found = np.delete(found, np.argmin(np.abs(found)))
         values.append(found)
+    values.append(structure.graph.in_weight()[single_followers(structure)].astype(complex))
     return Spectrum(np.concatenate(values), len(balanced))
+
+
+def component_blocks(structure: Structure) -> Iterator[tuple[np.ndarray, Any]]:
+    """Yield the nodes of every strong component of several nodes, and its block of ``L`` as a sparse array.
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])
+    >>> [(nodes.tolist(), block.toarray().tolist()) for nodes, block in component_blocks(analyse(g))]
+    [([0, 1], [[1.0, -1.0], [-1.0, 1.0]])]
+    """
+    from scipy import sparse
+
+    number, L = structure.strong_component, structure.graph.laplacian()
+    sizes = np.bincount(number)
+    entries = sparse.coo_array(L)
+    inside = np.flatnonzero((number[entries.row] == number[entries.col]) & (sizes[number[entries.row]] > 1))
+    inside = inside[np.argsort(number[entries.row[inside]], kind="stable")]
+    order = np.argsort(number, kind="stable")
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    place = np.empty_like(order)
+    place[order] = np.arange(order.size) - first[number[order]]
+    begin = np.searchsorted(number[entries.row[inside]], np.arange(sizes.size + 1))
+    for k in np.flatnonzero(sizes > 1).tolist():
+        own = inside[begin[k] : begin[k + 1]]
+        where = place[entries.row[own]], place[entries.col[own]]
+        block = sparse.csr_array((entries.data[own], where), shape=(sizes[k], sizes[k]))
+        yield order[first[k] : first[k + 1]], block
+
+
+def single_followers(structure: Structure) -> np.ndarray:
+    """Return the nodes that listen to somebody, and are strong components by themselves.
+
+    Examples
+    --------
+    >>> single_followers(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)]))).tolist()
+    [2]
+    """
+    number = structure.strong_component
+    return np.flatnonzero((np.bincount(number)[number] == 1) & (structure.graph.in_weight() > 0))
+
+
+def _nearest_eigenvalues(block: Any) -> np.ndarray:
+    """Return the eigenvalues nearest to 0, by inverses of the block shifted to the left of them all."""
+    from scipy import sparse
+    from scipy.sparse.linalg import ArpackError, LinearOperator, bicgstab, eigs
+
+    diagonal = block.diagonal()
+    shift = -1e-4 * float(diagonal.mean())
+    inverse = None
+    if fill_core(block) > FILL_NODES:
+        shifted = sparse.csr_array(block - shift * sparse.eye_array(diagonal.size))
+        scaled = LinearOperator(block.shape, matvec=lambda x: x.ravel() / (diagonal - shift))
+
+        def solve(x: np.ndarray) -> np.ndarray:
+            found, failed = bicgstab(shifted, x.ravel(), rtol=1e-10, maxiter=_PRODUCTS, M=scaled)
+            if failed:
+                raise np.linalg.LinAlgError("the inverse did not converge")
+            return found
+
+        inverse = LinearOperator(block.shape, matvec=solve)
+    try:
+        found = eigs(sparse.csc_array(block), k=_NEAREST, sigma=shift, OPinv=inverse, return_eigenvectors=False)
+    except (ArpackError, RuntimeError) as error:
+        raise np.linalg.LinAlgError(str(error)) from None
+    return np.asarray(found)
+
+
+def fill_core(block: Any) -> int:
+    """Return how many nodes are left when those with at most two neighbours are taken off, again and again.
+
+    A sparse factor of these fills in, that of the others does not.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> fill_core(sparse.csr_array(np.ones((5, 5)))), fill_core(sparse.eye_array(5, k=1) + sparse.eye_array(5))
+    (5, 0)
+    """
+    from scipy import sparse
+
+    near = sparse.csr_array(abs(block))
+    near = sparse.csr_array(near + near.T)
+    near.setdiag(0)
+    near.eliminate_zeros()
+    near.data = np.ones_like(near.data)
+    left = np.ones(near.shape[0])
+    while (few := (left > 0) & (near @ left <= 2)).any():
+        left[few] = 0
+    return int(left.sum())
 
 
 def left_vector(graph: SignedDigraph) -> np.ndarray:
     """Lemma 2.3: the positive ``p`` with ``p' M(L) = 0`` and ``p' 1 = 1`` of a strongly connected graph.
 
     Computed without subtractions (Grassmann, Taksar, Heyman 1985), hence to full relative accuracy in each entry
-    however far apart the weights lie; above 3,000 nodes by a sparse factor, to its accuracy.
+    however far apart the weights lie; above 500 nodes by a sparse factor, to its accuracy.
 
     Parameters
     ----------
@@ -128,7 +223,8 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     """
     if graph.n_nodes > DENSE_NODES:
         return _sparse_left_vector(graph)
-    rate = np.abs(graph.adjacency().toarray())
+    rate = np.abs(graph.dense_laplacian())
+    np.fill_diagonal(rate, 0.0)
     rate /= rate.max(initial=0.0) or 1.0
     n = graph.n_nodes
     p = np.zeros(n)
@@ -155,8 +251,16 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
+    from lmi.iterative import solve
+
     M = sparse.csc_array(sparse.diags_array(graph.in_weight()) - abs(graph.adjacency()))
-    p = np.append(splu(sparse.csc_array(M[:-1, :-1].T)).solve(-M[[-1], :-1].toarray().ravel()), 1.0)
+    rest, last = sparse.csc_array(M[:-1, :-1].T), -M[[-1], :-1].toarray().ravel()
+    if fill_core(M) > FILL_NODES:
+        p = np.append(solve(sparse.csr_array(rest), last, rest.diagonal()), 1.0)
+    else:
+        options = {"SymmetricMode": True}
+        factor = splu(rest, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        p = np.append(factor.solve(last), 1.0)
     if not (np.isfinite(p).all() and (p > 0).all()):
         raise HypothesisError("no positive left vector was found in float64")
     return p / p.sum()
@@ -216,7 +320,7 @@ def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) ->
         raise HypothesisError("a(L) is defined for structurally balanced graphs; this one has a negative cycle")
     p = left_vector(graph) if p is None else p
     half = np.sqrt(p)
-    S = half[:, None] * graph.laplacian().toarray() / half
+    S = half[:, None] * graph.dense_laplacian() / half
     return float(np.linalg.eigvalsh((S + S.T) / 2)[1])
 
 

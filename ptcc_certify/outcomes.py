@@ -204,7 +204,9 @@ class Outcome:
         return f"Outcome({shown}{', ...' if len(self.labels) > 8 else ''})"
 
 
-def outcome(structure: Structure, x0: Sequence[Any], *, exact: bool | None = None) -> Outcome:
+def outcome(
+    structure: Structure, x0: Sequence[Any], *, exact: bool | None = None, matrix: Influence | None = None
+) -> Outcome:
     """Compute the state at the deadline, ``Q x0``.
 
     Parameters
@@ -214,6 +216,8 @@ def outcome(structure: Structure, x0: Sequence[Any], *, exact: bool | None = Non
         In node order; ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
     exact : bool, optional
         See :func:`influence`.
+    matrix : Influence, optional
+        ``Q``, if it is known already.
 
     Returns
     -------
@@ -232,7 +236,7 @@ def outcome(structure: Structure, x0: Sequence[Any], *, exact: bool | None = Non
     (Fraction(1, 1), Fraction(-5, 4), Fraction(2, 1))
     """
     start = exact_start(structure, x0)
-    matrix = influence(structure, exact=exact)
+    matrix = influence(structure, exact=exact) if matrix is None else matrix
     final, values = matrix.apply(start if matrix.exact else [float(x) for x in start])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     size = max((abs(float(x)) for x in start), default=0.0)
@@ -262,6 +266,9 @@ def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], nam
         raise ParameterError(f"the start {name} has {len(x0)} values for {len(labels)} agents")
     start = []
     for label, value in zip(labels, x0, strict=True):
+        if type(value) is Fraction:
+            start.append(value)
+            continue
         try:
             start.append(as_fraction(value, f"{name} of agent {label}"))
         except NumberError as error:

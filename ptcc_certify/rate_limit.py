@@ -19,7 +19,7 @@ import numpy as np
 
 from lmi.exact import prove_positive_definite, round_to_bits
 from ptcc_certify.error_system import rounded_matrix
-from ptcc_certify.lemmas import EXACT_NODES
+from ptcc_certify.lemmas import EXACT_NODES, component_blocks, single_followers
 from ptcc_certify.rationals import format_exact
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import Matrix, multiply
@@ -88,23 +88,19 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
 
     Components of more than ``EXACT_NODES`` nodes are left out: the bound holds, but may not be sharp.
     """
-    L = structure.graph.laplacian().tocsr()
     balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
-    number = structure.strong_component
-    sizes = np.bincount(number)
-    diagonal = L.diagonal()
-    best = None
-    single = np.flatnonzero((sizes[number] == 1) & (diagonal > 0) & np.isfinite(diagonal))
+    best, weight = None, structure.graph.in_weight()
+    single = single_followers(structure)
+    single = single[np.isfinite(weight[single])]
     if single.size:
-        node = int(single[np.argmin(diagonal[single])])
-        best = ((node,), float(diagonal[node]), 1)
-    order = np.argsort(number, kind="stable")
-    for nodes in np.split(order, np.cumsum(sizes)[:-1]):
-        if not 1 < nodes.size <= EXACT_NODES:
+        node = int(single[np.argmin(weight[single])])
+        best = ((node,), float(weight[node]), 1)
+    for nodes, block in component_blocks(structure):
+        if nodes.size > EXACT_NODES:
             continue
         skipped = int(int(nodes[0]) in balanced)
         try:
-            parts = np.sort(np.linalg.eigvals(L[nodes][:, nodes].toarray()).real)[skipped:]
+            parts = np.sort(np.linalg.eigvals(block.toarray()).real)[skipped:]
         except np.linalg.LinAlgError:
             continue
         if parts.size and np.isfinite(parts[0]) and parts[0] > 0 and (best is None or parts[0] < best[1]):

@@ -71,7 +71,7 @@ class SharpMember:
         Class: ``perron``, ``lmi`` or ``full``.
     nodes : tuple of int
     diagonal : tuple of Fraction or None
-        Of a diagonal ``P``.
+        Of a diagonal ``P`` that is proved as a whole.
     matrix : rows of Fractions or None
         Of a full ``P``.
     rate : Fraction
@@ -81,7 +81,7 @@ class SharpMember:
     numerical_rate : float
         The rate of the matrix before it was rounded, in floating point.
     dominance : DominantMember or None
-        Of a large graph: what proves the rate row by row.
+        Of a large graph: the diagonal ``P``, and what proves the rate row by row.
     """
 
     kind: str
@@ -196,9 +196,9 @@ def sharpen_large(structure: Structure, clocks: Sequence[float]) -> Sharpening:
         return Sharpening()
     members = {}
     for m in found:
-        low, high = min(m.diagonal), max(m.diagonal)
+        nodes, low, high = tuple(m.nodes.tolist()), m.lowest, m.highest
         candidate = Candidate("perron", float(m.rate), float(high / low))
-        members[candidate] = SharpMember("perron", m.nodes, m.diagonal, None, m.rate, low, high, float(m.rate), m)
+        members[candidate] = SharpMember("perron", nodes, None, None, m.rate, low, high, float(m.rate), m)
     chosen = choose(list(members), clocks)
     tried = {"perron": max(c.rate for c in members)}
     return Sharpening(tuple(members[c] for c in chosen), tried)

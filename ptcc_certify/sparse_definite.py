@@ -194,19 +194,21 @@ def residual_definite(
     *,
     power: int = 0,
     weights: Any = None,
+    scale: int = 1,
     numpy: bool | None = None,
 ) -> bool:
     """Check that a rounded sparse factor proves a symmetric matrix positive definite, in integers.
 
     With ``T_ij = 2^(exponents_i + exponents_j + power) S_ij`` and ``E = 2^(2 bits) T[order, order] - R R'``, formed
     exactly, True means ``E_ii d_i > sum_j |E_ij| d_j`` for all rows, ``d`` positive. Then ``E > 0``, ``R R' >= 0``, and
-    ``S > 0``. Whether ``R`` is a good factor, and scaling and order good ones, decides only if it succeeds.
+    ``S > 0``. Whether ``R`` is a good factor, and scaling and order good ones, decides only if it succeeds. For a
+    rational ``S`` the entries are those of ``scale S``, and ``scale E`` is formed.
 
     Parameters
     ----------
     n : int
     entries : (rows, columns, values)
-        The lower triangle of ``S`` in ints, ``row >= column``; repeated entries add up.
+        The lower triangle of ``scale S`` in ints, ``row >= column``; repeated entries add up.
     order : n ints
         A permutation of 0 to n - 1.
     factor : (indptr, indices, data)
@@ -217,6 +219,8 @@ def residual_definite(
         For ``S`` over a scale: the exponents may be those of another multiple of it.
     weights : n ints, optional
         ``d`` in the order of elimination. Default: all 1.
+    scale : int
+        Positive.
     numpy : bool, optional
         Default: NumPy if the data of the factor are an array, otherwise the standard library.
 
@@ -238,7 +242,7 @@ def residual_definite(
     """
     try:
         columns = [*entries, order, *factor, exponents, [1] * n if weights is None else weights]
-        if len(columns) != 9 or type(bits) is not int or type(power) is not int:
+        if len(columns) != 9 or {type(bits), type(power), type(scale)} != {int} or scale <= 0:
             return False
         wanted = hasattr(columns[6], "dtype") if numpy is None else numpy
         columns = [x.tolist() if hasattr(x, "tolist") else list(x) for x in columns]
@@ -263,7 +267,7 @@ def residual_definite(
         return True
     if max(bits, abs(power), *map(abs, exponents)) > LARGEST_SHIFT:
         return False
-    # 2^(2 bits + up) T in integers, the lower triangle in the order of elimination
+    # scale 2^(2 bits + up) T in integers, the lower triangle in the order of elimination
     place = [0] * n
     for k, node in enumerate(order):
         place[node] = k
@@ -274,14 +278,14 @@ def residual_definite(
         a, b = place[i], place[j]
         T[(a, b) if a >= b else (b, a)] += value << (shift + up)
     judge = _residual_numpy if wanted else _residual_plain
-    return judge(n, T, (indptr, indices, data), up, weights)
+    return judge(n, T, (indptr, indices, data), scale << up, weights)
 
 
 Triangle = dict[tuple[int, int], int]
 Factor = tuple[list[int], list[int], list[int]]
 
 
-def _residual_plain(n: int, T: Triangle, factor: Factor, up: int, d: Sequence[int]) -> bool:
+def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     indptr, indices, data = factor
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(n)]
     for k in range(n):
@@ -290,8 +294,8 @@ def _residual_plain(n: int, T: Triangle, factor: Factor, up: int, d: Sequence[in
             row = E[i]
             for j, y in part[:number]:
                 row[j] -= x * y
-    if up:
-        E = [{j: value << up for j, value in row.items()} for row in E]
+    if times != 1:
+        E = [{j: value * times for j, value in row.items()} for row in E]
     for (i, j), value in T.items():
         E[i][j] = E[i].get(j, 0) + value
     spare = [0] * n
@@ -305,12 +309,12 @@ def _residual_plain(n: int, T: Triangle, factor: Factor, up: int, d: Sequence[in
     return min(spare) > 0
 
 
-def _residual_numpy(n: int, T: Triangle, factor: Factor, up: int, d: Sequence[int]) -> bool:
+def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     """Check as :func:`_residual_plain`: leading columns pair by pair, trailing ones as a dense block of slices."""
     import numpy as np
 
     if max(map(abs, factor[2]), default=0) > INT64_SAFE:
-        return _residual_plain(n, T, factor, up, d)
+        return _residual_plain(n, T, factor, times, d)
     indptr, indices, data = (np.array(x, dtype=np.int64) for x in factor)
     counts = np.diff(indptr)
     left = n - np.arange(n + 1.0)
@@ -325,15 +329,15 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, up: int, d: Sequence[in
     squares = _slice_products(_slices_of(corner, width, slices))
     sums = _pair_products(n, first, indptr, indices, _slices_of(data, width, slices))
     if squares is None or sums is None:
-        return _residual_plain(n, T, factor, up, d)
+        return _residual_plain(n, T, factor, times, d)
     block = sum(square.astype(object) << (width * m) for m, square in enumerate(squares))
     keys, limbs = sums
     values = sum(limb.astype(object) << (width * m) for m, limb in enumerate(limbs))
 
-    E = defaultdict(int, {key: -(value << up) for key, value in zip(keys.tolist(), values.tolist(), strict=True)})
+    E = defaultdict(int, {key: -value * times for key, value in zip(keys.tolist(), values.tolist(), strict=True)})
     for (i, j), value in T.items():
         E[i * n + j] += value
-    block = -(block << up) if block.size else block
+    block = -block * times if block.size else block
     spare = [0] * n
     for key, value in E.items():
         i, j = divmod(key, n)

@@ -77,8 +77,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     lines += _sliding_lines(certificate)
     if certificate.outcome is not None:
         kind = "exact" if certificate.outcome.exact else "floating point"
-        if certificate.enclosed is not None and certificate.enclosed.final is not None:
-            widest = max(radius for _, radius in certificate.enclosed.final)
+        if certificate.enclosed is not None and certificate.enclosed.radius is not None:
+            widest = Fraction(float(certificate.enclosed.radius.max())) * certificate.enclosed.unit
             kind = f"to within {_up(widest, 2)}, proved" if widest else "exact"
         lines.append(_line("ends at", f"{_pairs(graph.labels, certificate.outcome.final_state)} ({kind})"))
         if certificate.outcome.degenerate:

@@ -44,7 +44,7 @@ class Trajectory:
         How far from settled the state at ``T`` is: the larger of ``max_k |e_k|/(2 D_k)`` and of the change over the
         last doubling of ``tau``, relative to the largest entry of the start. None if ``T`` was not reached.
     stats : mapping
-        ``steps``, ``rhs`` (evaluations of the right-hand side), ``seconds``.
+        ``steps``, ``rhs`` (evaluations of the right-hand side, and of its derivatives in GMRES), ``seconds``.
     """
 
     graph: SignedDigraph

@@ -6,6 +6,7 @@ import ast
 import contextlib
 import copy
 import hashlib
+import io
 import json
 import os
 import re
@@ -25,11 +26,13 @@ import numpy as np
 import pytest
 from generators import all_classes, random_graph
 from mutations import Json, changed, mutants, resealed, same_claim
+from side_files import Side, with_factors, with_side_files
 
 import ptcc_certify
-from ptcc_certify import checker, document
+from ptcc_certify import certificate as certificate_module
+from ptcc_certify import checker, document, outcomes
 from ptcc_certify.certificate import Certificate, certify
-from ptcc_certify.checker import check
+from ptcc_certify.checker import check, digraph
 from ptcc_certify.definite import arithmetic
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
@@ -155,10 +158,10 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
     """A wrong claim that slips in anywhere before the JSON ends as undecided, with a note."""
     honest = document.certificate_document
 
-    def lying(certificate: Any, verdict: str) -> Json:
-        data = honest(certificate, verdict)
+    def lying(certificate: Any, verdict: str, files: bool = False) -> tuple[Json, Any]:
+        data, written = honest(certificate, verdict, files)
         rate = Fraction(data["rates"]["limit"]) * 2
-        return resealed({**data, "rates": {**data["rates"], "certified": str(rate)}})
+        return resealed({**data, "rates": {**data["rates"], "certified": str(rate)}}), written
 
     monkeypatch.setattr("ptcc_certify.certificate.certificate_document", lying)
     cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
@@ -166,10 +169,11 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
     assert "does not accept" in cert.notes[0] and "rates" in cert.notes[0]
 
 
-def test_a_graph_beyond_exact_arithmetic_is_undecided_and_accepted_as_such():
-    graph = SignedDigraph.from_edges([(i, (i + 1) % 130, 1 if i else -1) for i in range(130)])
+def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
+    pair = [("a", "x", "1e-17"), ("x", "y", 1), ("y", "x", 1)]
+    graph = SignedDigraph.from_edges([*pair, *(("x", f"f{i}", 1) for i in range(130))])
     data = json.loads(certify(graph, NOMINAL, simulation=False).to_json())
-    assert data["verdict"] == "undecided" and data["outcome"]["final_state"] is None
+    assert data["verdict"] == "undecided"
     accepted(data)
     rejected({**data, "verdict": "certified"}, "verdict")
 
@@ -219,7 +223,7 @@ def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monke
 
 
 def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "MANY_EDGES", 5)
+    monkeypatch.setattr(document, "LONG", 5)
     for k, name in enumerate(("fig1a", "fig3b")):
         graph = load_graph(name)
         if k:  # floats
@@ -259,7 +263,9 @@ OF_ITS_OWN_RIGHT = (
 )
 
 
-def judge(data: Json, every: int, start: int, long: bool) -> tuple[Counter[str], list[str]]:
+def judge(
+    data: Json, every: int, start: int, long: bool, files: dict[str, bytes] | None = None
+) -> tuple[Counter[str], list[str]]:
     """Check mutants as they are and resealed; return what rejected them, and what a forger would get through."""
     stops: Counter[str] = Counter()
     passed = []
@@ -267,7 +273,7 @@ def judge(data: Json, every: int, start: int, long: bool) -> tuple[Counter[str],
     for path, mutant in mutants(data, every, start, long):
         if same_claim(mutant, data):
             continue
-        report = check(mutant, stdlib=True)
+        report = check(mutant, stdlib=True, files=files)
         assert not report.accepted, path
         assert report.rejected
         stops[re.sub(r"\d+", "k", report.rejected)] += 1
@@ -583,6 +589,224 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
     assert (cert.reaching[0].z is not None) == provable
 
 
+# ---------------------------------------------------------------------- vectors in side files
+
+
+@cache
+def large(name: str, seed: int = 3, slides: bool = False) -> Json:
+    """The JSON of a certificate of a small graph that is treated as a large one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(certificate_module, "EXACT_NODES", 0)
+        patch.setattr(outcomes, "EXACT_NODES", 0)
+        return made.__wrapped__(name, seed, slides)
+
+
+def accepted_beside(data: Json, files: dict[str, bytes]) -> None:
+    """By the standard library, and by arrays however few edges there are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(digraph, "MANY_EDGES", 0)
+        for stdlib in (True, False):
+            report = check(data, stdlib=stdlib, files=files)
+            assert report.accepted, (report.rejected, report.reason)
+
+
+def rejected_beside(data: Json, files: dict[str, bytes], where: str, because: str = "") -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(digraph, "MANY_EDGES", 0)
+        for stdlib in (True, False):
+            report = check(resealed(data), stdlib=stdlib, files=files)
+            assert not report.accepted
+            assert re.match(where, report.rejected or ""), (report.rejected, report.reason)
+            assert re.search(because, report.reason or ""), report.reason
+
+
+def side_vectors(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
+    """Where side vectors stand."""
+    if isinstance(value, dict) and type(value.get("count")) is int and "file" in value:
+        return [path]
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [found for key, item in items for found in side_vectors(item, (*path, key))]
+
+
+@pytest.mark.parametrize(("name", "slides"), [(name, bool(k % 2)) for k, name in enumerate(CLASSES)])
+def test_every_class_is_accepted_with_vectors_beside_it(name: str, slides: bool):
+    """In the large form, by lists and by arrays; with the arrays alone too."""
+    data = large(name, 3, slides)
+    moved, files = with_side_files(data)
+    assert len(side_vectors(moved)) >= 4
+    accepted_beside(moved, files)
+    accepted_beside(data, {})
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_the_small_form_is_accepted_with_vectors_beside_it(name: str, slides: bool):
+    accepted_beside(*with_side_files(made(name, 5, slides)))
+
+
+@pytest.mark.parametrize(("name", "slides"), [("2.1 K>=2", True), ("3.1 mixed", False)])
+def test_side_vectors_that_are_odd_are_rejected(name: str, slides: bool):
+    data, files = with_side_files(large(name, 5, slides))
+    side, kinds = Side(), set()
+    for path in side_vectors(data):
+        said: Any = data
+        for key in path:
+            said = said[key]
+        values = np.load(io.BytesIO(files[said["file"]])).tolist()
+        floats, count = any(isinstance(x, float) for x in values), said["count"]
+        kinds.add((path[-1], floats))
+
+        def put(values: list[Any], path: Any = path, **other: Any) -> Json:
+            return changed(data, path, {**side.column(values), "count": len(values), **other})
+
+        assert count == len(values)
+        for count_said in (count - 1, count + 1, -1, True, str(count)):
+            rejected_beside(changed(data, path, {**said, "count": count_said}), files, ".*")
+        for wrong in ({**said, "sha256": "0" * 64}, {**said, "file": "../x.npy"}, {**said, "more": None}, None, [], {}):
+            rejected_beside(changed(data, path, wrong), files, ".*")
+        for content in (b"", files[said["file"]][:-8], files[said["file"]][:-1] + b"\x07"):
+            rejected_beside(data, {**files, said["file"]: content}, ".*", "is not what its hash says")
+        rejected_beside(data, {k: v for k, v in files.items() if k != said["file"]}, ".*", "cannot be read")
+        both = {**files, **side.files}
+        odd: list[Json] = [put(values[:-1]), put([*values, values[-1]])]
+        if path[-1] in ("leaders", "followers", "nodes"):
+            odd += [put([x, *values[1:]]) for x in (-1, 10**6, -(2**63), values[-1] if count > 1 else -2)]
+            odd += [put(list(map(float, values))), put(values, scale="1")]
+        else:
+            odd += [put([x, *map(float, values[1:])]) for x in (float("nan"), float("inf"))]
+            odd += [put(values, scale=x) for x in ("0", "-1", "nan", 1, None)]
+            odd += [put(list(map(float, values)), scale="1")]
+        if path[-1] in ("radius", "diagonal", "vector", "u"):
+            odd += [put([-abs(x) - 1, *values[1:]]) for x in values[:1]]
+        for mutant in odd:
+            rejected_beside(mutant, {**files, **side.files, **both}, ".*")
+    assert {key for key, _ in kinds} >= {"leaders", "followers", "nodes", "diagonal", "vector", "mid", "radius", "u"}
+
+
+def test_a_state_of_vectors_is_that_state_and_no_other():
+    data, files = with_side_files(large("3.1 mixed", 5))
+    side = Side()
+    final = data["outcome"]["final_state"]
+    mids, radii = (np.load(io.BytesIO(files[final[key]["file"]])).tolist() for key in ("mid", "radius"))
+    for v in range(len(mids)):
+        moved = [*mids[:v], mids[v] + max(3 * radii[v], 1e-7), *mids[v + 1 :]]
+        wide = [*radii[:v], 1e3, *radii[v + 1 :]]
+        for key, values in (("mid", moved), ("radius", wide)):
+            mutant = changed(data, ("outcome", "final_state", key), side.integers(values))
+            rejected_beside(mutant, {**files, **side.files}, "outcome of graph", "ends elsewhere|wider")
+    alone = changed(data, ("outcome", "final_state", "radius"), ["0"] * len(mids))
+    rejected_beside(alone, files, "outcome of graph", "not a side vector")
+
+
+def test_labels_that_are_the_keys_of_a_side_vector():
+    """Agents named "file", "sha256", "count", "mid" and "radius" have their numbers all the same."""
+    names = ["file", "sha256", "count", "mid", "radius", "scale"]
+    graph = SignedDigraph.from_edges([(names[i], names[i + 1], 1 - 2 * (i % 2)) for i in range(5)])
+    data = json.loads(certify(graph, NOMINAL, [1, 2, 3, 4, 5, 6], simulation=False).to_json())
+    accepted(data)
+    accepted_beside(*with_side_files(data))
+
+
+def test_many_components_are_numbered(tmp_path: Path):
+    pairs = [(f"a{i}", f"b{i}", -1) for i in range(checker.MANY_COMPONENTS + 5)]
+    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, simulation=False).to_json())
+    data, files = with_side_files(data)
+    accepted_beside(data, files)
+    path = ("components", "nodes")
+    number = np.load(io.BytesIO(files[data["components"]["nodes"]["file"]])).tolist()
+    side = Side()
+    for wrong in ([0] * len(number), [-1, *number[1:]], number[::-1], [k + 1 for k in number]):
+        mutant = changed(data, path, side.integers(wrong))
+        rejected_beside(mutant, {**files, **side.files}, "claim of graph", "other components")
+    for name, content in files.items():  # and from a folder
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "c.json").write_text(json.dumps(data))
+    assert check(tmp_path / "c.json").accepted
+    assert not check(data, files={}).accepted
+
+
+@pytest.mark.parametrize(("name", "slides"), [("3.1 mixed", True), ("2.2", False)])
+def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slides: bool):
+    data, files = with_side_files(with_factors(large(name, 5, slides)))
+    stops, passed = judge(data, 23, 0, False, files)
+    assert sum(stops.values()) > 20
+    # Of the paper's function nothing is proved there.
+    assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT + r"|paper\.blocks", path)] == []
+
+
+# ---------------------------------------------------------------------- factors of leader groups
+
+
+@pytest.mark.parametrize("aside", [False, True])
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 no single"])
+def test_groups_are_proved_by_factors(name: str, aside: bool):
+    data = with_factors(large(name, 5))
+    found = [g for step in data["proof"] if step["kind"] == "dominance" for g in step["witness"]["groups"]]
+    assert found and all(isinstance(g, dict) for g in found)
+    accepted_beside(*(with_side_files(data) if aside else (data, {})))
+
+
+@pytest.mark.parametrize("name", ["1.1", "2.2", "3.1 mixed"])
+def test_factors_that_are_odd_are_rejected(name: str):
+    data = with_factors(large(name, 5))
+    at = proof_step(data, "dominance")
+    for k, entry in enumerate(data["proof"][at]["witness"]["groups"]):
+        path = ("proof", at, "witness", "groups", k)
+        factor = entry["factor"]
+        n = len(factor["order"])
+        wrong: list[Json] = [
+            {**factor, "data": [2 * x for x in factor["data"]]},
+            {**factor, "indptr": [*factor["indptr"][:-1], factor["indptr"][-1] - 1]},
+            {**factor, "indptr": [*factor["indptr"][:-1], -1]},
+            {**factor, "indptr": [*factor["indptr"][:-1], 10**12]},
+            {**factor, "indices": [x + 1 for x in factor["indices"]]},
+            {**factor, "order": [0] * n if n > 1 else [1]},
+            {**factor, "order": [*factor["order"][:-1], n]},
+            {**factor, "bits": factor["bits"] - 1},
+            {**factor, "bits": -1},
+            {**factor, "bits": True},
+            {**factor, "bits": 10**9},
+            {**factor, "power": factor["power"] - 1},
+            {**factor, "power": "0"},
+            {**factor, "power": -(10**9)},
+            {**factor, "exponents": [10**9] * n},
+            {**factor, "exponents": [x - 1 for x in factor["exponents"]]},
+            {**factor, "exponents": factor["exponents"][1:]},
+            {**factor, "weights": [0] * n},
+            {**factor, "weights": [1.0] * n},
+            {**factor, "weights": [1] * (n + 1)},
+            {**factor, "scale": 1},
+            {key: value for key, value in factor.items() if key != "weights"},
+        ]
+        for one in wrong:
+            rejected_beside(changed(data, (*path, "factor"), one), {}, "dominance of")
+        for rate in (str(Fraction(entry["rate"]) * Fraction(101, 100)), "1e9", None):
+            rejected_beside(changed(data, (*path, "rate"), rate), {}, "dominance of")
+        rejected_beside(changed(data, path, {"rate": entry["rate"]}), {}, "dominance of")
+        accepted_beside(resealed(changed(data, (*path, "factor", "weights"), [1] * n)), {})
+
+
+def test_the_work_of_a_factor_is_bounded(monkeypatch: pytest.MonkeyPatch):
+    data = with_factors(large("2.2", 5))
+    monkeypatch.setattr("ptcc_certify.definite.Standard.products", 3)
+    report = check(data, stdlib=True)
+    assert report.rejected == "dominance of lyapunov.members[0]" and "products; standard library takes 3" in (
+        report.reason or ""
+    )
+    monkeypatch.setattr("ptcc_certify.checker.lyapunov.LARGEST_PRODUCT", 3)
+    report = check(with_factors(large("1.1", 5)))
+    assert "too many edges" in (report.reason or "")
+
+
+def test_what_is_proved_once_holds_for_all_multiples_of_the_weights():
+    """Groups are not proved anew for each member; another rate or other weights are."""
+    data = with_factors(large("2.2", 5))
+    steps = [k for k, step in enumerate(data["proof"]) if step["kind"] == "dominance"]
+    assert len(steps) > 1
+    entry = data["proof"][steps[1]]["witness"]["groups"][0]
+    higher = {**entry, "rate": str(Fraction(entry["rate"]) * 2)}
+    rejected_beside(changed(data, ("proof", steps[1], "witness", "groups", 0), higher), {}, r"dominance of .*\[1\]")
+
+
 # ---------------------------------------------------------------------- limits
 
 
@@ -691,6 +915,7 @@ def test_numbers_outside_the_grammar_are_rejected(text: str):
 STANDARD = {
     "__future__",
     "array",
+    "bisect",
     "collections",
     "collections.abc",
     "contextlib",

@@ -16,8 +16,10 @@ import pytest
 from generators import all_classes, random_graph, smallest
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, containers, leaves
+from side_files import with_factors, with_side_files
 
-from ptcc_certify import checker, document
+from ptcc_certify import certificate as certificate_module
+from ptcc_certify import checker, document, outcomes
 from ptcc_certify.certificate import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.reading import RejectedError, exact
@@ -127,13 +129,42 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
 
 
 def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "MANY_EDGES", 1)
+    monkeypatch.setattr(document, "LONG", 1)
     certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, simulation=False).save(tmp_path / "c.json")
     data = checker.read(tmp_path / "c.json")
     VALIDATOR.validate(data)
     assert isinstance(data["graph"]["edges"], dict)
     assert not valid(changed(data, ("graph", "edges", "source", "file"), "../x.npy"))
     assert not valid(changed(data, ("graph", "edges", "count"), "2"))
+
+
+def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(certificate_module, "EXACT_NODES", 0)
+    monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
+    data, _ = with_side_files(with_factors(made.__wrapped__("3.1 mixed", True, "best")))
+    VALIDATOR.validate(data)
+    assert depth({**data, "unverified": {}}) <= 8
+    step = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "dominance")
+    for path in (
+        ("structure", "leaders"),
+        ("initial_state",),
+        ("outcome", "final_state", "mid"),
+        ("proof", step, "witness", "vector"),
+        ("lyapunov", "members", 0, "blocks", 0, "diagonal"),
+    ):
+        said = at(data, path)
+        assert not valid(changed(data, path, {**said, "count": str(said["count"])})), path
+        assert not valid(changed(data, path, {**said, "scale": 1})), path
+        assert not valid(changed(data, path, {**said, "more": None})), path
+    path = ("proof", step, "witness", "groups", 0)
+    entry = at(data, path)
+    for new in (
+        {"rate": entry["rate"]},
+        {**entry, "more": 1},
+        {**entry, "factor": {**entry["factor"], "bits": "1"}},
+        {**entry, "factor": {**entry["factor"], "data": [0.5]}},
+    ):
+        assert not valid(changed(data, path, new))
 
 
 @pytest.mark.parametrize(("name", "slides"), SAMPLE)

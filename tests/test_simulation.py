@@ -2,6 +2,8 @@
 
 import csv
 import io
+import os
+import signal
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
@@ -96,12 +99,63 @@ def test_a_deadline_called_settled_is_the_limit(n, seed, decades):
         assert run.deadline_residual > 1e-9
 
 
-def test_a_large_graph_is_solved_by_gmres_as_accurately():
-    rng = np.random.default_rng(0)
-    graph, start = random_graph(rng, 500), rng.uniform(-1, 1, 500)
-    run = simulate(graph, EXAMPLE_1, start)
-    reached = expm_multiply(-graph.laplacian().tocsc() * run.clock[run.deadline_index - 1], start)
-    assert spread(run.states[:, run.deadline_index - 1], reached) < 1e-8
+def sparse_graph(rng, n, decades, links=4):
+    """A tenth of the agents listen to nobody, the others to random ones."""
+    target = np.repeat(np.arange(n // 10, n), links)
+    source = (target + rng.integers(1, n, target.size)) % n
+    size = 10 ** rng.uniform(-decades / 2, decades / 2, target.size) * rng.choice([-1, 1], target.size)
+    W = sparse.coo_array((size, (target, source)), shape=(n, n)).tocsr()
+    return SignedDigraph.from_matrix(W)
+
+
+@pytest.mark.parametrize(("n", "decades"), [(500, 0), (500, 3), (10_000, 0)])
+def test_a_large_graph_is_solved_by_gmres_as_accurately(n, decades):
+    rng = np.random.default_rng(n)
+    graph, start = sparse_graph(rng, n, decades), rng.uniform(-1, 1, n)
+    run = simulate(graph, EXAMPLE_1, start, times=["0.3", "0.59", Fraction(599999, 10**6)])
+    L, clock, state = graph.laplacian().tocsc(), 0.0, start
+    for i in range(3):
+        state, clock = expm_multiply(-L * (run.clock[i] - clock), state), run.clock[i]
+        assert spread(run.states[:, i], state) < 1e-8
+
+
+def test_a_large_stiff_graph_settles_in_few_steps():
+    """With CasADi's 10 Krylov vectors it took 6,640 steps."""
+    rng = np.random.default_rng(1)
+    run = simulate(sparse_graph(rng, 300, 5), NominalProtocol(1, 1, 1, 2), rng.uniform(-1, 1, 300))
+    assert run.deadline_residual < 1e-10
+    assert run.stats["steps"] < 3000
+
+
+def test_columns_of_a_large_graph_evolve_apart():
+    rng = np.random.default_rng(2)
+    graph, start = sparse_graph(rng, 300, 1), rng.normal(size=(300, 2))
+    run = simulate(graph, EXAMPLE_1, start, times=["0.3", "0.6"])
+    for column in range(2):
+        alone = simulate(graph, EXAMPLE_1, start[:, column], times=["0.3", "0.6"])
+        assert spread(run.states[:, column], alone.states) < 5e-9
+
+
+@pytest.fixture
+def alarm_interrupts():
+    """Let an alarm act like Ctrl-C."""
+    before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    yield
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no alarms")
+@pytest.mark.usefixtures("alarm_interrupts")
+@pytest.mark.parametrize("n", [50, 5000])
+def test_an_interrupt_is_no_failure_of_the_integrator(n):
+    rng = np.random.default_rng(3)
+    graph, start = sparse_graph(rng, n, 6), rng.uniform(-1, 1, n)
+    handler = signal.getsignal(signal.SIGINT)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            simulate(graph, EXAMPLE_1, start)
+    assert signal.getsignal(signal.SIGINT) is handler
 
 
 def test_the_deadline_is_reached_continuously_and_what_has_settled_stays():

@@ -3,7 +3,8 @@
 Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from its edges, and checks every claim
 outside ``unverified``, step by step as the proof lists them. Imports the standard library and three modules on exact
 arithmetic, nothing that makes certificates; python-flint and NumPy are used where they are installed. ``FORMAT.md``
-specifies the file. The modules, in the order of the proof: ``reading``, ``structure``, ``outcome``, ``lyapunov``.
+specifies the file. The modules, in the order of the proof: ``reading``, ``vectors``, ``digraph``, ``structure``,
+``outcome``, ``lyapunov``.
 
     python -m ptcc_certify.checker certificate.json [--stdlib]
 """
@@ -21,6 +22,7 @@ from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement
 from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
 from ptcc_certify.checker.structure import MANY_COMPONENTS
+from ptcc_certify.checker.vectors import SideFiles
 from ptcc_certify.errors import FormatError
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]"
@@ -41,7 +43,9 @@ __all__ = [
 ]
 
 
-def check(source: str | Path | Mapping[str, Any], *, stdlib: bool = False) -> CheckReport:
+def check(
+    source: str | Path | Mapping[str, Any], *, stdlib: bool = False, files: Mapping[str, bytes] | None = None
+) -> CheckReport:
     """Check a certificate.
 
     Parameters
@@ -49,6 +53,8 @@ def check(source: str | Path | Mapping[str, Any], *, stdlib: bool = False) -> Ch
     source : path, or the parsed JSON object
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
+    files : mapping from name to bytes, optional
+        The side files, in place of those in the folder of the certificate.
 
     Raises
     ------
@@ -64,7 +70,7 @@ def check(source: str | Path | Mapping[str, Any], *, stdlib: bool = False) -> Ch
         data, folder = dict(source), Path()
     else:
         data, folder = read(source), Path(source).parent
-    run = _Check(data, folder, stdlib)
+    run = _Check(data, SideFiles(folder, files), stdlib)
     try:
         run.everything()
     except RejectedError as error:

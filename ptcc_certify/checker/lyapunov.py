@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from operator import mul
 from typing import Any
 
 from ptcc_certify.checker.outcome import OutcomeCheck
 from ptcc_certify.checker.reading import entries, exact, fields, integers, need, same, short, shown, triangle
+from ptcc_certify.checker.vectors import Numbers, beside
+from ptcc_certify.sparse_definite import residual_definite
 
 Matrix = list[list[int]]
+Sparse = list[dict[int, int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
+#: Products of entries up to which sparse matrices are multiplied.
+LARGEST_PRODUCT = 50_000_000
 
 
 class LyapunovCheck(OutcomeCheck):
@@ -23,7 +30,7 @@ class LyapunovCheck(OutcomeCheck):
 
     def _block(self, nodes: Sequence[int]) -> Matrix:
         """Return rows and columns of ``L``, times unit."""
-        return [[self.L[i].get(j, 0) for j in nodes] for i in nodes]
+        return [[row.get(j, 0) for j in nodes] for row in map(self.digraph.row, nodes)]
 
     def _bounded_size(self, rows: int) -> None:
         """Refuse matrices for which the arithmetic at hand would take long."""
@@ -36,23 +43,23 @@ class LyapunovCheck(OutcomeCheck):
         for a, row in P.items():
             moved = [0] * self.n
             for b, weight in row.items():
-                for j, x in self.L[b].items():
+                for j, x in self.digraph.row(b).items():
                     moved[j] += weight * x
-            for i, x in self.L[a].items():
+            for i, x in self.digraph.row(a).items():
                 F[i] = [f + x * y for f, y in zip(F[i], moved, strict=True)]
         return F
 
     def _decrease(self, F: Matrix, b: Fraction, nodes: Sequence[int]) -> Matrix:
         """Return ``F L + L'F - b F`` on some nodes, times a positive integer; ``F`` is symmetric."""
-        moved = []
+        moved, L = [], [self.digraph.row(v) for v in range(self.n)]
         for row in F:
             product = [0] * self.n
-            for x, laplacian in zip(row, self.L, strict=True):
+            for x, laplacian in zip(row, L, strict=True):
                 if x:
                     for j, y in laplacian.items():
                         product[j] += x * y
             moved.append(product)
-        p, q = (b * self.unit).as_integer_ratio()
+        p, q = (b * self.digraph.unit).as_integer_ratio()
         return [[q * (moved[i][j] + moved[j][i]) - p * F[i][j] for j in nodes] for i in nodes]
 
     def _margin(self, S: Sequence[Sequence[Fraction]], m: Fraction) -> bool:
@@ -168,12 +175,13 @@ class LyapunovCheck(OutcomeCheck):
     def _null_vector(self, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
         """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term, as the paper's formula asks."""
         weight = dict(zip(nodes, p, strict=True))
-        left = {v: weight[v] * self.L[v][v] for v in nodes}
+        L = {v: self.digraph.row(v) for v in nodes}
+        left = {v: weight[v] * L[v][v] for v in nodes}
         for v in nodes:
-            for j, x in self.L[v].items():
+            for j, x in L[v].items():
                 if j != v:
                     left[j] -= weight[v] * abs(x)
-        near = all(abs(left[v]) * 10**9 <= weight[v] * self.L[v][v] for v in nodes)
+        near = all(abs(left[v]) * 10**9 <= weight[v] * L[v][v] for v in nodes)
         need(near, "the weights are not the left null vector of the comparison matrix")
 
     def _lyapunov(self, nodes: Sequence[int], weights: Sequence[Fraction]) -> list[list[Fraction]]:
@@ -181,7 +189,8 @@ class LyapunovCheck(OutcomeCheck):
         self._bounded_size(len(nodes))
         A = self._block(nodes)
         return [
-            [(weights[i] * A[i][j] + weights[j] * A[j][i]) / self.unit for j in range(len(A))] for i in range(len(A))
+            [(weights[i] * A[i][j] + weights[j] * A[j][i]) / self.digraph.unit for j in range(len(A))]
+            for i in range(len(A))
         ]
 
     def _coupled(self, gamma: dict[int, Fraction] | None, rho: Fraction) -> list[list[Fraction]]:
@@ -207,7 +216,7 @@ class LyapunovCheck(OutcomeCheck):
         need(len(ends) != 1, "one end without the other")
         if not ends:
             leading = {v for block in self.blocks if not block[3] for v in block[1]}
-            free = all(j not in leading for v in self.followers for j in self.L[v])
+            free = all(j not in leading for v in self.followers for j in self.digraph.row(v))
             need(free, "rho is bounded, since followers listen to these leaders")
             return
         need(self.open("rho-interval", "paper", list(ends)) == {**ends, "witness": None}, "other ends")
@@ -224,6 +233,7 @@ class LyapunovCheck(OutcomeCheck):
         self.at = "lyapunov"
         members = entries(fields(self.data["lyapunov"], ("members",), "lyapunov")["members"], "members")
         self.found: list[tuple[Fraction, Fraction, str, str]] = []  # rate, prefactor, class, coordinates
+        self.proved: set[tuple[int, Fraction, tuple[int, ...]]] = set()  # group, its rate and weights
         need(self.paper_rate is None or bool(members), "the paper's certificate is not among the members")
         need(bool(self.moving) or not members, "a Lyapunov function where nothing moves")
         for k, member in enumerate(members):
@@ -249,7 +259,7 @@ class LyapunovCheck(OutcomeCheck):
         """Return ``E'W E`` as a form of the state, times a scale, and the scale."""
         (scaled,), scale = integers([list(weights.values())])
         form = self._state_form({v: {v: x} for v, x in zip(weights, scaled, strict=True)})
-        return form, Fraction(scale * self.unit**2)
+        return form, Fraction(scale * self.digraph.unit**2)
 
     def _sharp(self, member: dict[str, Any], of: str) -> tuple[Matrix, Fraction]:
         """Verify rate and prefactor of a sharper Lyapunov matrix; return its form in the state and the scale."""
@@ -260,24 +270,27 @@ class LyapunovCheck(OutcomeCheck):
         shape = "lower_triangle" if kind == "full" else "diagonal"
         fields(block, ("name", "nodes", shape, "times_rho"), "a block")
         need(block["name"] == "P" and block["times_rho"] is False, "another block")
-        nodes = self._numbers(block["nodes"], "nodes of a block")
+        nodes = self._numbers(block["nodes"], "nodes of a block", len(self.moving))
         need(sorted(nodes) == self.moving, "nodes of a block")
         rate = exact(member["rate"])
         if kind == "full":
             rows = triangle(block[shape], len(nodes))
             P, common = integers(rows)
             named = {v: dict(zip(nodes, row, strict=True)) for v, row in zip(nodes, P, strict=True)}
-            form, scale = self._state_form(named), Fraction(common * self.unit**2)
+            form, scale = self._state_form(named), Fraction(common * self.digraph.unit**2)
         else:
-            weights = [exact(w) for w in entries(block[shape], shape, len(nodes))]
-            low, high = min(weights), max(weights)
-            need(low > 0, "a weight is not positive")
             following = self.data["proof"][self.next] if self.next < len(self.data["proof"]) else None
-            if isinstance(following, dict) and following.get("kind") == "dominance":
-                self._dominance(dict(zip(nodes, weights, strict=True)), rate, of)
+            dominates = isinstance(following, dict) and following.get("kind") == "dominance"
+            need(dominates or not beside(block[shape]), "a side vector where it has no place")
+            diagonal = self.files.numbers(block[shape], shape, len(nodes))
+            need(diagonal.positive(), "a weight is not positive")
+            low, high = (Fraction(end(diagonal.values)) / (diagonal.scale or 1) for end in (min, max))
+            if dominates:
+                self._dominance(nodes, diagonal, rate, of)
                 need(exact(member["prefactor"]) == high / low, "the prefactor is another")
                 self.found.append((rate, high / low, kind, "E"))
                 return [], Fraction(1)
+            weights = list(diagonal)
             form, scale = self._weighted(dict(zip(nodes, weights, strict=True)))
         need(self.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
         need(self.exact.definite(self._decrease(form, rate, self.kept)), "not proved definite")
@@ -293,41 +306,107 @@ class LyapunovCheck(OutcomeCheck):
         self.found.append((rate, high / low, kind, "E"))
         return form, scale
 
-    def _dominance(self, w: Mapping[int, Fraction], rate: Fraction, of: str) -> None:
+    def _dominance(self, nodes: Sequence[int], weights: Numbers, rate: Fraction, of: str) -> None:
         """Verify a diagonal matrix row by row: ``S_ii d_i > sum_j |S_ij| d_j``, after each leader group by itself."""
         step = self.open("dominance", of, ["b"], witness=True)
         need(step["b"] == rate, "b is not the rate")
         said = fields(step["witness"], ("vector", "groups"), "the witness")
-        nodes = list(w)
-        d = dict(zip(nodes, (exact(x) for x in entries(said["vector"], "vector", len(nodes))), strict=True))
-        need(all(x > 0 for x in d.values()), "the vector is not positive")
+        vector = self.files.numbers(said["vector"], "vector", len(nodes))
+        need(vector.positive(), "the vector is not positive")
+        (own, scale), (each, _) = (numbers.over(range(len(nodes))) for numbers in (weights, vector))
+        W, D = [0] * self.n, [0] * self.n
+        for v, w, d in zip(nodes, own, each, strict=True):
+            W[v], D[v] = w, d
         groups = [k for k, group in enumerate(self.closed) if len(group) > 1]
-        known: dict[int, Fraction] = {}  # g_k of the nodes of leader groups
-        for k, text in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True):
-            group, g = self.closed[k], exact(text)
-            kept = range(self.gauges[k] is not None, len(group))
-            S = self._group_decrease(group, [w[v] for v in group], g, kept)
-            need(self.exact.definite(S), "a leader group is not proved")
-            known.update(dict.fromkeys(group, g))
-        (weights,), _ = integers([list(w.values())])
-        (vector,), _ = integers([list(d.values())])
-        W, D = dict(zip(nodes, weights, strict=True)), dict(zip(nodes, vector, strict=True))
-        left: dict[int, Fraction | int] = {}
-        p, q = (rate * self.unit).as_integer_ratio()
+        known = {  # g_k of leader groups
+            k: self._group(k, [W[v] for v in self.closed[k]], scale, entry)
+            for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True)
+        }
+        # w_i d_i times rate, less what the others push, times q and unit
+        p, q = (rate * self.digraph.unit).as_integer_ratio()
+        heard, diagonal = self.digraph.heard(D), self.digraph.diagonal
+        pushes = [0 if k >= 0 else w * d for k, w, d in zip(self.number, W, D, strict=True)]
+        pushed = self.digraph.hearing(pushes)
         for v in nodes:
-            if v in known:
-                left[v] = ((known[v] - rate) * self.unit * q) * W[v] * D[v]
+            if self.number[v] < 0:
+                left = (2 * q * diagonal[v] - p) * pushes[v] - q * (W[v] * heard[v] + pushed[v])
             else:
-                left[v] = (2 * q * self.L[v][v] - p) * W[v] * D[v]
-        for v in nodes:
-            if v not in known:
-                own, pushed = q * W[v], q * W[v] * D[v]
-                for j, x in self.L[v].items():
-                    if j != v and j in left:
-                        left[v] -= own * abs(x) * D[j]
-                        left[j] -= abs(x) * pushed
-        need(all(x > 0 for x in left.values()), "a row is not dominated by its diagonal")
+                spare = (known[self.number[v]] - rate) * self.digraph.unit
+                left = spare.numerator * W[v] * D[v] - spare.denominator * pushed[v]
+            need(left > 0, "a row is not dominated by its diagonal")
         self.done(f"b = {shown(rate)}, {len(nodes)} rows")
+
+    def _group(self, k: int, weights: Sequence[int], scale: int, said: Any) -> Fraction:
+        """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
+        if isinstance(said, dict):
+            fields(said, ("rate", "factor"), "a leader group")
+        g, common = exact(said["rate"] if isinstance(said, dict) else said), math.gcd(*weights)
+        key = k, g, tuple(w // common for w in weights)
+        if key in self.proved:
+            return g
+        group, balanced = self.closed[k], self.gauges[k] is not None
+        if isinstance(said, dict):
+            self._factor(said["factor"], group, Fraction(common, scale), key[2], g, balanced)
+        else:
+            S = self._group_decrease(group, [Fraction(w) for w in key[2]], g, range(balanced, len(group)))
+            need(self.exact.definite(S), "a leader group is not proved")
+        self.proved.add(key)
+        return g
+
+    def _factor(
+        self, said: Any, group: Sequence[int], times: Fraction, ratios: Sequence[int], g: Fraction, balanced: bool
+    ) -> None:
+        """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
+        keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights")
+        said, n, read = fields(said, keys, "factor"), len(group) - balanced, self.files.integers
+        need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")
+        order, exponents, indptr = (
+            read(said[key], key, count) for key, count in (("order", n), ("exponents", n), ("indptr", n + 1))
+        )
+        vector = None if said["weights"] is None else read(said["weights"], "weights", n)
+        need(0 <= indptr[-1] <= n * (n + 1) // 2, "the factor has too many entries")
+        work = sum((b - a) ** 2 for a, b in pairwise(indptr))
+        need(work <= self.exact.products, f"a factor of {work} products; {self.exact.name} takes {self.exact.products}")
+        columns = indptr, *(read(said[key], key, indptr[-1]) for key in ("indices", "data"))
+        lower, scale = self._group_form(group, [times.numerator * w for w in ratios], g, balanced)
+        scale *= times.denominator
+        told: dict[str, Any] = {"power": said["power"], "weights": vector, "scale": scale, "numpy": self.exact.numpy}
+        proved = residual_definite(n, lower, order, columns, exponents, said["bits"], **told)
+        need(proved, "a leader group is not proved by its factor")
+
+    def _group_form(
+        self, group: Sequence[int], weights: Sequence[int], g: Fraction, balanced: bool
+    ) -> tuple[tuple[list[int], list[int], list[int]], int]:
+        """Return the lower triangle of ``S = W A + A'W - g W``, or of ``A'S A`` without the first node, times a scale.
+
+        The latter where the group is balanced.
+        """
+        place, unit = {v: i for i, v in enumerate(group)}, self.digraph.unit
+        A = [{place[j]: x for j, x in self.digraph.row(v).items()} for v in group]
+        p, scale = (g * unit).as_integer_ratio()
+        S: Sparse = [defaultdict(int, {i: -p * w}) for i, w in enumerate(weights)]
+        for i, row in enumerate(A):
+            for j, x in row.items():
+                S[i][j] += scale * weights[i] * x
+                S[j][i] += scale * weights[i] * x
+        rows: Iterable[dict[int, int]] = S
+        if balanced:
+            B: Sparse = [{j - 1: x for j, x in row.items() if j} for row in A]
+            columns: Sparse = [{} for _ in range(len(group) - 1)]
+            for i, row in enumerate(B):
+                for j, x in row.items():
+                    columns[j][i] = x
+            need(sum(len(B[j]) for row in S for j in row) <= LARGEST_PRODUCT, "a leader group of too many edges")
+            SB = list(multiplied(S, B))
+            need(sum(map(mul, map(len, B), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
+            rows, scale = multiplied(columns, SB), scale * unit**2
+        lower: tuple[list[int], list[int], list[int]] = [], [], []
+        for i, row in enumerate(rows):
+            for j, x in row.items():
+                if j <= i:
+                    for part, value in zip(lower, (i, j, x), strict=True):
+                        part.append(value)
+        return lower, scale * unit
 
     def _group_decrease(
         self, group: Sequence[int], weights: Sequence[Fraction], g: Fraction, kept: Sequence[int]
@@ -339,7 +418,7 @@ class LyapunovCheck(OutcomeCheck):
         columns = [list(column) for column in zip(*A, strict=True)]
         F = product(columns, [[x * y for y in row] for x, row in zip(scaled, A, strict=True)])
         FL = product(F, A)
-        p, q = (g * self.unit).as_integer_ratio()
+        p, q = (g * self.digraph.unit).as_integer_ratio()
         return [[q * (FL[i][j] + FL[j][i]) - p * F[i][j] for j in kept] for i in kept]
 
     def _distance(self, said: Any, form: Matrix, scale: Fraction, of: str) -> None:
@@ -393,11 +472,12 @@ class LyapunovCheck(OutcomeCheck):
         need(exact(self.data["rates"]["limit"]) == limit["limit"], "the limit is another")
         said = fields(limit["witness"], ("nodes", "lower_triangle", "vectors"), "the witness")
         nodes = self._numbers(said["nodes"], "nodes")
-        own = [v for v in range(self.n) if nodes and self.strong[v] == self.strong[nodes[0]]]
+        there, back = (self.digraph.reached(nodes[:1], back) for back in (False, True))
+        own = [v for v, both in enumerate(zip(there, back, strict=True)) if all(both)]
         need(nodes == own and bool(nodes), "the nodes are not a strong component")
         self._bounded_size(len(nodes))
         H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
-        p, q = (limit["limit"] / 2 * self.unit).as_integer_ratio()
+        p, q = (limit["limit"] / 2 * self.digraph.unit).as_integer_ratio()
         B = [[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(self._block(nodes))]
         HB = product(H, B)
         S = [
@@ -421,3 +501,13 @@ def product(A: Matrix, B: Matrix) -> Matrix:
     """Return ``A B``."""
     columns = list(zip(*B, strict=True))
     return [[sum(map(mul, row, column)) for column in columns] for row in A]
+
+
+def multiplied(A: Sparse, B: Sparse) -> Iterator[dict[int, int]]:
+    """Yield the rows of ``A B``."""
+    for left in A:
+        row: dict[int, int] = defaultdict(int)
+        for k, x in left.items():
+            for j, y in B[k].items():
+                row[j] += x * y
+        yield row

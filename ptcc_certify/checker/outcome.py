@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
@@ -20,6 +21,7 @@ from ptcc_certify.checker.reading import (
     shown,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
+from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.enclosure import decay_integrals_below
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -28,17 +30,25 @@ SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
 REACHING_BITS = 64
 #: An interval may be wider than twice what is proved by this share of the largest entry of the start.
 WIDEST = Fraction(1, 10**6)
+#: Bits to which the values of leader groups are rounded, beyond the common scale of states, in the large form.
+GRID_BITS = 128
+#: The voices of a group of one.
+ALONE = [(Fraction(1), Fraction(0))]
 
 
 class OutcomeCheck(StructureCheck):
     """The outcome matrix, the final state, the sliding variables."""
 
-    def _state(self, key: str) -> list[Fraction] | None:
+    def _state(self, key: str) -> Numbers | None:
         self.at, said = key, self.data[key]
-        if said is None:
-            return None
-        need(list(fields(said, self.labels, key)) == self.labels, "agents are in another order")
-        return [exact(x) for x in said.values()]
+        return None if said is None else self._by_agent(said, key)
+
+    def _by_agent(self, said: Any, what: str) -> Numbers:
+        """Read a number for every agent: an object in their order, or a side vector."""
+        if beside(said):
+            return self.files.numbers(said, what, self.n)
+        need(list(fields(said, self.labels, what)) == self.labels, "agents are in another order")
+        return Numbers([exact(x) for x in said.values()])
 
     def sliding(self) -> None:
         """Verify Proposition 1 and every reaching time."""
@@ -82,54 +92,53 @@ class OutcomeCheck(StructureCheck):
         witness = self.open("outcome", "graph", witness=True)["witness"]
         said = fields(said, ("final_state", "degenerate", "influence"), "outcome")
         parts = fields(said["influence"], ("components", "followers"), "influence")
-        u = {} if witness is None else fields(witness, ("u",), "the witness")["u"]
-        self.u = [exact(x) for x in fields(u, self.labels, "u").values()] if witness is not None else None
-        need(self.u is None or (list(u) == self.labels and all(x > 0 for x in self.u)), "u is not positive")
+        self.u = None if witness is None else self._by_agent(fields(witness, ("u",), "the witness")["u"], "u")
+        need(self.u is None or self.u.positive(), "u is not positive")
         balanced = [
             (k, g, s) for k, (g, s) in enumerate(zip(self.closed, self.gauges, strict=True), 1) if s is not None
         ]
         grouped = parts["followers"] is None  # no weights of followers: voices of groups alone, and one final state
         listed = [b for b in balanced if len(b[1]) > 1 or not grouped]
-        voice = {group[0]: [(Fraction(1), Fraction(0))] for _, group, _ in balanced}
-        for entry, (_, group, gauge) in zip(
+        voice = {}
+        for entry, (k, group, gauge) in zip(
             entries(parts["components"], "components", len(listed)), listed, strict=True
         ):
             fields(entry, ("nodes", "voices"), "a component")
             need(self._numbers(entry["nodes"], "a component") == group, "another component")
-            voice[group[0]] = [interval(x) for x in entries(entry["voices"], "voices", len(group))]
-            signed = zip(gauge, voice[group[0]], strict=True)
-            self._voices(group, [(g * x, r) for g, (x, r) in signed])
-        voices = [voice[group[0]] for _, group, _ in balanced]
-        pulls = [] if grouped else self._influence(parts["followers"], balanced)
-        if not grouped and not any(r for row in (*voices, *pulls) for _, r in row):
-            self.weights_of_leaders = balanced, voices, pulls
+            voice[k] = [interval(x) for x in entries(entry["voices"], "voices", len(group))]
+            self._voices(group, gauge, voice[k])
         if start is None:
             need(said["final_state"] is None and said["degenerate"] is None, "a final state without a start")
             need(all(final is None for _, final in self.components), "an outcome without a start")
-        else:
-            moved = [x - s for x, s in zip(start, sigma0 or [Fraction(0)] * self.n, strict=True)]
-            values = [
-                combined(voice, [(moved[v], Fraction(0)) for v in g])
-                for voice, (_, g, _) in zip(voices, balanced, strict=True)
-            ]
-            final: list[Interval] = [(Fraction(0), Fraction(0))] * self.n
-            for (_, group, gauge), (x, r) in zip(balanced, values, strict=True):
-                for v, g in zip(group, gauge, strict=True):
-                    final[v] = (g * x, r)
-            if grouped:
-                self._followers(final, said["final_state"])
+        voices = [voice[k] for k, _, _ in listed]
+        pulls = [] if grouped else self._influence(parts["followers"], balanced)
+        if not grouped and not any(r for row in (*voices, *pulls) for _, r in row):
+            self.weights_of_leaders = balanced, voices, pulls
+        widest = Fraction(0)
+        if start is not None:
+            moved = start if sigma0 is None else Numbers([x - s for x, s in zip(start, sigma0, strict=True)])
+            values = {k: combined(voice.get(k, ALONE), [(moved[v], Fraction(0)) for v in g]) for k, g, _ in balanced}
+            need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
+            need(same(said["degenerate"], [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
+            claimed, spare = self._claimed(said["final_state"]), WIDEST * moved.largest()
+            for k, (group, signs) in enumerate(zip(self.closed, self.gauges, strict=True), 1):
+                x, r = (Fraction(0), Fraction(0)) if signs is None else values[k]
+                widest = max(widest, r)
+                for v, g in zip(group, signs or [0] * len(group), strict=True):
+                    self._holds(v, claimed, (g * x, r), spare)
+            if grouped and self.followers:
+                widest = max(widest, self._followers(values, claimed, spare))
             for v, row in zip(self.followers, pulls, strict=False):
-                final[v] = combined(row, values)
-            self._final_state(said, final, WIDEST * max(map(abs, moved)))
-            need(all(abs(x) > r or r == 0 for x, r in values), "a value that may or may not be 0")
-            at_zero = [k for (k, _, _), (x, _) in zip(balanced, values, strict=True) if x == 0]
-            need(same(said["degenerate"], at_zero), "which components meet at 0")
+                x, r = combined(row, list(values.values()))
+                widest = max(widest, r)
+                self._holds(v, claimed, (x, r), spare)
+            self._outcomes(said["final_state"])
         if self.weights_of_leaders is not None:
             self.done("exact")
         elif start is None:
             self.done("influence of leader groups")
         else:
-            self.done(f"enclosed, radius at most {shown(max(r for _, r in final))}")
+            self.done(f"enclosed, radius at most {shown(widest)}")
 
     def projection(self) -> list[dict[int, Fraction]]:
         """Return the rows of ``Q``, which are exact."""
@@ -153,76 +162,121 @@ class OutcomeCheck(StructureCheck):
             self._pulls(dict(zip(group, gauge, strict=True)), [row[column] for row in pulls])
         return pulls
 
-    def _followers(self, final: list[Interval], said: Any) -> None:
-        """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
+    def _claimed(self, said: Any) -> tuple[Numbers, Numbers]:
+        """Read middles and radii of the final state: two side vectors, or intervals by agent."""
+        if isinstance(said, dict) and beside(said.get("mid")):
+            fields(said, ("mid", "radius"), "final_state")
+            need(beside(said["radius"]), "radius is not a side vector")
+            mid, radius = (self.files.numbers(said[key], key, self.n) for key in ("mid", "radius"))
+            need(all(r >= 0 for r in radius.values), "a radius is negative")
+            return mid, radius
+        need(list(fields(said, self.labels, "final_state")) == self.labels, "agents are in another order")
+        intervals = [interval(x) for x in said.values()]
+        return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])
+
+    def _holds(self, v: int, claimed: tuple[Numbers, Numbers], found: Interval, spare: Fraction) -> None:
+        """Check that an interval lies within the one that is claimed, which is not much wider."""
+        mid, radius = claimed[0][v], claimed[1][v]
+        x, r = found
+        if x == mid and r == radius:
+            return
+        if abs(x - mid) + r > radius:
+            raise RejectedError(f"agent {short(self.labels[v])} ends elsewhere")
+        if r != radius and radius > 2 * r + spare:
+            raise RejectedError(f"the interval of agent {short(self.labels[v])} is wider than what is proved")
+
+    def _followers(self, values: Mapping[int, Interval], claimed: tuple[Numbers, Numbers], spare: Fraction) -> Fraction:
+        """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``.
+
+        All in integers: states over ``grid``, to which values of leaders are rounded where they do not fit, and ``u``
+        over another scale. Returns the largest radius that is proved.
+        """
         if self.u is None:
             raise RejectedError("no witness of the enclosure")
-        claimed = fields(said, self.labels, "final_state")
-        known = [x for x, _ in final]
-        for v in self.followers:
-            known[v], _ = interval(claimed[self.labels[v]])
-        # Everything as integers: middles and radii over one denominator, u over another.
-        (X, R), scale = integers([known, [r for _, r in final]])
-        (U,), _ = integers([self.u])
-        following = set(self.followers)
+        F, graph = self.followers, self.digraph
+        (mids, scale), (radii, fine), (U, _) = (numbers.over(F) for numbers in (*claimed, self.u))
+        alone = {self.closed[k - 1][0]: x for k, (x, _) in values.items() if len(self.closed[k - 1]) == 1}
+        groups = {k: value for k, value in values.items() if len(self.closed[k - 1]) > 1}
+        (own,), other = integers([list(alone.values())])
+        grid = math.lcm(scale, other)
+        if any(r or grid % x.denominator for x, r in groups.values()):
+            grid <<= GRID_BITS
+        X, R, u = [0] * self.n, [0] * self.n, [0] * self.n
+        for v, x in zip(alone, own, strict=True):
+            X[v] = x * (grid // other)
+        for v, x, weight in zip(F, mids, U, strict=True):
+            X[v], u[v] = x * (grid // scale), weight
+        for k, (value, r) in groups.items():
+            middle = math.floor(value * grid)
+            wide = math.ceil(r * grid) + (middle != value * grid)
+            for v, g in zip(self.closed[k - 1], self.gauges[k - 1] or (), strict=True):
+                X[v], R[v] = g * middle, wide
+        diagonal, heard, pushing = graph.diagonal, graph.heard(X, signed=True), graph.heard(u)
+        blur = graph.heard(R) if any(R) else R
         worst, least = 0, 1  # max |r_i| / (M(L_F) u)_i, without the scales
-        for v in self.followers:
-            left = blur = pushed = 0
-            for j, x in self.L[v].items():
-                left += x * X[j]
-                blur += abs(x) * R[j]
-                if j in following:
-                    pushed += x * U[j] if j == v else -abs(x) * U[j]
+        for v in F:
+            pushed = diagonal[v] * u[v] - pushing[v]
             need(pushed > 0, "u is no witness")
-            if (abs(left) + blur) * least > worst * pushed:
-                worst, least = abs(left) + blur, pushed
-        for v in self.followers:
-            final[v] = (known[v], Fraction(worst * U[v], least * scale))
+            left = abs(diagonal[v] * X[v] - heard[v]) + blur[v]
+            if left * least > worst * pushed:
+                worst, least = left, pushed
+        # The radius that is proved is worst u / (least grid); all over least grid fine
+        room, share = math.floor(spare * (least * grid * fine)), least * grid
+        for v, said, weight in zip(F, radii, U, strict=True):
+            proved, radius = worst * fine * weight, share * said
+            if proved > radius:
+                raise RejectedError(f"agent {short(self.labels[v])} ends elsewhere")
+            if proved != radius and radius > 2 * proved + room:
+                raise RejectedError(f"the interval of agent {short(self.labels[v])} is wider than what is proved")
+        return Fraction(worst * max(U), share)
 
-    def _final_state(self, said: dict[str, Any], final: Sequence[Interval], spare: Fraction) -> None:
-        """Check that every interval lies within the one that is claimed, here and under ``components``."""
-        claimed = fields(said["final_state"], self.labels, "final_state")
-        need(list(claimed) == self.labels, "agents are in another order")
-        for (label, text), (x, r) in zip(claimed.items(), final, strict=True):
-            mid, radius = interval(text)
-            if not (x == mid and r == radius) and abs(x - mid) + r > radius:
-                raise RejectedError(f"agent {short(label)} ends elsewhere")
-            if r != radius and radius > 2 * r + spare:
-                raise RejectedError(f"the interval of agent {short(label)} is wider than what is proved")
+    def _outcomes(self, claimed: Any) -> None:
+        """Check the outcome of every weak component, which repeats the final state where that is no side vector."""
         for nodes, state in self.components:
-            own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
-            grouped = state is None and len(self.components) > MANY_COMPONENTS
-            need(grouped or same(state, own), "the outcome of a component")
+            if len(self.components) > MANY_COMPONENTS or beside(claimed.get("mid")):
+                need(state is None, "the outcome of a component")
+            else:
+                own = {self.labels[v]: claimed[self.labels[v]] for v in nodes}
+                need(same(state, own), "the outcome of a component")
 
-    def _voices(self, group: Sequence[int], eta: Sequence[Interval]) -> None:
-        """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1``: exactly, or within the radii."""
-        columns: list[dict[int, int]] = [{} for _ in group]  # of the comparison matrix
-        place = {v: i for i, v in enumerate(group)}
-        for i, v in enumerate(group):
-            for j, x in self.L[v].items():
-                columns[place[j]][i] = x if j == v else -abs(x)
-        mids, radii = [x for x, _ in eta], [r for _, r in eta]
+    def _voices(self, group: Sequence[int], gauge: Sequence[int], voices: Sequence[Interval]) -> None:
+        """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1``: exactly, or within the radii; all in integers."""
+        (eta, radii), scale = integers(
+            [[g * x for g, (x, _) in zip(gauge, voices, strict=True)], [r for _, r in voices]]
+        )
+        left = self._kept(group, eta)
         if not any(radii):
-            need(sum(mids) == 1, "voices do not sum to 1")
-            need(all(sum(mids[i] * x for i, x in c.items()) == 0 for c in columns), "voices are not kept by the motion")
+            need(sum(eta) == scale, "voices do not sum to 1")
+            need(not any(left), "voices are not kept by the motion")
             return
-        top = max(range(len(mids)), key=lambda i: mids[i])
-        if self.u is None or mids[top] <= 0:
+        top = max(range(len(eta)), key=eta.__getitem__)
+        if self.u is None or eta[top] <= 0:
             raise RejectedError("no witness of the enclosure")
-        z = [x / mids[top] for x in mids]
-        u = [Fraction(0) if i == top else self.u[v] for i, v in enumerate(group)]
-        error = Fraction(0)  # |exact / exact[top] - z| <= error u, since the rest of M is an M-matrix
-        for j, column in enumerate(columns):
-            if j != top:
-                pushed = sum((u[i] * x for i, x in column.items()), Fraction(0))
+        u, _ = self.u.over(group)
+        u[top] = 0
+        # |exact / exact[top] - eta / eta[top]| <= worst / (least eta[top]) u, since the rest of M is an M-matrix
+        worst, least = 0, 1
+        for i, (x, pushed) in enumerate(zip(left, self._kept(group, u), strict=True)):
+            if i != top:
                 need(pushed > 0, "u is no witness")
-                error = max(error, abs(sum((z[i] * x for i, x in column.items()), Fraction(0))) / pushed)
-        total, width = sum(z, Fraction(0)), error * sum(u, Fraction(0))
-        low, high = total - width, total + width
+                if abs(x) * least > worst * pushed:
+                    worst, least = abs(x), pushed
+        middle, width = least * sum(eta), worst * sum(u)
+        low, high = middle - width, middle + width
         need(low > 0, "voices are not enclosed")
-        for share, weight, mid, radius in zip(z, u, mids, radii, strict=True):
-            ends = (share - error * weight) / high, (share + error * weight) / low
-            need(mid - radius <= ends[0] and ends[1] <= mid + radius, "voices are not enclosed")
+        for x, weight, radius in zip(eta, u, radii, strict=True):
+            below, above = least * x - worst * weight, least * x + worst * weight
+            need(
+                (x - radius) * high <= scale * below and scale * above <= (x + radius) * low, "voices are not enclosed"
+            )
+
+    def _kept(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
+        """Return ``x' M(L_k)``, times ``unit``."""
+        sums = dict.fromkeys(group, 0)
+        for v, weight in zip(group, x, strict=True):
+            for j, a in self.digraph.row(v).items():
+                sums[j] += weight * (a if j == v else -abs(a))
+        return list(sums.values())
 
     def _pulls(self, camp: Mapping[int, int], column: Sequence[Interval]) -> None:
         """Verify ``L_F w = -L_FLk G_k 1``: exactly, or by ``|w - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
@@ -230,7 +284,7 @@ class OutcomeCheck(StructureCheck):
         known = {**{v: Fraction(g) for v, g in camp.items()}, **mids}
         left = {
             v: sum(
-                (x * known.get(j, Fraction(0)) for j, x in self.L[v].items()), Fraction(0)
+                (x * known.get(j, Fraction(0)) for j, x in self.digraph.row(v).items()), Fraction(0)
             )  # unbalanced leaders end at 0
             for v in self.followers
         }
@@ -241,7 +295,7 @@ class OutcomeCheck(StructureCheck):
             raise RejectedError(f"agent {short(self.labels[astray[0]])} is not where its neighbours pull it")
         error = Fraction(0)
         for v in self.followers:
-            row, u = self.L[v], self.u
+            row, u = self.digraph.row(v), self.u
             pushed = sum((u[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in mids), Fraction(0))
             need(pushed > 0, "u is no witness")
             error = max(error, abs(left[v]) / pushed)

@@ -18,8 +18,8 @@ from ptcc_certify.errors import FormatError
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.
 MAX_BYTES, MAX_CHARACTERS, MAX_EXPONENT, MAX_BINARY_EXPONENT = 200_000_000, 4000, 400, 1400
-#: Longest common denominator that is formed.
-MAX_SCALE_BITS = 100_000
+#: Longest common denominator that is formed, and bits that a vector may take over one.
+MAX_SCALE_BITS, MAX_TOTAL_BITS = 100_000, 8_000_000_000
 INTEGER, SIGNED = re.compile(r"[0-9]+", re.ASCII), re.compile(r"[+-]?[0-9]+", re.ASCII)
 DECIMAL = re.compile(r"([+-]?[0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
 HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,5})", re.ASCII)
@@ -193,5 +193,6 @@ def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
     scale = 1
     for row in rows:
         scale = math.lcm(scale, *{x.denominator for x in row})
-        need(scale.bit_length() <= MAX_SCALE_BITS, "the numbers have no common denominator of moderate length")
+        moderate = scale.bit_length() <= min(MAX_SCALE_BITS, MAX_TOTAL_BITS // (len(row) + 1))
+        need(moderate, "the numbers have no common denominator of moderate length")
     return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale

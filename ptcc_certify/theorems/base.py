@@ -122,12 +122,12 @@ class Obligation(Statement):
         The part of the certificate that it is about.
     numbers : mapping of str to Fraction
         The constants of the statement.
-    witness : mapping or None
-        What makes the statement easy to verify; need not be trusted.
+    witness : optional
+        What makes the statement easy to verify, JSON-ready or to be written by the document; need not be trusted.
     """
 
     numbers: Mapping[str, Fraction] = field(default_factory=dict)
-    witness: Mapping[str, Any] | None = None
+    witness: Any = None
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class Theorem(ABC):
 
 def dense_laplacian(graph: SignedDigraph) -> np.ndarray:
     """Return ``L`` as a dense float matrix."""
-    return graph.laplacian().toarray()
+    return graph.dense_laplacian()
 
 
 def float_block(L: np.ndarray, rows: Iterable[int], columns: Iterable[int]) -> np.ndarray:

@@ -1,0 +1,136 @@
+"""Long vectors of a certificate: texts in the JSON, or binary files beside it, named with their SHA-256. All exact."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import sys
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ptcc_certify.checker.reading import RejectedError, exact, fields, integers, need
+
+NPY = re.compile(r"\{'descr': '(<i8|<f8)', 'fortran_order': False, 'shape': \(([0-9]{1,12}),\), \} *\n")
+
+
+class Numbers:
+    """Rationals, each by itself or as integers over one scale.
+
+    Examples
+    --------
+    >>> x = Numbers([Fraction(1, 2), Fraction(1, 3)])
+    >>> x[1], x.over([0, 1]), Numbers([1, 4], 2).over([1])
+    (Fraction(1, 3), ([3, 2], 6), ([4], 2))
+    """
+
+    def __init__(self, values: Sequence[Any], scale: int | None = None):
+        self.values, self.scale = values, scale
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, k: int) -> Fraction:
+        return Fraction(self.values[k]) if self.scale is None else Fraction(self.values[k], self.scale)
+
+    def __iter__(self) -> Iterator[Fraction]:
+        return map(self.__getitem__, range(len(self)))
+
+    def over(self, which: Sequence[int]) -> tuple[list[int], int]:
+        """Return some of the numbers as integers over a common scale, and that."""
+        chosen: list[Any] = [self.values[k] for k in which]
+        if self.scale is not None:
+            return chosen, self.scale
+        (scaled,), scale = integers([chosen])
+        return scaled, scale
+
+    def largest(self) -> Fraction:
+        """Return the largest size."""
+        return Fraction(max(map(abs, self.values))) / (self.scale or 1)
+
+    def positive(self) -> bool:
+        """Tell whether all are positive."""
+        return all(x > 0 for x in self.values)
+
+
+def beside(said: Any) -> bool:
+    """Tell whether a value stands for a side vector: numbers and labels by agent are never JSON integers."""
+    return isinstance(said, dict) and type(said.get("count")) is int
+
+
+class SideFiles:
+    """The files that a certificate names: in its folder, or given by name.
+
+    Parameters
+    ----------
+    folder : Path
+    files : mapping from name to bytes, optional
+        In place of the folder.
+    """
+
+    def __init__(self, folder: Path, files: Mapping[str, bytes] | None):
+        self.folder, self.files = folder, files
+
+    def column(self, said: Any, count: int) -> array[Any]:
+        """Read ``{"file", "sha256"}``: a .npy vector of 64-bit integers or finite floats, little-endian."""
+        said = fields(said, ("file", "sha256"), "a side file")
+        name = said["file"]
+        need(isinstance(name, str) and re.fullmatch(r"[\w.-]{1,200}", name) is not None, "a side file's name is odd")
+        content = self._content(name, 8 * count + 1024)
+        need(hashlib.sha256(content).hexdigest() == said["sha256"], f"side file {name} is not what its hash says")
+        size = int.from_bytes(content[8:10], "little")
+        match = NPY.fullmatch(content[10 : 10 + size].decode("latin-1"))
+        fits = content[:8] == b"\x93NUMPY\x01\x00" and match is not None and int(match[2]) == count
+        need(fits and len(content) == 10 + size + 8 * count, f"side file {name} is not a vector of {count} numbers")
+        values = array(
+            "q" if match is not None and match[1] == "<i8" else "d", memoryview(content)[10 + size :].tobytes()
+        )
+        if sys.byteorder == "big":
+            values.byteswap()
+        need(values.typecode == "q" or all(map(math.isfinite, values)), f"side file {name}: a number is not finite")
+        return values
+
+    def _content(self, name: str, largest: int) -> bytes:
+        if self.files is not None:
+            need(name in self.files, f"side file {name} cannot be read")
+            return self.files[name]
+        try:
+            need((self.folder / name).is_file(), f"side file {name} cannot be read")
+            need((self.folder / name).stat().st_size <= largest, f"side file {name} is not a vector of so few numbers")
+            return (self.folder / name).read_bytes()
+        except OSError:
+            raise RejectedError(f"side file {name} cannot be read") from None
+
+    def _vector(self, said: dict[str, Any], what: str, count: int) -> array[Any]:
+        need(said["count"] == count, f"{what} has not {count} entries")
+        return self.column({key: value for key, value in said.items() if key not in ("count", "scale")}, count)
+
+    def integers(self, said: Any, what: str, count: int) -> list[int]:
+        """Return a list of JSON integers, or a side vector of integers."""
+        if beside(said):
+            need("scale" not in said, f"{what}: integers have no scale")
+            values = self._vector(said, what, count)
+            need(values.typecode == "q", f"{what}: not integers")
+            return values.tolist()
+        need(isinstance(said, list) and len(said) == count, f"{what} has not {count} entries")
+        need(all(type(x) is int for x in said), f"{what}: not integers")
+        return said
+
+    def numbers(self, said: Any, what: str, count: int) -> Numbers:
+        """Return the exact numbers of a list of texts, or of a side vector: floats, or integers over a scale."""
+        if not beside(said):
+            need(isinstance(said, list) and len(said) == count, f"{what} has not {count} entries")
+            return Numbers([exact(x) for x in said])
+        values = self._vector(said, what, count)
+        if values.typecode == "d":
+            need("scale" not in said, f"{what}: only integers have a scale")
+            ratios = [x.as_integer_ratio() for x in values]
+            common = max((q for _, q in ratios), default=1)  # they are powers of two
+            return Numbers([p * (common // q) for p, q in ratios], common)
+        scale = exact(said.get("scale", "1"))
+        need(scale > 0, f"{what}: the scale is not positive")
+        factor = scale.denominator
+        return Numbers(values.tolist() if factor == 1 else [factor * x for x in values], scale.numerator)
