@@ -28,8 +28,8 @@ _RESIDUAL, _PRODUCTS = 1e-10, 2000
 _WITNESS_RESIDUAL = 0.05
 #: Solves to a smaller tolerance than this are refined.
 _REFINED = 1e-9
-#: Up to these many rows a factor is made at once, and where Krylov solves fail.
-DIRECT_ROWS, FACTOR_ROWS = 2000, 20_000
+#: Up to these many rows a factor is made at once; up to so many that fill in, where Krylov solves fail.
+DIRECT_ROWS, FILL_ROWS = 2000, 4000
 
 
 class SparseHMatrix:
@@ -104,8 +104,8 @@ def solve(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float = _R
 
     ``tolerance`` bounds the residual over ``right`` in the Euclidean norm; small ones are met by one refinement.
     What is not converged is returned as it is, to be judged by its residual. Above ``DIRECT_ROWS`` rows a factor is
-    made only where BiCGSTAB fails and there are at most ``FACTOR_ROWS`` rows: long chains converge slowly, and have
-    sparse factors.
+    made only where BiCGSTAB fails and at most ``FILL_ROWS`` rows fill in: long chains converge slowly, and have sparse
+    factors.
 
     Examples
     --------
@@ -119,12 +119,33 @@ def solve(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float = _R
     residual = right - B @ x
     loose = tolerance > _REFINED
     if not np.linalg.norm(residual) <= (2 if loose else 1e3) * tolerance * np.linalg.norm(right):
-        return _direct(B, right) if B.shape[0] <= FACTOR_ROWS else x
+        return _direct(B, right) if fill_core(B) <= FILL_ROWS else x
     if loose:
         return x
     correction, _ = bicgstab(B, residual, rtol=1e-6, maxiter=_PRODUCTS, M=own)
     better = x + correction
     return better if np.abs(right - B @ better).max() < np.abs(residual).max() else x
+
+
+def fill_core(block: Any) -> int:
+    """Return how many rows are left when those coupled to at most two others are taken off, again and again.
+
+    A sparse factor of these fills in, that of the others does not.
+
+    Examples
+    --------
+    >>> fill_core(sparse.csr_array(np.ones((5, 5)))), fill_core(sparse.eye_array(5, k=1) + sparse.eye_array(5))
+    (5, 0)
+    """
+    near = sparse.csr_array(abs(block))
+    near = sparse.csr_array(near + near.T)
+    near.setdiag(0)
+    near.eliminate_zeros()
+    near.data = np.ones_like(near.data)
+    left = np.ones(near.shape[0])
+    while (few := (left > 0) & (near @ left <= 2)).any():
+        left[few] = 0
+    return int(left.sum())
 
 
 def _direct(B: Any, right: np.ndarray) -> np.ndarray:

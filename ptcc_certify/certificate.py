@@ -597,12 +597,12 @@ def _sharpen(
     n, gain = structure.graph.n_nodes, protocol.gain
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
     if n > EXACT_NODES:
-        if method not in ("perron", "best"):
-            notes.append(f"above {EXACT_NODES} nodes only the class perron is proved; the graph has {n}")
+        if method not in ("perron", "lmi", "best"):
+            notes.append(f"above {EXACT_NODES} nodes only the classes perron and lmi are proved; the graph has {n}")
             return Sharpening()
         if at is not None:
             clocks.append(float(gain.clock_at_remaining(float(1 - at / protocol.T))))
-        found = sharpen_large(structure, clocks)
+        found = sharpen_large(structure, method, clocks)
         notes.extend(found.notes)
         return found
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))

@@ -4,7 +4,8 @@
 
     P_k L_k + L_k' P_k - g_k P_k > 0    on the range of L_k,
 
-of a dense matrix, or above ``EXACT_NODES`` nodes by a sparse factor. With ``(g_k - b) P_k`` in place of these blocks,
+of a dense matrix, or above ``EXACT_NODES`` nodes by a sparse factor: ``P_k`` is the Perron vector, or the best diagonal
+matrix of :func:`lmi.diagonal_lyapunov`. With ``(g_k - b) P_k`` in place of these blocks,
 ``S = P L + L' P - b P`` is positive definite if some ``d > 0`` has
 
     S_ii d_i > sum_j |S_ij| d_j    for every row i.
@@ -23,11 +24,12 @@ from typing import Any
 
 import numpy as np
 
+import lmi
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact import SparseDefinitenessProof, prove_generalized_margin, prove_sparse_positive_definite, round_to_bits
-from lmi.iterative import SparseHMatrix
+from lmi.iterative import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.lemmas import EXACT_NODES, FILL_NODES, fill_core, left_vector
+from ptcc_certify.lemmas import EXACT_NODES, gauge, left_vector
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 
@@ -36,6 +38,8 @@ LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
 #: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
 _BITS, _SLACK = 40, 1e-9
 _ROUNDING = 1e-14
+#: Largest condition of a diagonal matrix that is searched for a leader group.
+_LARGEST_CONDITION = 1e6
 #: Losses of its rate that are tried for a leader group that is proved by a sparse factor.
 _GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.5)
 
@@ -91,10 +95,11 @@ class DominantMember:
         return Fraction(float(self.weights.max()))
 
 
-def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> list[DominantMember]:
+def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, search: int = 0) -> list[DominantMember]:
     """Return Lyapunov functions from the fastest to the one of the smallest prefactor.
 
-    The rates of leader groups are proved. The inequality of all rows holds in floating point with some slack; the check
+    Leader groups of more than ``EXACT_NODES`` nodes, up to ``search``, take the best diagonal matrix in place of the
+    Perron vector. Their rates are proved. The inequality of all rows holds in floating point with some slack; the check
     of the certificate establishes it.
 
     Raises
@@ -111,7 +116,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> 
     """
     if not structure.graph.n_edges:
         return []
-    problem = _Composite(structure)
+    problem = _Composite(structure, search)
     found: list[DominantMember] = []
     for loss in losses:
         try:
@@ -126,7 +131,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES) -> 
 class _Composite:
     """Leader groups and followers of one graph, in floats."""
 
-    def __init__(self, structure: Structure):
+    def __init__(self, structure: Structure, search: int):
         leaders = [c for c in structure.closed_components if len(c.nodes) > 1]
         self.groups = [list(c.nodes) for c in leaders]
         L = structure.graph.laplacian().tocsr()
@@ -143,7 +148,7 @@ class _Composite:
         first = 0
         for group, component in zip(self.groups, leaders, strict=True):
             own = several.subgraph(np.arange(first, first + len(group)))
-            proofs.append(prove_group(own, component.balanced))
+            proofs.append(prove_group(own, component.balanced, search))
             first += len(group)
         self.proofs = tuple(proofs)
         self.p = np.concatenate([proof.weights for proof in proofs]) if proofs else np.zeros(0)
@@ -216,8 +221,10 @@ def round_array(x: np.ndarray) -> np.ndarray:
     return np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS)
 
 
-def prove_group(graph: SignedDigraph, balanced: bool) -> GroupProof:
-    """Prove the decay of a strongly connected group: the left null vector of ``M(L)``, rounded, and its rate.
+def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupProof:
+    """Prove the decay of a strongly connected group: of the left null vector of ``M(L)``, rounded.
+
+    A group of more than ``EXACT_NODES`` nodes, up to ``search``, takes the best diagonal matrix instead.
 
     Raises
     ------
@@ -230,9 +237,12 @@ def prove_group(graph: SignedDigraph, balanced: bool) -> GroupProof:
     2.0
     """
     p = left_vector(graph)
-    weights = round_array(p / p.max())
     if graph.n_nodes > EXACT_NODES:
-        return _prove_large_group(graph, balanced, weights)
+        guess = None
+        if graph.n_nodes <= search:
+            p, guess = _best_diagonal(graph, p if balanced else None)
+        return _prove_large_group(graph, balanced, round_array(p / p.max()), guess)
+    weights = round_array(p / p.max())
     exact = tuple(Fraction(x) for x in weights.tolist())
     half = np.sqrt(weights)
     S = half[:, None] * graph.dense_laplacian() / half
@@ -247,16 +257,32 @@ def prove_group(graph: SignedDigraph, balanced: bool) -> GroupProof:
     return GroupProof(weights, proved)
 
 
-def _prove_large_group(graph: SignedDigraph, balanced: bool, weights: np.ndarray) -> GroupProof:
-    """Prove a rate just below the smallest generalized eigenvalue by a sparse factor."""
+def _best_diagonal(graph: SignedDigraph, p: np.ndarray | None) -> tuple[np.ndarray, float]:
+    """Return the diagonal matrix of the best rate, and that; of a balanced group with left vector ``p`` on range(L)."""
+    L, basis = graph.dense_laplacian(), None
+    if p is not None:
+        from scipy.linalg import null_space
+
+        basis = null_space((gauge(graph) * p / np.linalg.norm(p))[None, :])  # type: ignore[operator]
+    best = lmi.diagonal_lyapunov(L, objective="rate", basis=basis)
+    if best.condition > _LARGEST_CONDITION:
+        best = lmi.diagonal_lyapunov(
+            L, objective="rate", basis=basis, max_condition=_LARGEST_CONDITION, start=best.log_omega
+        )
+    return np.exp(best.log_omega - best.log_omega.max()), best.rate
+
+
+def _prove_large_group(graph: SignedDigraph, balanced: bool, weights: np.ndarray, guess: float | None) -> GroupProof:
+    """Prove a rate just below the one in floats, by default the smallest generalized eigenvalue, by a sparse factor."""
     from scipy import sparse
 
     L = sparse.csr_array(graph.laplacian())
     P = sparse.diags_array(weights)
     half = P @ L
     form = sparse.csc_array(half + half.T)
-    n, short = graph.n_nodes, fill_core(L) <= FILL_NODES
-    guess = _smallest_eigenvalue(form, weights, balanced, short)
+    n, short = graph.n_nodes, fill_core(L) <= FILL_ROWS
+    if guess is None:
+        guess = _smallest_eigenvalue(form, weights, balanced, short)
     if not short:
         raise NoCertificate(
             f"the rate {guess:.6g} of a leader group of {n} nodes is numerical: a proof would take long"

@@ -83,7 +83,7 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
     >>> from ptcc_certify.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
     >>> found = enclose(st, influence(st, exact=False), [Fraction(1), Fraction(0), Fraction(1)])
-    >>> abs(found.middle[1] + 1 / 3) <= found.radius[1] < 1e-9  # the follower c ends at -1/3
+    >>> bool(abs(found.middle[1] + 1 / 3) <= found.radius[1] < 1e-9)  # the follower c ends at -1/3
     True
     """
     n, F = structure.graph.n_nodes, structure.followers

@@ -23,8 +23,6 @@ from ptcc_certify.structure import Structure, analyse
 EXACT_NODES = 120
 #: Above this many nodes null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
 DENSE_NODES, FACTOR_NODES = 500, 20_000
-#: A sparse factor is made where at most so many nodes fill in; see :func:`fill_core`.
-FILL_NODES = 4000
 #: Eigenvalues nearest to 0 that are computed, and products spent on an inverse.
 _NEAREST, _PRODUCTS = 8, 2000
 
@@ -151,10 +149,12 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
     from scipy import sparse
     from scipy.sparse.linalg import ArpackError, LinearOperator, bicgstab, eigs
 
+    from lmi.iterative import FILL_ROWS, fill_core
+
     diagonal = block.diagonal()
     shift = -1e-4 * float(diagonal.mean())
     inverse = None
-    if fill_core(block) > FILL_NODES:
+    if fill_core(block) > FILL_ROWS:
         shifted = sparse.csr_array(block - shift * sparse.eye_array(diagonal.size))
         scaled = LinearOperator(block.shape, matvec=lambda x: x.ravel() / (diagonal - shift))
 
@@ -170,30 +170,6 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
     except (ArpackError, RuntimeError) as error:
         raise np.linalg.LinAlgError(str(error)) from None
     return np.asarray(found)
-
-
-def fill_core(block: Any) -> int:
-    """Return how many nodes are left when those with at most two neighbours are taken off, again and again.
-
-    A sparse factor of these fills in, that of the others does not.
-
-    Examples
-    --------
-    >>> from scipy import sparse
-    >>> fill_core(sparse.csr_array(np.ones((5, 5)))), fill_core(sparse.eye_array(5, k=1) + sparse.eye_array(5))
-    (5, 0)
-    """
-    from scipy import sparse
-
-    near = sparse.csr_array(abs(block))
-    near = sparse.csr_array(near + near.T)
-    near.setdiag(0)
-    near.eliminate_zeros()
-    near.data = np.ones_like(near.data)
-    left = np.ones(near.shape[0])
-    while (few := (left > 0) & (near @ left <= 2)).any():
-        left[few] = 0
-    return int(left.sum())
 
 
 def left_vector(graph: SignedDigraph) -> np.ndarray:
@@ -251,11 +227,11 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
-    from lmi.iterative import solve
+    from lmi.iterative import FILL_ROWS, fill_core, solve
 
     M = sparse.csc_array(sparse.diags_array(graph.in_weight()) - abs(graph.adjacency()))
     rest, last = sparse.csc_array(M[:-1, :-1].T), -M[[-1], :-1].toarray().ravel()
-    if fill_core(M) > FILL_NODES:
+    if fill_core(M) > FILL_ROWS:
         p = np.append(solve(sparse.csr_array(rest), last, rest.diagonal()), 1.0)
     else:
         options = {"SymmetricMode": True}

@@ -27,12 +27,14 @@ from lmi.matrices import block_columns
 from ptcc_certify.dominance import DominantMember, dominant_members
 from ptcc_certify.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.errors import HypothesisError
-from ptcc_certify.lemmas import laplacian_spectrum, left_vector
+from ptcc_certify.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import BITS, Matrix, diagonal_matrix
 
 METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
+#: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
+SEARCHED_GROUP = (300, 2000)
 #: The member with the largest rate is chosen among those with at most this prefactor.
 LARGEST_PREFACTOR = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
@@ -178,30 +180,41 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
     return Sharpening(tuple(_without_hair_splitting(proved)), tried, limit, tuple(notes))
 
 
-def sharpen_large(structure: Structure, clocks: Sequence[float]) -> Sharpening:
+def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) -> Sharpening:
     """Return diagonal Lyapunov functions of a large graph, to be proved row by row by the check of the certificate.
+
+    Leader groups take the Perron vector (class ``perron``), and those of some hundreds of nodes the best diagonal
+    matrix besides (class ``lmi``; asked for by ``method``, those of some thousands).
 
     Parameters
     ----------
     structure : Structure
+    method : {"perron", "lmi", "best"}
     clocks : sequence of float
         See :func:`sharpen`.
     """
-    try:
-        with np.errstate(all="ignore"):
-            found = dominant_members(structure)
-    except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
-        return Sharpening(notes=(f"class perron: {error}",))
-    if not found:
-        return Sharpening()
-    members = {}
-    for m in found:
-        nodes, low, high = tuple(m.nodes.tolist()), m.lowest, m.highest
-        candidate = Candidate("perron", float(m.rate), float(high / low))
-        members[candidate] = SharpMember("perron", nodes, None, None, m.rate, low, high, float(m.rate), m)
-    chosen = choose(list(members), clocks)
-    tried = {"perron": max(c.rate for c in members)}
-    return Sharpening(tuple(members[c] for c in chosen), tried)
+    members: dict[Candidate, SharpMember] = {}
+    notes: list[str] = []
+    tried: dict[str, float] = {}
+    groups = [len(c.nodes) for c in structure.closed_components]
+    largest = SEARCHED_GROUP[method == "lmi"]
+    searches = {"perron": 0}
+    if method != "perron" and any(EXACT_NODES < size <= largest for size in groups):
+        searches = {"lmi": largest} if method == "lmi" else {**searches, "lmi": largest}
+    for kind, search in searches.items():
+        try:
+            with np.errstate(all="ignore"):
+                found = dominant_members(structure, search=search)
+        except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+            notes.append(f"class {kind}: {error}")
+            continue
+        for m in found:
+            nodes, low, high = tuple(m.nodes.tolist()), m.lowest, m.highest
+            candidate = Candidate(kind, float(m.rate), float(high / low))
+            members[candidate] = SharpMember(kind, nodes, None, None, m.rate, low, high, float(m.rate), m)
+        if found:
+            tried[kind] = max(float(m.rate) for m in found)
+    return Sharpening(tuple(members[c] for c in choose(list(members), clocks)), tried, notes=tuple(notes))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:

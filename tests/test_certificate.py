@@ -1239,7 +1239,7 @@ def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_o
 def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_in_floating_point(
     last: int, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(dominance, "FILL_NODES", -1)
+    monkeypatch.setattr(dominance, "FILL_ROWS", -1)
     n = 121
     cert = certify(ring(n, last), PROTOCOL, list(range(n)))
     data = through_json(cert)

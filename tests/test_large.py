@@ -169,7 +169,7 @@ def strong_graph(n: int, balanced: bool, seed: int, followers: int = 0) -> Signe
 def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, followers: int):
     graph = strong_graph(150, balanced, 7 + followers, followers)
     start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
-    cert = certify(graph, NOMINAL, start, simulation=False)
+    cert = certify(graph, NOMINAL, start, simulation=False, method="perron")
     assert cert.verdict == "certified", cert.notes
     for stdlib in (True, False):
         report = check(cert.to_dict(), stdlib=stdlib)
@@ -187,6 +187,21 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     assert cert.enclosed is not None and cert.enclosed.middle is not None and cert.enclosed.radius is not None
     assert (np.abs(end - cert.enclosed.middle) <= cert.enclosed.radius + 1e-6).all()
     assert cert.enclosed.radius.max() < 1e-8
+
+
+@pytest.mark.parametrize("balanced", [True, False])
+def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool):
+    graph = strong_graph(125, balanced, 1)
+    found = {
+        method: certify(graph, NOMINAL, simulation=False, method=method) for method in ("perron", "lmi", "best", "full")
+    }
+    assert [c.verdict for c in found.values()] == ["certified"] * 3 + ["undecided"]
+    assert any("only the classes perron and lmi are proved" in note for note in found["full"].notes)
+    perron, best, both = (float(found[m].rate or 0) for m in ("perron", "lmi", "best"))
+    assert perron < 0.95 * best and both == pytest.approx(best, rel=1e-6)
+    assert best <= (found["lmi"].spectral_rate or 0) * (1 + 1e-9)
+    assert {m.kind for m in found["lmi"].sharpening.members} == {"lmi"}
+    assert set(found["best"].sharpening.tried) == {"perron", "lmi"}
 
 
 @pytest.mark.parametrize("balanced", [True, False])
@@ -211,7 +226,7 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
 
 
 def test_a_leader_group_beyond_the_limit_is_undecided_with_a_note(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(dominance, "FILL_NODES", 100)
+    monkeypatch.setattr(dominance, "FILL_ROWS", 100)
     graph = strong_graph(200, False, 5)
     cert = certify(graph, NOMINAL, simulation=False)
     assert cert.verdict == "undecided"

@@ -290,10 +290,3 @@ def test_a_chain_of_followers_has_a_certificate():
     assert cert.comparison is not None and not cert.comparison.violated
     closed = lmi.m_matrix_certificate(ErrorSystem(cert.structure).matrix)
     assert closed.log_condition > 100 and closed.rate == pytest.approx(2, rel=1e-5)
-
-
-def test_above_the_limit_of_exact_proofs_it_is_said():
-    graph = ring(125, (3, 1, -1))
-    cert = certify(graph, P, simulation=False)
-    assert cert.verdict == "undecided"
-    assert any("leader group has 125 nodes" in note for note in cert.notes)
