@@ -56,6 +56,8 @@ STEPS = (
 )
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
+#: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
+SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
 #: A simulated end state is settled when it is this near to the outcome, relative to the start.
 SETTLED = 1e-6
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
@@ -379,7 +381,7 @@ def certify(
     *,
     sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
     disturbance: Any = None,
-    simulation: bool = True,
+    simulation: bool | None = None,
     method: str = "best",
     at: Any = None,
     progress: Callable[[str], None] = lambda step: None,
@@ -398,8 +400,8 @@ def certify(
         Sliding mode: ``sigma(0)``, by default 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
     disturbance : optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
-    simulation : bool
-        Whether to compare the proved bound with a CVODES run.
+    simulation : bool, optional
+        Whether to compare the proved bound with a CVODES run; by default up to 10,000 agents.
     method : {"best", "paper", "perron", "lmi", "full"}
         Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.sharpen`.
     at : number, optional
@@ -453,9 +455,14 @@ ReachingTime(0, 1 before T_r)))
     manifold, reaching = _reaching(structure, protocol, sigma0)
     trajectory = comparison = None
     notes: list[str] = []
-    if simulation and start is not None:
+    if simulation is None and graph.n_nodes > SIMULATED_NODES:
+        notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
+        simulation = False
+    if simulation is not False and start is not None:
         progress(STEPS[0])
-        more = {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance} if sliding else {}
+        more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
+        if sliding:
+            more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
         try:
             trajectory = simulate(graph, protocol, [float(x) for x in start], **more)
         except SimulationError as error:

@@ -136,7 +136,9 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     help="Lyapunov functions searched beside the paper's.",
 )
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
-@click.option("--no-simulation", is_flag=True, help="Do not compare with a CVODES run.")
+@click.option(
+    "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
+)
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @_json_option
 def certify(
@@ -148,7 +150,7 @@ def certify(
     min_rate: str | None,
     method: str,
     at: str | None,
-    no_simulation: bool,
+    simulation: bool | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -171,7 +173,7 @@ def certify(
             start,
             method=method,
             at=instant,
-            simulation=not no_simulation,
+            simulation=simulation,
             progress=begin,
             **sliding,
         )

@@ -691,3 +691,27 @@ def test_classify_loads_nothing_heavy():
     loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines() if "|" in line}
     assert {"ptcc_certify", "numpy", "scipy", "click"} <= loaded
     assert not loaded & {"casadi", "cvxpy", "clarabel", "matplotlib", "networkx", "flint", "lmi", "rich"}
+
+
+# ---------------------------------------------------------------------- progress
+
+
+def test_a_terminal_sees_which_step_is_at_work_and_standard_output_does_not(tmp_path: Path):
+    """Standard error is a pseudo-terminal: a bar comes and goes; without one there is nothing."""
+    pty = pytest.importorskip("pty")
+    words = [sys.executable, "-c", "from ptcc_certify.cli import main; main()", "certify", "fig1a", "--json"]
+    own, other = pty.openpty()
+    run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=other, cwd=tmp_path)
+    os.close(other)
+    seen = b""
+    try:
+        while part := os.read(own, 4096):
+            seen += part
+    except OSError:  # the other end is closed
+        pass
+    assert run.stdout is not None
+    assert one_object(run.stdout.read().decode())["verdict"] == "certified" and run.wait() == 0
+    assert b"independent check" in seen  # the last step stands until the end
+    assert b"\x1b[2K" in seen  # the line is erased
+    plain = subprocess.run(words, capture_output=True, cwd=tmp_path, check=True)
+    assert plain.stderr == b""
