@@ -23,6 +23,7 @@ from lmi.errors import LMIError
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
+from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.document import Writer, certificate_document, outcome_witness
 from ptcc_certify.enclosed import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.enclosure import decay_integrals_below
@@ -458,6 +459,8 @@ ReachingTime(0, 1 before T_r)))
     if simulation is None and graph.n_nodes > SIMULATED_NODES:
         notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
         simulation = False
+    if simulation is False and isinstance(protocol, SlidingModeProtocol) and disturbance is not None:
+        as_disturbance(disturbance, graph.n_nodes, protocol.delta, float(protocol.T))  # refused beyond delta
     if simulation is not False and start is not None:
         progress(STEPS[0])
         more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
@@ -487,6 +490,8 @@ ReachingTime(0, 1 before T_r)))
             enclosed = enclose(structure, matrix, moved)
         except NotEnclosedError as error:
             notes.append(f"the outcome is floating point only: {error}")
+    if enclosed is not None and result is not None:
+        result = enclosed.outcome(result)
     if trajectory is not None and result is not None:
         gap = float(np.abs(trajectory.final_state - result.values).max())
         if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
@@ -637,7 +642,7 @@ def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], note
     except np.linalg.LinAlgError:
         rate = math.nan
     if rate is not None and not (rate > 0 and math.isfinite(rate) and max(x or 0 for x in proved) <= rate * (1 + 1e-6)):
-        notes.append("the spectral rate is lost in the rounding of float64")
+        notes.append("the spectral rate was not found, or is lost in the rounding of float64")
         return None
     return rate
 

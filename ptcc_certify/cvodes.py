@@ -154,7 +154,8 @@ class NominalMotion(_Motion):
         columns = ca.reshape(x, *self.state.shape)
         clock, p = ca.MX.sym("z"), ca.MX.sym("p", 3)
         ode = -(p[0] * ca.exp(-p[2] * clock) + p[1]) * ca.vec(self._product(columns))
-        return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
+        with _interruptible():
+            return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
 
     def _integrate(self, integrator: Any, a: float, b: float, c: float, end: float) -> np.ndarray:
         """Return the (instants, N, S) states that the integrator reaches from the present one, the last at ``end``."""
@@ -262,7 +263,8 @@ class SlidingMotion(_Motion):
             -R / self._unit * (self._mu1 * s - ca.fabs(sign) * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
         )
         problem = {"x": x, "t": clock, "p": p, "ode": ode}
-        integrator = ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options)
+        with _interruptible():
+            integrator = ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options)
         weight = (phase.rho1 * phase.span + phase.pole) * self.in_weight.max()
         stiffness = (weight + phase.mu2 * phase.span + phase.reaching_pole) * float(z[-1] - start)
         reached = self._call(integrator, self.state, [*signs, *linear[0], *linear[1]], stiffness)
@@ -350,10 +352,13 @@ def _interruptible() -> Iterator[None]:
     signal.signal(signal.SIGINT, handler)
     try:
         yield
-    except RuntimeError:
+    except (RuntimeError, SystemError):
         if raised:
             raise raised[0] from None
         raise
+    else:
+        if raised:
+            raise raised[0]
     finally:
         signal.signal(signal.SIGINT, previous)
 

@@ -47,11 +47,14 @@ class Writer:
     ----------
     files : dict of str to bytes
         Names and contents of the side files, ``.npy`` vectors of 64-bit numbers.
+    told : set of int
+        The proofs of leader groups that are written already, by identity.
     """
 
     def __init__(self, labels: Sequence[str], files: bool = False):
         self.labels, self._aside = labels, files
         self.files: dict[str, bytes] = {}
+        self.told: set[int] = set()
 
     def aside(self, length: int) -> bool:
         """Tell whether a vector of this length goes to a side file."""
@@ -319,7 +322,9 @@ def _dominance_witness(member: DominantMember, out: Writer) -> dict[str, Any]:
     first = 0
     for proof in member.groups:
         rate = format_exact(proof.rate)
-        if proof.factor is None:
+        told = id(proof) in out.told
+        out.told.add(id(proof))
+        if proof.factor is None or told:
             groups.append(rate)
         else:
             # The factor is that of the group's own weights, of which those of the member are a power of two.
@@ -331,8 +336,9 @@ def _dominance_witness(member: DominantMember, out: Writer) -> dict[str, Any]:
             weights = proof.factor.weights
             factor |= {
                 "bits": proof.factor.bits,
-                "power": 1 - math.frexp(times)[1],
+                "power": proof.power + 1 - math.frexp(times)[1],
                 "weights": None if weights is None else out.integers("weights", weights),
+                "parents": None if proof.parents is None else out.integers("parents", proof.parents),
             }
             groups.append({"rate": rate, "factor": factor})
         first += proof.weights.size

@@ -17,6 +17,8 @@ the followers hardly disturb them.
 
 from __future__ import annotations
 
+import contextlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -29,7 +31,7 @@ from lmi.errors import LMIError, NoCertificate
 from lmi.exact import SparseDefinitenessProof, prove_generalized_margin, prove_sparse_positive_definite, round_to_bits
 from lmi.iterative import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.lemmas import EXACT_NODES, gauge, left_vector
+from ptcc_certify.lemmas import EXACT_NODES, dyadic_left_vector, gauge, left_vector
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 
@@ -41,7 +43,7 @@ _ROUNDING = 1e-14
 #: Largest condition of a diagonal matrix that is searched for a leader group.
 _LARGEST_CONDITION = 1e6
 #: Losses of its rate that are tried for a leader group that is proved by a sparse factor.
-_GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.5)
+_GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +57,24 @@ class GroupProof:
     rate : Fraction
         ``g_k``.
     factor : SparseDefinitenessProof or None
-        What proves it for a group of more than ``EXACT_NODES`` nodes.
+        What proves it for a group of more than ``EXACT_NODES`` nodes: of ``L_k`` over ``2^shift``.
+    shift : int
+    parents : (n,) int array or None
+        A spanning tree, -1 at its root, whose differences are the basis of the form that was factored; without one
+        that of a balanced group is the columns of ``L_k`` but the first.
     """
 
     weights: np.ndarray
     rate: Fraction
     factor: SparseDefinitenessProof | None = None
+    shift: int = 0
+    parents: np.ndarray | None = None
+
+    @property
+    def power(self) -> int:
+        """The form that was factored is that of the graph's own ``L_k`` times ``2^power``."""
+        basis = self.factor is not None and self.parents is None and self.factor.order.size < self.weights.size
+        return -self.shift * (3 if basis else 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,10 +252,10 @@ def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupP
     """
     p = left_vector(graph)
     if graph.n_nodes > EXACT_NODES:
-        guess = None
         if graph.n_nodes <= search:
-            p, guess = _best_diagonal(graph, p if balanced else None)
-        return _prove_large_group(graph, balanced, round_array(p / p.max()), guess)
+            with contextlib.suppress(LMIError):
+                return _prove_large_group(graph, balanced, *_best_diagonal(graph, p if balanced else None))
+        return _prove_large_group(graph, balanced, p / p.max())
     weights = round_array(p / p.max())
     exact = tuple(Fraction(x) for x in weights.tolist())
     half = np.sqrt(weights)
@@ -272,34 +286,67 @@ def _best_diagonal(graph: SignedDigraph, p: np.ndarray | None) -> tuple[np.ndarr
     return np.exp(best.log_omega - best.log_omega.max()), best.rate
 
 
-def _prove_large_group(graph: SignedDigraph, balanced: bool, weights: np.ndarray, guess: float | None) -> GroupProof:
+def _prove_large_group(
+    graph: SignedDigraph, balanced: bool, weights: np.ndarray, guess: float | None = None
+) -> GroupProof:
     """Prove a rate just below the one in floats, by default the smallest generalized eigenvalue, by a sparse factor."""
     from scipy import sparse
 
-    L = sparse.csr_array(graph.laplacian())
+    weights = round_array(weights)
+    shift = math.frexp(float(graph.in_weight().max()))[1]
+    L = sparse.csr_array(graph.laplacian() * 2.0**-shift)
     P = sparse.diags_array(weights)
     half = P @ L
     form = sparse.csc_array(half + half.T)
     n, short = graph.n_nodes, fill_core(L) <= FILL_ROWS
-    if guess is None:
-        guess = _smallest_eigenvalue(form, weights, balanced, short)
+    guess = _smallest_eigenvalue(form, weights, balanced, short) if guess is None else guess * 2.0**-shift
+    unit = 2.0**shift
     if not short:
-        raise NoCertificate(
-            f"the rate {guess:.6g} of a leader group of {n} nodes is numerical: a proof would take long"
-        )
+        said = f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical"
+        raise NoCertificate(f"{said}: its proof would be long")
+    basis, parents = None, None
+    if balanced and (whole := dyadic_left_vector(graph)) and len(set((weights / np.array(whole)).tolist())) == 1:
+        parents = _spanning_tree(L)
+        basis = _differences(parents, np.array(whole), gauge(graph))  # type: ignore[arg-type]
+    elif balanced:
+        basis = sparse.csc_array(L[:, 1:])
     for loss in _GROUP_LOSSES:
         g = float(round_to_bits(guess * (1 - loss), 24))
         S = sparse.csc_array(form - g * P)
         size = abs(half) + abs(half.T) + abs(g) * P
-        if balanced:  # modulo the kernel of L
-            S, size = (sparse.csc_array((R.T @ X @ R)[1:, 1:]) for R, X in ((L, S), (abs(L), size)))
+        if basis is not None:
+            S, size = sparse.csc_array(basis.T @ S @ basis), sparse.csc_array(abs(basis).T @ size @ abs(basis))
         # What rounding may have changed in a row is taken off the diagonal.
         spare = _ROUNDING * np.asarray(size.sum(axis=1)).ravel()
         S = sparse.csc_array((S + S.T) / 2 - sparse.diags_array(spare))
         factor = prove_sparse_positive_definite(S)
         if factor is not None:
-            return GroupProof(weights, Fraction(g), factor)
-    raise NoCertificate(f"the rate {guess:.6g} of a leader group of {n} nodes is numerical: it was not proved")
+            return GroupProof(weights, Fraction(g) * Fraction(2) ** shift, factor, shift, parents)
+    raise NoCertificate(f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical: it was not proved")
+
+
+def _spanning_tree(L: Any) -> np.ndarray:
+    """Return the parent of every node in a breadth-first tree from the node with most neighbours, -1 at the root."""
+    from scipy import sparse
+    from scipy.sparse.csgraph import breadth_first_order
+
+    near = sparse.csr_array(abs(L))
+    root = int(np.argmax(np.diff(near.indptr)))
+    _, parents = breadth_first_order(near, root, directed=False, return_predecessors=True)
+    parents = parents.astype(np.int64)
+    parents[root] = -1
+    return parents
+
+
+def _differences(parents: np.ndarray, w: np.ndarray, signs: np.ndarray) -> Any:
+    """Return the columns ``w_q G_i e_i - w_i G_q e_q`` of every node ``i`` but the root, ``q`` its parent."""
+    from scipy import sparse
+
+    own = np.flatnonzero(parents >= 0)
+    q, column = parents[own], np.arange(own.size)
+    values = np.concatenate([w[q] * signs[own], -w[own] * signs[q]]).astype(float)
+    where = np.concatenate([own, q]), np.concatenate([column, column])
+    return sparse.csc_array((values, where), shape=(parents.size, own.size))
 
 
 def _smallest_eigenvalue(form: Any, weights: np.ndarray, balanced: bool, factor: bool) -> float:

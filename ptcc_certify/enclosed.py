@@ -12,7 +12,7 @@ forms them exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.iterative import SparseHMatrix, solve
-from ptcc_certify.outcomes import Influence, follower_state
+from ptcc_certify.outcomes import Influence, Outcome, follower_state
 from ptcc_certify.structure import ClosedComponent, Structure
 
 #: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
@@ -67,6 +67,17 @@ class EnclosedOutcome:
     voices: dict[int, tuple[np.ndarray, np.ndarray]]
     witness: np.ndarray
 
+    def outcome(self, found: Outcome) -> Outcome:
+        """Return an outcome in floats with what is proved in its place: exact ends, middles, degenerate groups."""
+        if self.middle is None or self.degenerate is None:
+            return found
+        unit = float(self.unit)
+        final: list[Fraction | float] = [x * unit for x in self.middle.tolist()]
+        for v, x in self.exact.items():
+            final[v] = x
+        values = [final[c.nodes[0]] * sign for c in found.influence.balanced for sign in [(c.gauge or (1,))[0]]]
+        return replace(found, final_state=tuple(final), consensus_values=tuple(values), degenerate=self.degenerate)
+
 
 def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction] | None) -> EnclosedOutcome:
     """Enclose ``Q start``.
@@ -96,7 +107,7 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
             voices[k] = _enclosed_voices(structure, component, np.array(voice, dtype=float), u)
     if start is None:
         return EnclosedOutcome(None, None, Fraction(1), {}, None, voices, u)
-    size = max(map(abs, start))
+    size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
     unit = Fraction(1)
     if 0 < size < _SMALLEST:
         unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
@@ -106,7 +117,7 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
     degenerate = []
     for k, (number, component) in enumerate(zip(numbers, influence.balanced, strict=True)):
         signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
-        if k in voices:
+        if k in voices and any(start[v] for v in component.nodes):
             own = np.array([float(start[v]) for v in component.nodes])
             value, spread = float(voices[k][0] @ own), float(voices[k][1] @ np.abs(own))
             spread = (spread + _ROUNDING * float(np.abs(voices[k][0]) @ np.abs(own))) * _MORE
@@ -114,8 +125,8 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
                 raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
             middle[nodes], radius[nodes] = signs * value, spread
             continue
-        known = sum((Fraction(w) * start[v] for v, w in zip(component.nodes, influence.voices[k], strict=True)), 0)
-        known = Fraction(known)
+        shares = zip(component.nodes, influence.voices[k], strict=True)
+        known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
         degenerate += [number] if known == 0 else []
         exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
         middle[nodes] = signs * float(known)

@@ -7,6 +7,7 @@ component, Lemma 8 the same for Lemma 9.2.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -23,8 +24,8 @@ from ptcc_certify.structure import Structure, analyse
 EXACT_NODES = 120
 #: Above this many nodes null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
 DENSE_NODES, FACTOR_NODES = 500, 20_000
-#: Eigenvalues nearest to 0 that are computed, and products spent on an inverse.
-_NEAREST, _PRODUCTS = 8, 2000
+#: Eigenvalues nearest to 0 that are computed, products spent on an inverse, and restarts of Arnoldi's method.
+_NEAREST, _PRODUCTS, _RESTARTS = 8, 2000, 50
 
 
 def gauge(graph: SignedDigraph) -> np.ndarray | None:
@@ -147,7 +148,7 @@ def single_followers(structure: Structure) -> np.ndarray:
 def _nearest_eigenvalues(block: Any) -> np.ndarray:
     """Return the eigenvalues nearest to 0, by inverses of the block shifted to the left of them all."""
     from scipy import sparse
-    from scipy.sparse.linalg import ArpackError, LinearOperator, bicgstab, eigs
+    from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, bicgstab, eigs
 
     from lmi.iterative import FILL_ROWS, fill_core
 
@@ -165,10 +166,15 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
             return found
 
         inverse = LinearOperator(block.shape, matvec=solve)
+    told: dict[str, Any] = {"sigma": shift, "OPinv": inverse, "return_eigenvectors": False, "maxiter": _RESTARTS}
     try:
-        found = eigs(sparse.csc_array(block), k=_NEAREST, sigma=shift, OPinv=inverse, return_eigenvectors=False)
+        found = eigs(sparse.csc_array(block), k=_NEAREST, **told)
+    except ArpackNoConvergence as error:
+        found = error.eigenvalues
     except (ArpackError, RuntimeError) as error:
         raise np.linalg.LinAlgError(str(error)) from None
+    if len(found) < 2:
+        raise np.linalg.LinAlgError("the eigenvalues nearest to 0 were not found")
     return np.asarray(found)
 
 
@@ -240,6 +246,30 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     if not (np.isfinite(p).all() and (p > 0).all()):
         raise HypothesisError("no positive left vector was found in float64")
     return p / p.sum()
+
+
+def dyadic_left_vector(graph: SignedDigraph) -> list[int] | None:
+    """Lemma 2.3 in integers of at most 40 bits, if there is such a ``p``, as in undirected graphs; None if not.
+
+    Examples
+    --------
+    >>> dyadic_left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 3)]))
+    [1, 1]
+    >>> dyadic_left_vector(SignedDigraph.from_edges([(1, 2, 3), (2, 1, 1)])) is None
+    True
+    """
+    p = left_vector(graph)
+    whole = np.rint(np.ldexp(p / p.max(), 40)).astype(np.int64).tolist()
+    if min(whole) <= 0:
+        return None
+    common = math.gcd(*whole)
+    whole = [w // common for w in whole]
+    surplus = [Fraction(0)] * graph.n_nodes
+    for edge, (s, t) in enumerate(zip(graph.source.tolist(), graph.target.tolist(), strict=True)):
+        flow = whole[t] * abs(graph.exact_weight(edge))
+        surplus[t] += flow
+        surplus[s] -= flow
+    return None if any(surplus) else whole
 
 
 def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:

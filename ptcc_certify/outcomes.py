@@ -20,6 +20,7 @@ from ptcc_certify.errors import HypothesisError, NumberError, ParameterError
 from ptcc_certify.lemmas import (
     EXACT_NODES,
     containment_weights,
+    dyadic_left_vector,
     exact_containment_weights,
     exact_left_vector,
     left_vector,
@@ -34,7 +35,6 @@ Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
 MANY_PULLS = 1_000_000
 #: Largest leader group of a large graph whose voices are computed in rationals.
-GROUP_NODES = EXACT_NODES
 
 
 @dataclass(frozen=True)
@@ -152,8 +152,14 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
             voices.append((Fraction(1),))
             continue
         block = groups.subgraph([place[v] for v in component.nodes])
-        rational = exact or block.n_nodes <= GROUP_NODES
-        eta: Sequence[Number] = exact_left_vector(block) if rational else left_vector(block).tolist()
+        eta: Sequence[Number]
+        if exact or block.n_nodes <= EXACT_NODES:
+            eta = exact_left_vector(block)
+        elif whole := dyadic_left_vector(block):
+            total = sum(whole)
+            eta = [Fraction(w, total) for w in whole]
+        else:
+            eta = left_vector(block).tolist()
         voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
     if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
         return Influence(structure, tuple(voices), None, False)

@@ -22,6 +22,12 @@ FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
 SLICE = 20
 #: Exponents beyond this are refused, lest a witness fill the memory.
 LARGEST_SHIFT = 2**16
+#: Bits that the entries may be shifted by in all.
+LARGEST_BITS = 4_000_000_000
+#: Pairs of entries of a column of the factor that are multiplied: in all, and kept at a time by the standard library.
+LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 20_000_000
+#: NumPy: longest column that is multiplied pair by pair, and largest dense block at the end.
+LONGEST_COLUMN, LARGEST_BLOCK = 4000, 6000
 #: Pairs of entries multiplied at a time.
 CHUNK = 2_000_000
 
@@ -265,7 +271,7 @@ def residual_definite(
             return False
     if n == 0:
         return True
-    if max(bits, abs(power), *map(abs, exponents)) > LARGEST_SHIFT:
+    if max(abs(bits), abs(power), *map(abs, exponents)) > LARGEST_SHIFT:
         return False
     # scale 2^(2 bits + up) T in integers, the lower triangle in the order of elimination
     place = [0] * n
@@ -273,6 +279,8 @@ def residual_definite(
         place[node] = k
     shifts = [exponents[i] + exponents[j] + power + 2 * bits for i, j in zip(rows, cols, strict=True)]
     up = max(0, -min(shifts, default=0))
+    if (max(shifts, default=0) + up) * len(shifts) > LARGEST_BITS:
+        return False
     T: dict[tuple[int, int], int] = defaultdict(int)
     for i, j, value, shift in zip(rows, cols, values, shifts, strict=True):
         a, b = place[i], place[j]
@@ -287,6 +295,9 @@ Factor = tuple[list[int], list[int], list[int]]
 
 def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     indptr, indices, data = factor
+    pairs = sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(indptr))
+    if pairs > LARGEST_PAIRS or min(pairs, n * (n + 1) // 2) > LARGEST_KEPT:
+        return False
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(n)]
     for k in range(n):
         part = list(zip(indices[indptr[k] : indptr[k + 1]], data[indptr[k] : indptr[k + 1]], strict=True))
@@ -320,6 +331,9 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     left = n - np.arange(n + 1.0)
     before = np.concatenate([[0.0], np.cumsum(counts.astype(float) ** 2)])
     first = int(np.argmin(100 * before + 0.1 * left**3 + 500 * left**2))
+    long = int(counts[:first].max(initial=0)) > LONGEST_COLUMN
+    if long or before[first] > 2 * LARGEST_PAIRS or n - first > LARGEST_BLOCK:
+        return False
     width = min(21, (53 - max(n - first, 1).bit_length()) // 2 + 1)
     slices = max(-(-(int(np.abs(data).max(initial=0)).bit_length() + 1) // width), 1)
 

@@ -344,3 +344,75 @@ def test_long_chains_have_a_bound_that_says_something():
     """The fastest member has an astronomical prefactor; the slowest one bounds the first instants."""
     found = certify(chain([1] * 141), NOMINAL, simulation=False).sharpening.members
     assert min(m.prefactor for m in found) < 10**5
+
+
+# ---------------------------------------------------------------------- slow mixing, degenerate starts
+
+
+def undirected(pairs: list[tuple[int, int, Any]]) -> SignedDigraph:
+    return SignedDigraph.from_edges([e for i, j, w in pairs for e in ((i, j, w), (j, i, w))])
+
+
+SLOW = {
+    "path": undirected([(i, i + 1, 1) for i in range(399)]),
+    "signed path": undirected([(i, i + 1, Fraction((-1) ** i, 3)) for i in range(249)]),
+    "ring": undirected([(i, (i + 1) % 500, 1) for i in range(500)]),
+    "directed ring": SignedDigraph.from_edges([(i, (i + 1) % 300, "0.1") for i in range(300)]),
+    "ladder": undirected([(i, i + 2, 1) for i in range(398)] + [(2 * i, 2 * i + 1, -1) for i in range(200)]),
+    "huge weights": undirected([(i, i + 1, 10**150) for i in range(150)]),
+    "tiny weights": undirected([(i, i + 1, Fraction(1, 10**150)) for i in range(150)]),
+}
+
+
+@pytest.mark.parametrize("name", SLOW)
+def test_undirected_groups_that_mix_slowly_are_certified(name: str):
+    """Their left vector is exact, so that the proof needs no cube of the Laplacian, and the end is exact too."""
+    graph = SLOW[name]
+    n = graph.n_nodes
+    cert = certify(graph, NOMINAL, list(range(n)), simulation=False)
+    assert cert.verdict == "certified", cert.notes
+    assert check(cert.to_dict(), stdlib=True).accepted
+    symmetric = graph.dense_laplacian()
+    scale = np.abs(symmetric).max()
+    best = float(np.linalg.eigvalsh((symmetric + symmetric.T) / scale)[1]) * scale
+    assert cert.rate is not None and 0.7 * best <= float(cert.rate) <= best * (1 + 1e-6)
+    camps = cert.structure.closed_components[0].gauge or ()
+    mean = sum((Fraction(g * k) for k, g in enumerate(camps)), Fraction(0)) / n
+    assert cert.outcome is not None and list(cert.outcome.final_state) == [g * mean for g in camps]
+
+
+@pytest.mark.parametrize(
+    "start", [[0] * 200, [(-1) ** i for i in range(200)], [0] * 199 + ["1e-320"]], ids=["zero", "degenerate", "tiny"]
+)
+def test_starts_that_meet_at_zero_and_tiny_ones(start: list[Any]):
+    cert = certify(undirected([(i, (i + 1) % 200, 1) for i in range(200)]), NOMINAL, start, simulation=False)
+    assert cert.verdict == "certified", cert.notes
+    assert cert.outcome is not None and cert.outcome.degenerate == (() if start[-1] == "1e-320" else (1,))
+    directed = certify(strong_graph(150, True, 2), NOMINAL, [0] * 150, simulation=False)
+    assert directed.verdict == "certified" and directed.outcome is not None and directed.outcome.degenerate == (1,)
+
+
+def test_what_is_printed_lies_in_the_intervals_of_the_certificate():
+    edges = [(0, 1, 1), (1, 2, 1), (2, 0, 1), *((i, i + 1, 1) for i in range(2, 132))]
+    start = [Fraction(1, 10), Fraction(2, 10), Fraction(-3, 10) + Fraction(1, 10**17), *[1] * 130]
+    cert = certify(SignedDigraph.from_edges(edges), NOMINAL, start, simulation=False)
+    data = cert.to_dict()
+    assert data["outcome"]["degenerate"] == [] and cert.outcome is not None and cert.outcome.degenerate == ()
+    for seen, said in zip(cert.outcome.final_state, data["outcome"]["final_state"].values(), strict=True):
+        middle, radius = (said["mid"], said["radius"]) if isinstance(said, dict) else (said, "0")
+        assert abs(Fraction(seen) - Fraction(middle)) <= Fraction(radius)
+    assert not any("degenerate" in line for line in certificate_lines(cert, "g"))
+
+
+def test_a_forged_tree_is_rejected():
+    data = json.loads(certify(SLOW["directed ring"], NOMINAL, simulation=False, method="perron").to_json())
+    step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "dominance")
+    where = ("proof", step, "witness", "groups", 0, "factor", "parents")
+    tree = data["proof"][step]["witness"]["groups"][0]["factor"]["parents"]
+    root = tree.index(-1)
+    two = [-1 if i == (root + 1) % 300 else q for i, q in enumerate(tree)]
+    loop = [(i + 1) % 300 for i in range(300)]
+    for new in (None, tree[:-1], two, loop, [300, *tree[1:]], [*loop[:-1], -2], [0, *tree[1:]]):
+        rejected(changed(data, where, new), "dominance of")
+    weights = ("lyapunov", "members", 0, "blocks", 0, "diagonal", 0)
+    rejected(changed(data, weights, "0.9"), "dominance of")

@@ -26,6 +26,19 @@ CHUNK = 65_536
 DIGIT, PASSES = 32, 200
 
 
+def _numbered(weights: Any) -> tuple[list[Any], list[int]]:
+    """Return the distinct weights, and the number of each one; by their texts, whose hashes nobody can foresee."""
+    number: dict[str, int] = {}
+    distinct: list[Any] = []
+    which = []
+    for w in weights:
+        k = number.setdefault(str(w), len(distinct))
+        if k == len(distinct):
+            distinct.append(w)
+        which.append(k)
+    return distinct, which
+
+
 class Digraph:
     """Edges with integer or rational weights over a scale.
 
@@ -70,9 +83,8 @@ class Digraph:
         need(all(a < b for a, b in pairwise(ends)), "edges are not in order, or one occurs twice")
         need(all(0 <= s < self.n and 0 <= t < self.n and s != t for t, s in ends), "an edge of a node to itself")
         need(all(weights), "an edge of weight 0")
-        number: dict[Any, int] = {}
-        self.which: Any = array("q", (number.setdefault(w, len(number)) for w in weights))
-        self.distinct: list[Any] = list(number)
+        self.distinct, which = _numbered(weights)
+        self.which: Any = array("q", which)
         self.negative: Any = bytearray(w < 0 for w in weights)
         leaving = sorted(range(self.n_edges), key=self.source.__getitem__)
         self.into = _starts(self.n, self.target), memoryview(array("q", self.source)), memoryview(self.negative)
@@ -263,9 +275,8 @@ class ArrayDigraph(Digraph):
             values, which = np.unique(np.asarray(weights), return_inverse=True)
             self.distinct = values.tolist()
         else:
-            number: dict[Any, int] = {}
-            which = np.array([number.setdefault(w, len(number)) for w in weights], dtype=np.int64)
-            self.distinct = list(number)
+            self.distinct, listed = _numbered(weights)
+            which = np.array(listed, dtype=np.int64)
         need(all(self.distinct), "an edge of weight 0")
         self.source, self.target, self.which = source, target, which
         self.negative = np.array([w < 0 for w in self.distinct], dtype=np.uint8)[which]

@@ -343,10 +343,11 @@ class LyapunovCheck(OutcomeCheck):
         g, common = exact(said["rate"] if isinstance(said, dict) else said), math.gcd(*weights)
         key = k, g, tuple(w // common for w in weights)
         if key in self.proved:
+            need(not isinstance(said, dict), "a factor of a leader group that is proved already")
             return g
         group, balanced = self.closed[k], self.gauges[k] is not None
         if isinstance(said, dict):
-            self._factor(said["factor"], group, Fraction(common, scale), key[2], g, balanced)
+            self._factor(said["factor"], group, Fraction(common, scale), key[2], g, self.gauges[k])
         else:
             S = self._group_decrease(group, [Fraction(w) for w in key[2]], g, range(balanced, len(group)))
             need(self.exact.definite(S), "a leader group is not proved")
@@ -354,11 +355,18 @@ class LyapunovCheck(OutcomeCheck):
         return g
 
     def _factor(
-        self, said: Any, group: Sequence[int], times: Fraction, ratios: Sequence[int], g: Fraction, balanced: bool
+        self,
+        said: Any,
+        group: Sequence[int],
+        times: Fraction,
+        ratios: Sequence[int],
+        g: Fraction,
+        gauge: Sequence[int] | None,
     ) -> None:
         """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
-        keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights")
-        said, n, read = fields(said, keys, "factor"), len(group) - balanced, self.files.integers
+        keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
+        said, read = fields(said, keys, "factor"), self.files.integers
+        n = len(group) - (gauge is not None)
         need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")
         order, exponents, indptr = (
             read(said[key], key, count) for key, count in (("order", n), ("exponents", n), ("indptr", n + 1))
@@ -368,45 +376,81 @@ class LyapunovCheck(OutcomeCheck):
         work = sum((b - a) ** 2 for a, b in pairwise(indptr))
         need(work <= self.exact.products, f"a factor of {work} products; {self.exact.name} takes {self.exact.products}")
         columns = indptr, *(read(said[key], key, indptr[-1]) for key in ("indices", "data"))
-        lower, scale = self._group_form(group, [times.numerator * w for w in ratios], g, balanced)
+        A = self._sparse_block(group)
+        basis = None
+        if said["parents"] is not None:
+            need(gauge is not None, "parents of a group that is not balanced")
+            basis = self._differences(A, ratios, gauge or (), read(said["parents"], "parents", len(group)))
+        elif gauge is not None:
+            basis = [{j - 1: x for j, x in row.items() if j} for row in A]
+        lower, scale = self._group_form(A, [times.numerator * w for w in ratios], g, basis)
+        if gauge is not None and said["parents"] is None:
+            scale *= self.digraph.unit**2
         scale *= times.denominator
         told: dict[str, Any] = {"power": said["power"], "weights": vector, "scale": scale, "numpy": self.exact.numpy}
         proved = residual_definite(n, lower, order, columns, exponents, said["bits"], **told)
         need(proved, "a leader group is not proved by its factor")
 
-    def _group_form(
-        self, group: Sequence[int], weights: Sequence[int], g: Fraction, balanced: bool
-    ) -> tuple[tuple[list[int], list[int], list[int]], int]:
-        """Return the lower triangle of ``S = W A + A'W - g W``, or of ``A'S A`` without the first node, times a scale.
+    def _sparse_block(self, group: Sequence[int]) -> Sparse:
+        """Return the rows of ``L_k``, times unit."""
+        place = {v: i for i, v in enumerate(group)}
+        return [{place[j]: x for j, x in self.digraph.row(v).items()} for v in group]
 
-        The latter where the group is balanced.
+    def _differences(self, A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:
+        """Return a basis of all ``y`` with ``eta'y = 0``, ``eta = G w``, which contain the range of ``A``, by rows.
+
+        One column ``w_q G_i e_i - w_i G_q e_q`` for each node ``i`` but the root of a tree, ``q`` its parent.
         """
-        place, unit = {v: i for i, v in enumerate(group)}, self.digraph.unit
-        A = [{place[j]: x for j, x in self.digraph.row(v).items()} for v in group]
-        p, scale = (g * unit).as_integer_ratio()
+        n = len(A)
+        kept = [0] * n
+        for i, row in enumerate(A):
+            for j, x in row.items():
+                kept[j] += gauge[i] * w[i] * x
+        need(not any(kept), "the weights are not a left null vector")
+        need(min(parents) == -1 and parents.count(-1) == 1 and max(parents) < n, "parents have not one root")
+        children: list[list[int]] = [[] for _ in range(n + 1)]  # those of the root's parent, -1, at the end
+        for i, q in enumerate(parents):
+            children[q].append(i)
+        reached = list(children[-1])
+        for i in reached:
+            reached += children[i]
+        need(len(reached) == n, "parents are no tree")
+        basis: Sparse = [{} for _ in range(n)]
+        root = parents.index(-1)
+        for i, q in enumerate(parents):
+            if q >= 0:
+                column = i - (i > root)
+                basis[i][column] = w[q] * gauge[i]
+                basis[q][column] = -w[i] * gauge[q]
+        return basis
+
+    def _group_form(
+        self, A: Sparse, weights: Sequence[int], g: Fraction, basis: Sparse | None
+    ) -> tuple[tuple[list[int], list[int], list[int]], int]:
+        """Return the lower triangle of ``S = W A + A'W - g W``, or of ``B'S B`` with a basis ``B``, times a scale."""
+        p, scale = (g * self.digraph.unit).as_integer_ratio()
         S: Sparse = [defaultdict(int, {i: -p * w}) for i, w in enumerate(weights)]
         for i, row in enumerate(A):
             for j, x in row.items():
                 S[i][j] += scale * weights[i] * x
                 S[j][i] += scale * weights[i] * x
         rows: Iterable[dict[int, int]] = S
-        if balanced:
-            B: Sparse = [{j - 1: x for j, x in row.items() if j} for row in A]
-            columns: Sparse = [{} for _ in range(len(group) - 1)]
-            for i, row in enumerate(B):
+        if basis is not None:
+            columns: Sparse = [{} for _ in range(len(A) - 1)]
+            for i, row in enumerate(basis):
                 for j, x in row.items():
                     columns[j][i] = x
-            need(sum(len(B[j]) for row in S for j in row) <= LARGEST_PRODUCT, "a leader group of too many edges")
-            SB = list(multiplied(S, B))
-            need(sum(map(mul, map(len, B), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
-            rows, scale = multiplied(columns, SB), scale * unit**2
+            need(sum(len(basis[j]) for row in S for j in row) <= LARGEST_PRODUCT, "a leader group of too many edges")
+            SB = list(multiplied(S, basis))
+            need(sum(map(mul, map(len, basis), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
+            rows = multiplied(columns, SB)
         lower: tuple[list[int], list[int], list[int]] = [], [], []
         for i, row in enumerate(rows):
             for j, x in row.items():
                 if j <= i:
                     for part, value in zip(lower, (i, j, x), strict=True):
                         part.append(value)
-        return lower, scale * unit
+        return lower, scale * self.digraph.unit
 
     def _group_decrease(
         self, group: Sequence[int], weights: Sequence[Fraction], g: Fraction, kept: Sequence[int]

@@ -168,7 +168,8 @@ class StructureCheck:
         """Check a closed walk of the undirected graph inside a component whose signs multiply to -1."""
         steps = [tuple(self._numbers(entries(step, "a step", 2), "a step")) for step in entries(said, "negative_cycle")]
         group = set(nodes)
-        need(bool(steps) and all(s in group and self.digraph.sign(s, t) for s, t in steps), "not a walk along edges")
+        inside = all(s in group and t in group and self.digraph.sign(s, t) for s, t in steps)
+        need(bool(steps) and inside, "not a walk along edges of the component")
         need(math.prod(self.digraph.sign(s, t) for s, t in steps) == -1, "the cycle is not negative")
         for home in steps[0]:
             place: int | None = home

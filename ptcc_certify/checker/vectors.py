@@ -78,7 +78,10 @@ class SideFiles:
         """Read ``{"file", "sha256"}``: a .npy vector of 64-bit integers or finite floats, little-endian."""
         said = fields(said, ("file", "sha256"), "a side file")
         name = said["file"]
-        need(isinstance(name, str) and re.fullmatch(r"[\w.-]{1,200}", name) is not None, "a side file's name is odd")
+        need(
+            isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_.-]{1,200}", name) is not None,
+            "a side file's name is odd",
+        )
         content = self._content(name, 8 * count + 1024)
         need(hashlib.sha256(content).hexdigest() == said["sha256"], f"side file {name} is not what its hash says")
         size = int.from_bytes(content[8:10], "little")
