@@ -18,7 +18,6 @@ from ptcc_certify.lemmas import left_vector
 from ptcc_certify.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     Matrix,
-    dense_laplacian,
     exact_block,
     float_block,
     follower_nodes,
@@ -61,7 +60,7 @@ class ErrorSystem:
     @cached_property
     def matrix(self) -> np.ndarray:
         """``A`` with ``E' = -gain A E``, (n, n): the rows and columns of ``L``."""
-        return float_block(dense_laplacian(self.structure.graph), self.nodes, self.nodes)
+        return float_block(self.structure.graph.dense_laplacian(), self.nodes, self.nodes)
 
     @cached_property
     def normals(self) -> np.ndarray:

@@ -201,6 +201,8 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
     searches = {"perron": 0}
     if method != "perron" and any(EXACT_NODES < size <= largest for size in groups):
         searches = {"lmi": largest} if method == "lmi" else {**searches, "lmi": largest}
+    elif method == "lmi":
+        notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
     for kind, search in searches.items():
         try:
             with np.errstate(all="ignore"):

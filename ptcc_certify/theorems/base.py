@@ -172,7 +172,7 @@ class Theorem(ABC):
 
         ``Omega A + A' Omega`` on the rows of ``V`` unless the theorem says otherwise.
         """
-        S = floats(V.weights)[:, None] * float_block(dense_laplacian(structure.graph), V.nodes, V.nodes)
+        S = floats(V.weights)[:, None] * float_block(structure.graph.dense_laplacian(), V.nodes, V.nodes)
         return S + S.T
 
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:
@@ -187,11 +187,6 @@ class Theorem(ABC):
 
 
 # ---------------------------------------------------------------------- floats
-
-
-def dense_laplacian(graph: SignedDigraph) -> np.ndarray:
-    """Return ``L`` as a dense float matrix."""
-    return graph.dense_laplacian()
 
 
 def float_block(L: np.ndarray, rows: Iterable[int], columns: Iterable[int]) -> np.ndarray:

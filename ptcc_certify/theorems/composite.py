@@ -13,7 +13,6 @@ from ptcc_certify.theorems.base import (
     RateProof,
     Theorem,
     closed_blocks,
-    dense_laplacian,
     exact_block,
     exact_phi,
     float_block,
@@ -37,7 +36,7 @@ class DiagonalComposite(Theorem):
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """All blocks and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
-        L, F = dense_laplacian(structure.graph), structure.followers
+        L, F = structure.graph.dense_laplacian(), structure.followers
         try:
             omega = lmi.diagonal_lyapunov(L).omega
         except lmi.NoCertificate:

@@ -14,7 +14,6 @@ from ptcc_certify.theorems.base import (
     Theorem,
     block_of,
     connectivity_rate,
-    dense_laplacian,
     diagonal_matrix,
     float_block,
     floats,
@@ -49,7 +48,7 @@ class BalancedQuasiStrong(Theorem):
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """``Xi_F`` and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
-        L, F = dense_laplacian(structure.graph), structure.followers
+        L, F = structure.graph.dense_laplacian(), structure.followers
         leaders = structure.closed_components[0]
         if len(leaders.nodes) == 1:
             found = lmi.h_matrix_lyapunov(float_block(L, F, F))
@@ -75,7 +74,7 @@ class BalancedQuasiStrong(Theorem):
         if V.rho is None:
             return super().decrease(structure, V)
         leaders, followers = V.blocks
-        L, F, K = dense_laplacian(structure.graph), followers.nodes, leaders.nodes
+        L, F, K = structure.graph.dense_laplacian(), followers.nodes, leaders.nodes
         gamma = connectivity_rate(structure.graph.subgraph(K), leaders.diagonal) * np.diag(floats(leaders.diagonal))
         nu, xi = floats(leaders.diagonal), floats(followers.diagonal)
         return lmi.Coupling(gamma, nu, xi, float_block(L, F, K), float_block(L, F, F)).phi(float(V.rho))

@@ -23,7 +23,6 @@ from ptcc_certify.theorems.base import (
     block_of,
     closed_blocks,
     connectivity_rate,
-    dense_laplacian,
     diagonal_matrix,
     float_block,
     floats,
@@ -62,7 +61,7 @@ class BalancedWeak(Theorem):
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """Free blocks, ``H_F`` and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""
-        L, F = dense_laplacian(structure.graph), structure.followers
+        L, F = structure.graph.dense_laplacian(), structure.followers
         components = _several_nodes(structure)
         if not components:
             if F.size == 0:
@@ -80,7 +79,7 @@ class BalancedWeak(Theorem):
                 decrease = connectivity_rate(graph, eta) * float(min(eta))
                 leaders.append(lmi.FixedLeader(floats(eta), np.full(len(eta), decrease)))
             else:
-                leaders.append(lmi.FreeLeader(dense_laplacian(graph)))
+                leaders.append(lmi.FreeLeader(graph.dense_laplacian()))
         joint = lmi.coupled_lyapunov(leaders, float_block(L, F, K), float_block(L, F, F))
         blocks = [
             LyapunovBlock(f"H_{k}", component.nodes, fixed.get(k) or rounded(diagonal))
@@ -96,7 +95,7 @@ class BalancedWeak(Theorem):
 
     def _coupling(self, structure: Structure, blocks: tuple[LyapunovBlock, ...]) -> lmi.Coupling:
         """Return the composite in floats; without followers its follower block is empty."""
-        L = dense_laplacian(structure.graph)
+        L = structure.graph.dense_laplacian()
         leaders = [block for block in blocks if not block.times_rho]
         decreases = np.concatenate(
             [np.full(len(b.nodes), _leader_decrease(structure, b, _balanced(structure, b))) for b in leaders]
@@ -182,4 +181,4 @@ def _leader_decrease(structure: Structure, block: LyapunovBlock, balanced: bool)
     graph = structure.graph.subgraph(block.nodes)
     if balanced:
         return connectivity_rate(graph, block.diagonal) * float(min(block.diagonal))
-    return lmi.diagonal_margin(dense_laplacian(graph), floats(block.diagonal))
+    return lmi.diagonal_margin(graph.dense_laplacian(), floats(block.diagonal))
