@@ -32,7 +32,8 @@ def _numbered(weights: Any) -> tuple[list[Any], list[int]]:
     distinct: list[Any] = []
     which = []
     for w in weights:
-        k = number.setdefault(str(w), len(distinct))
+        p, q = w.as_integer_ratio()
+        k = number.setdefault(f"{p:x}/{q:x}", len(distinct))
         if k == len(distinct):
             distinct.append(w)
         which.append(k)
