@@ -45,6 +45,39 @@ _CAUSES = {
 }
 
 
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let what a signal handler raises (KeyboardInterrupt) pass.
+
+    CasADi turns it into a failure of CVODES, or loses it where it tries what type an argument has.
+    """
+    previous = signal.getsignal(signal.SIGINT)
+    if not callable(previous) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    raised: list[BaseException] = []
+
+    def handler(number: int, frame: Any) -> None:
+        try:
+            previous(number, frame)
+        except BaseException as error:
+            raised.append(error)
+            raise
+
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    except (RuntimeError, SystemError):
+        if raised:
+            raise raised[0] from None
+        raise
+    else:
+        if raised:
+            raise raised[0]
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
 class _Motion:
     """What every motion shares: CVODES with its options, and its failures with their causes."""
 
@@ -79,7 +112,7 @@ class _Motion:
                 f"the integrator was not started: {_TOO_LARGE} (gain x weight x span = {stiffness:.1e})"
             )
         try:
-            with _interruptible():
+            with interruptible():
                 reached = np.array(integrator(x0=state, p=parameters)["xf"])
         except RuntimeError as error:
             flag = re.search(r"CV_\w+", str(error))
@@ -147,6 +180,7 @@ class NominalMotion(_Motion):
         share = math.sqrt(len(self.state))
         return self._options | {name: min(tol, max(tol / share, _FINEST)) for name, tol in given.items()}
 
+    @interruptible()
     def _integrator(self, z: np.ndarray, options: dict[str, Any]) -> Any:
         import casadi as ca
 
@@ -154,8 +188,7 @@ class NominalMotion(_Motion):
         columns = ca.reshape(x, *self.state.shape)
         clock, p = ca.MX.sym("z"), ca.MX.sym("p", 3)
         ode = -(p[0] * ca.exp(-p[2] * clock) + p[1]) * ca.vec(self._product(columns))
-        with _interruptible():
-            return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
+        return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
 
     def _integrate(self, integrator: Any, a: float, b: float, c: float, end: float) -> np.ndarray:
         """Return the (instants, N, S) states that the integrator reaches from the present one, the last at ``end``."""
@@ -263,7 +296,7 @@ class SlidingMotion(_Motion):
             -R / self._unit * (self._mu1 * s - ca.fabs(sign) * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
         )
         problem = {"x": x, "t": clock, "p": p, "ode": ode}
-        with _interruptible():
+        with interruptible():
             integrator = ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options)
         weight = (phase.rho1 * phase.span + phase.pole) * self.in_weight.max()
         stiffness = (weight + phase.mu2 * phase.span + phase.reaching_pole) * float(z[-1] - start)
@@ -331,36 +364,6 @@ def _product_without_pattern(laplacian: sparse.csr_array, columns: int) -> Any:
             return ca.Function(name, [X, Y, seeds], [moved], inputs, outputs, options)
 
     return Product()
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let what a signal handler raises (KeyboardInterrupt) pass, which CasADi turns into a failure of CVODES."""
-    previous = signal.getsignal(signal.SIGINT)
-    if not callable(previous) or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    raised: list[BaseException] = []
-
-    def handler(number: int, frame: Any) -> None:
-        try:
-            previous(number, frame)
-        except BaseException as error:
-            raised.append(error)
-            raise
-
-    signal.signal(signal.SIGINT, handler)
-    try:
-        yield
-    except (RuntimeError, SystemError):
-        if raised:
-            raise raised[0] from None
-        raise
-    else:
-        if raised:
-            raise raised[0]
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def _to_casadi(matrix: sparse.csr_array) -> Any:

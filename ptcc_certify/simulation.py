@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.cvodes import NominalMotion
+from ptcc_certify.cvodes import NominalMotion, interruptible
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
@@ -121,40 +121,42 @@ def simulate(
         source = as_disturbance(
             "adversary" if disturbance is None else disturbance, graph.n_nodes, protocol.delta, float(instants.t[-1])
         )
-        return simulate_sliding(
-            graph,
-            protocol,
-            start[:, 0],
-            np.zeros(graph.n_nodes) if sigma0 is None else _start(graph, sigma0, "sigma0")[:, 0],
-            source,
-            instants,
-            rtol=rtol,
-            atol=atol,
-            boundary_layer=boundary_layer,
-        )
+        with interruptible():
+            return simulate_sliding(
+                graph,
+                protocol,
+                start[:, 0],
+                np.zeros(graph.n_nodes) if sigma0 is None else _start(graph, sigma0, "sigma0")[:, 0],
+                source,
+                instants,
+                rtol=rtol,
+                atol=atol,
+                boundary_layer=boundary_layer,
+            )
     for name, value in (("sigma0", sigma0), ("disturbance", disturbance), ("boundary_layer", boundary_layer)):
         if value is not None:
             raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
     t, left = _default_instants(protocol, remaining, samples, past) if times is None else _instants(protocol, times)
     scale = np.abs(start).max(axis=0)
     scale[scale == 0] = 1
-    run = NominalMotion(graph, start / scale, rtol, atol)
     gain, T = protocol.gain, float(protocol.T)
     residual = None
-    if protocol.prescribed:
-        before = left > 0
-        # Whichever of 1 - t/T and t is the small one holds the digits.
-        tau = np.where(left > 0.5, gain.tau(t), -np.log(np.where(before, left, 1)))[before]
-        parts = [run.sample(float(gain.rho1) * T, float(gain.pole), 1.0, tau)]
-        if not before.all():
-            residual = run.settle(float(gain.rho1) * T, float(gain.pole), tau[-1] if tau.size else 0.0)
-            parts.append(run.sample(0.0, float(gain.rho1) * T, 0.0, np.maximum(t[~before] / T - 1, 0)))
-        clock = np.append(gain.clock_at_tau(tau), np.full(t.size - tau.size, np.inf))
-        at_deadline = np.flatnonzero((left == 0) & (t == T))
-    else:
-        parts = [run.sample(0.0, float(gain.rho1) * T, 0.0, t / T)]
-        clock = gain.clock(t)
-        at_deadline = np.zeros(0, dtype=int)
+    with interruptible():
+        run = NominalMotion(graph, start / scale, rtol, atol)
+        if protocol.prescribed:
+            before = left > 0
+            # Whichever of 1 - t/T and t is the small one holds the digits.
+            tau = np.where(left > 0.5, gain.tau(t), -np.log(np.where(before, left, 1)))[before]
+            parts = [run.sample(float(gain.rho1) * T, float(gain.pole), 1.0, tau)]
+            if not before.all():
+                residual = run.settle(float(gain.rho1) * T, float(gain.pole), tau[-1] if tau.size else 0.0)
+                parts.append(run.sample(0.0, float(gain.rho1) * T, 0.0, np.maximum(t[~before] / T - 1, 0)))
+            clock = np.append(gain.clock_at_tau(tau), np.full(t.size - tau.size, np.inf))
+            at_deadline = np.flatnonzero((left == 0) & (t == T))
+        else:
+            parts = [run.sample(0.0, float(gain.rho1) * T, 0.0, t / T)]
+            clock = gain.clock(t)
+            at_deadline = np.zeros(0, dtype=int)
     states = np.moveaxis(np.concatenate(parts), 0, -1) * scale[:, None]
     return Trajectory(
         graph=graph,

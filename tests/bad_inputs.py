@@ -298,6 +298,7 @@ def _disturbed(name: str, says: str, text: str, *more: str) -> BadInput:
 
 
 SLIDING = [
+    _disturbed("beyond delta, with no run to show it", "beyond delta", "2", "--x0", "1,1,1,1,1,1", "--no-simulation"),
     _disturbed("code", "__import__", "__import__('os')"),
     _disturbed("an attribute", "column", "t.__class__"),
     _disturbed("a string", "column", "'t'"),
