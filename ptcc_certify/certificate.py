@@ -40,6 +40,7 @@ from ptcc_certify.reaching import ReachingTime, certified_reaching_times
 from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
 from ptcc_certify.simulation import simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
+from ptcc_certify.sliding_simulation import rounding_slack
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.summary import certificate_lines
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
@@ -459,15 +460,18 @@ ReachingTime(0, 1 before T_r)))
     if simulation is None and graph.n_nodes > SIMULATED_NODES:
         notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
         simulation = False
-    if simulation is False and isinstance(protocol, SlidingModeProtocol) and disturbance is not None:
-        as_disturbance(disturbance, graph.n_nodes, protocol.delta, float(protocol.T))  # refused beyond delta
-    if simulation is not False and start is not None:
+    begin = None if simulation is False else start
+    if isinstance(protocol, SlidingModeProtocol) and disturbance is not None and begin is None:
+        T = float(protocol.T)
+        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, T)
+        source.check(protocol.delta, graph.labels, T, rounding_slack(protocol))
+    if begin is not None:
         progress(STEPS[0])
         more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
         if sliding:
             more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
         try:
-            trajectory = simulate(graph, protocol, [float(x) for x in start], **more)
+            trajectory = simulate(graph, protocol, [float(x) for x in begin], **more)
         except SimulationError as error:
             notes.append(f"simulation: {error}")
     progress(STEPS[1])

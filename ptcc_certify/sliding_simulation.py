@@ -73,7 +73,7 @@ def simulate_sliding(
         As there.
     """
     began = time.perf_counter()
-    slack = _slack(protocol)
+    slack = rounding_slack(protocol)
     bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), slack)
     unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
     solver = _Solver(graph, protocol, disturbance, unit, rtol, atol)
@@ -180,7 +180,7 @@ class _Solver:
         phase, L = self.reaching, self.graph.laplacian()
         disturbance = self.disturbance
         assert isinstance(disturbance, StateDependent)
-        labels, delta, slack = self.graph.labels, self.protocol.delta, _slack(self.protocol)
+        labels, delta, slack = self.graph.labels, self.protocol.delta, rounding_slack(self.protocol)
         signs, reached = np.sign(sigma0), np.where(sigma0 == 0, 0.0, np.inf)
         state = np.concatenate([start - sigma0, sigma0]) / self.unit
         # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
@@ -336,7 +336,7 @@ class _Solver:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
         disturbance, labels, delta = self.disturbance, self.graph.labels, self.protocol.delta
         if isinstance(disturbance, StateDependent):
-            slack = _slack(self.protocol)
+            slack = rounding_slack(self.protocol)
             columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels, slack) for i in range(t.size))
             return np.stack(list(columns), axis=1)
         if isinstance(disturbance, Adversary) and layer is not None:
@@ -350,8 +350,8 @@ class _Solver:
             self.stats[key] += stats[key]
 
 
-def _slack(protocol: SlidingModeProtocol) -> float:
-    """Return by how much a float may exceed ``delta``, relatively: by rounding, and never so far as ``mu1``."""
+def rounding_slack(protocol: SlidingModeProtocol) -> float:
+    """Return by how much a float disturbance may exceed ``delta``, relatively; never as far as ``mu1``."""
     gap = (protocol.mu1 - protocol.delta) / (2 * protocol.delta) if protocol.delta else 0
     return min(TOLERANCE, float(gap))
 
