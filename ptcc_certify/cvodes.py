@@ -67,7 +67,7 @@ def interruptible() -> Iterator[None]:
     signal.signal(signal.SIGINT, handler)
     try:
         yield
-    except (RuntimeError, SystemError):
+    except Exception:
         if raised:
             raise raised[0] from None
         raise

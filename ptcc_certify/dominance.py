@@ -40,6 +40,8 @@ LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
 #: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
 _BITS, _SLACK = 40, 1e-9
 _ROUNDING = 1e-14
+#: In-weights from here on leave no room for rates, which may be four times as large.
+_LARGEST_WEIGHT = 2.0**1021
 #: Largest condition of a diagonal matrix that is searched for a leader group.
 _LARGEST_CONDITION = 1e6
 #: Losses of its rate that are tried for a leader group that is proved by a sparse factor.
@@ -252,10 +254,12 @@ def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupP
     """
     p = left_vector(graph)
     if graph.n_nodes > EXACT_NODES:
+        if not (largest := float(graph.in_weight().max())) < _LARGEST_WEIGHT:
+            raise NoCertificate(f"a leader group listens with the weight {largest:.3g}, too near to the largest float")
         if graph.n_nodes <= search:
             with contextlib.suppress(LMIError):
-                return _prove_large_group(graph, balanced, *_best_diagonal(graph, p if balanced else None))
-        return _prove_large_group(graph, balanced, p / p.max())
+                return _prove_large_group(graph, balanced, p, *_best_diagonal(graph, p if balanced else None))
+        return _prove_large_group(graph, balanced, p, p / p.max())
     weights = round_array(p / p.max())
     exact = tuple(Fraction(x) for x in weights.tolist())
     half = np.sqrt(weights)
@@ -287,9 +291,12 @@ def _best_diagonal(graph: SignedDigraph, p: np.ndarray | None) -> tuple[np.ndarr
 
 
 def _prove_large_group(
-    graph: SignedDigraph, balanced: bool, weights: np.ndarray, guess: float | None = None
+    graph: SignedDigraph, balanced: bool, p: np.ndarray, weights: np.ndarray, guess: float | None = None
 ) -> GroupProof:
-    """Prove a rate just below the one in floats, by default the smallest generalized eigenvalue, by a sparse factor."""
+    """Prove a rate just below the one in floats, by default the smallest generalized eigenvalue, by a sparse factor.
+
+    ``p`` is the left vector.
+    """
     from scipy import sparse
 
     weights = round_array(weights)
@@ -305,7 +312,7 @@ def _prove_large_group(
         said = f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical"
         raise NoCertificate(f"{said}: its proof would be long")
     basis, parents = None, None
-    if balanced and (whole := dyadic_left_vector(graph)) and len(set((weights / np.array(whole)).tolist())) == 1:
+    if balanced and (whole := dyadic_left_vector(graph, p)) and len(set((weights / np.array(whole)).tolist())) == 1:
         parents = _spanning_tree(L)
         basis = _differences(parents, np.array(whole), gauge(graph))  # type: ignore[arg-type]
     elif balanced:

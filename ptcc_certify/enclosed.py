@@ -71,8 +71,9 @@ class EnclosedOutcome:
         """Return an outcome in floats with what is proved in its place: exact ends, middles, degenerate groups."""
         if self.middle is None or self.degenerate is None:
             return found
-        unit = float(self.unit)
-        final: list[Fraction | float] = [x * unit for x in self.middle.tolist()]
+        final: list[Fraction | float] = self.middle.tolist()
+        if self.unit != 1:  # floats may not hold the product
+            final = [Fraction(x) * self.unit for x in final]
         for v, x in self.exact.items():
             final[v] = x
         values = [final[c.nodes[0]] * sign for c in found.influence.balanced for sign in [(c.gauge or (1,))[0]]]

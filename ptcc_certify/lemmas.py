@@ -182,7 +182,8 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     """Lemma 2.3: the positive ``p`` with ``p' M(L) = 0`` and ``p' 1 = 1`` of a strongly connected graph.
 
     Computed without subtractions (Grassmann, Taksar, Heyman 1985), hence to full relative accuracy in each entry
-    however far apart the weights lie; above 500 nodes by a sparse factor, to its accuracy.
+    however far apart the weights lie; above 500 nodes by a sparse factor, to its accuracy. Where everybody listens to
+    as much as is listened to them, as in undirected graphs, it is ``1/N``: that is tried first, exactly.
 
     Parameters
     ----------
@@ -204,7 +205,7 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     array([0.75, 0.25])
     """
     if graph.n_nodes > DENSE_NODES:
-        return _sparse_left_vector(graph)
+        return np.full(graph.n_nodes, 1 / graph.n_nodes) if _all_ones(graph) else _sparse_left_vector(graph)
     rate = np.abs(graph.dense_laplacian())
     np.fill_diagonal(rate, 0.0)
     rate /= rate.max(initial=0.0) or 1.0
@@ -228,6 +229,28 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     return p / p.sum()
 
 
+def _all_ones(graph: SignedDigraph) -> bool:
+    """Tell whether the left vector of a graph is the vector of ones, exactly; False if the graph is not connected."""
+    from scipy.sparse.csgraph import connected_components
+
+    size, heard = np.abs(graph.weights), graph.in_weight()
+    with np.errstate(all="ignore"):
+        surplus = np.abs(heard - np.bincount(graph.source, size, minlength=graph.n_nodes))
+    if (surplus > 1e-9 * heard).any() or connected_components(graph.adjacency(), directed=False)[0] > 1:
+        return False
+    return _annihilates(graph, [1] * graph.n_nodes)
+
+
+def _annihilates(graph: SignedDigraph, p: Sequence[int]) -> bool:
+    """Tell whether ``p' M(L) = 0``, exactly."""
+    surplus = [Fraction(0)] * graph.n_nodes
+    for edge, (s, t) in enumerate(zip(graph.source.tolist(), graph.target.tolist(), strict=True)):
+        flow = p[t] * abs(graph.exact_weight(edge))
+        surplus[t] += flow
+        surplus[s] -= flow
+    return not any(surplus)
+
+
 def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     """Solve ``p' M(L) = 0`` with the last entry of ``p`` set to 1, by a sparse factor."""
     from scipy import sparse
@@ -248,8 +271,15 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     return p / p.sum()
 
 
-def dyadic_left_vector(graph: SignedDigraph) -> list[int] | None:
+def dyadic_left_vector(graph: SignedDigraph, p: np.ndarray | None = None) -> list[int] | None:
     """Lemma 2.3 in integers of at most 40 bits, if there is such a ``p``, as in undirected graphs; None if not.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Strongly connected.
+    p : (N,) array, optional
+        :func:`left_vector` by default.
 
     Examples
     --------
@@ -258,18 +288,13 @@ def dyadic_left_vector(graph: SignedDigraph) -> list[int] | None:
     >>> dyadic_left_vector(SignedDigraph.from_edges([(1, 2, 3), (2, 1, 1)])) is None
     True
     """
-    p = left_vector(graph)
+    p = left_vector(graph) if p is None else p
     whole = np.rint(np.ldexp(p / p.max(), 40)).astype(np.int64).tolist()
     if min(whole) <= 0:
         return None
     common = math.gcd(*whole)
     whole = [w // common for w in whole]
-    surplus = [Fraction(0)] * graph.n_nodes
-    for edge, (s, t) in enumerate(zip(graph.source.tolist(), graph.target.tolist(), strict=True)):
-        flow = whole[t] * abs(graph.exact_weight(edge))
-        surplus[t] += flow
-        surplus[s] -= flow
-    return None if any(surplus) else whole
+    return whole if _annihilates(graph, whole) else None
 
 
 def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:

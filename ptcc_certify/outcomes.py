@@ -155,11 +155,11 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
         eta: Sequence[Number]
         if exact or block.n_nodes <= EXACT_NODES:
             eta = exact_left_vector(block)
-        elif whole := dyadic_left_vector(block):
-            total = sum(whole)
-            eta = [Fraction(w, total) for w in whole]
         else:
-            eta = left_vector(block).tolist()
+            p = left_vector(block)
+            whole = dyadic_left_vector(block, p)
+            total = sum(whole or ())
+            eta = [Fraction(w, total) for w in whole] if whole else p.tolist()
         voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
     if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
         return Influence(structure, tuple(voices), None, False)

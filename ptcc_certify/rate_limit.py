@@ -77,6 +77,8 @@ def prove_rate_limit(structure: Structure) -> RateLimit | None:
     A = [[row.get(j, Fraction(0)) for j in nodes] for row in rows]
     with np.errstate(all="ignore"):
         for gap in _GAPS:
+            if not np.isfinite(decay * (1 + gap)):
+                break
             found = _proved(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
             if found is not None:
                 return found

@@ -22,7 +22,7 @@ FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
 SLICE = 20
 #: Exponents beyond this are refused, lest a witness fill the memory.
 LARGEST_SHIFT = 2**16
-#: Bits that the entries may be shifted by in all.
+#: Bits that the entries may be shifted by, or multiplied by, in all.
 LARGEST_BITS = 4_000_000_000
 #: Pairs of entries of a column of the factor that are multiplied: in all, and kept at a time by the standard library.
 LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 20_000_000
@@ -305,6 +305,8 @@ def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
             row = E[i]
             for j, y in part[:number]:
                 row[j] -= x * y
+    if sum(map(len, E)) * times.bit_length() > LARGEST_BITS:
+        return False
     if times != 1:
         E = [{j: value * times for j, value in row.items()} for row in E]
     for (i, j), value in T.items():
@@ -344,6 +346,8 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     sums = _pair_products(n, first, indptr, indices, _slices_of(data, width, slices))
     if squares is None or sums is None:
         return _residual_plain(n, T, factor, times, d)
+    if (len(sums[0]) + corner.size) * times.bit_length() > LARGEST_BITS:
+        return False
     block = sum(square.astype(object) << (width * m) for m, square in enumerate(squares))
     keys, limbs = sums
     values = sum(limb.astype(object) << (width * m) for m, limb in enumerate(limbs))

@@ -3,7 +3,10 @@ known exactly, and on large ones."""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import signal
+import tracemalloc
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -21,12 +24,15 @@ from ptcc_certify import certificate as certificate_module
 from ptcc_certify import dominance, outcomes
 from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.checker import check
+from ptcc_certify.cvodes import interruptible
 from ptcc_certify.dominance import dominant_members
+from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import read_graph
 from ptcc_certify.lemmas import laplacian_spectrum, left_vector
 from ptcc_certify.outcomes import outcome
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.sparse_definite import residual_definite
 from ptcc_certify.structure import analyse
 from ptcc_certify.summary import certificate_lines
 
@@ -416,3 +422,76 @@ def test_a_forged_tree_is_rejected():
         rejected(changed(data, where, new), "dominance of")
     weights = ("lyapunov", "members", 0, "blocks", 0, "diagonal", 0)
     rejected(changed(data, weights, "0.9"), "dominance of")
+
+
+def mean_of_start(cert: Certificate) -> list[Fraction]:
+    """Return the end of a balanced undirected graph, of all agents alike."""
+    camps = cert.structure.closed_components[0].gauge or ()
+    mean = sum((g * Fraction(x) for g, x in zip(camps, cert.start or (), strict=True)), Fraction(0)) / len(camps)
+    return [g * mean for g in camps]
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["path", "ring"])
+def test_long_undirected_groups_have_an_exact_left_vector(closed: bool):
+    """A factor in floats finds it to 1e-11 only, and the cube of the Laplacian is not proved."""
+    n = 1500
+    graph = undirected([(i, (i + 1) % n, Fraction((-1) ** i, 3)) for i in range(n - 1 + closed)])
+    assert left_vector(graph).tolist() == [1 / n] * n
+    cert = certify(graph, NOMINAL, list(range(n)), simulation=False, method="perron")
+    assert cert.verdict == "certified" and cert.rate is not None, cert.notes
+    best = 4 / 3 * (1 - np.cos((2 if closed else 1) * np.pi / n))
+    assert 0.7 * best <= float(cert.rate) <= best * (1 + 1e-6)
+    assert cert.outcome is not None and list(cert.outcome.final_state) == mean_of_start(cert)
+
+
+def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
+    ring = [(i, (i + 1) % 600, 1) for i in range(600)]
+    assert left_vector(SignedDigraph.from_edges(ring)).tolist() == [1 / 600] * 600
+    nearly = [*ring[1:], (0, 1, 1 + Fraction(1, 10**12))]
+    assert left_vector(SignedDigraph.from_edges(nearly)).tolist() != [1 / 600] * 600
+    with pytest.raises((HypothesisError, RuntimeError)):
+        left_vector(undirected([(i, i + 1, 1) for i in range(0, 600, 2)]))
+
+
+@pytest.mark.parametrize("method", ["perron", "best"])
+@pytest.mark.parametrize("weight", [1.7e308, 1e306])
+def test_weights_near_the_largest_float_are_undecided(weight: float, method: str):
+    star = undirected([(0, i, weight) for i in range(1, 130)])
+    for graph in (star, SignedDigraph.from_edges([(i, (i + 1) % 130, 1.7e308) for i in range(130)])):
+        cert = certify(graph, NOMINAL, simulation=False, method=method)
+        assert cert.verdict == "undecided"
+        assert any("too near to the largest float" in note for note in cert.notes)
+
+
+def test_ends_below_the_floats_are_kept():
+    graph = SignedDigraph.from_edges([(i, (i + 1) % 130, Fraction(1, 1 + i % 3)) for i in range(130)])
+    cert = certify(graph, NOMINAL, ["1e-400"] * 130, simulation=False)
+    assert cert.outcome is not None and cert.outcome.degenerate == ()
+    for value in (*cert.outcome.final_state, *cert.outcome.consensus_values):
+        assert abs(Fraction(value) * 10**400 - 1) < 1e-9
+
+
+@pytest.mark.parametrize("numpy", [False, True])
+def test_factors_that_would_fill_the_memory_once_multiplied_are_not_judged(numpy: bool):
+    n, low = 250, -(2**16)
+    columns = [list(range(k, n)) for k in range(n)]
+    indices = [i for column in columns for i in column]
+    indptr = np.cumsum([0, *map(len, columns)]).tolist()
+    diagonal = list(range(n)), list(range(n)), [1] * n
+    tracemalloc.start()
+    factor = indptr, indices, [1] * len(indices)
+    assert not residual_definite(n, diagonal, list(range(n)), factor, [low] * n, low, power=low, numpy=numpy)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10**8
+
+
+def test_an_interrupt_that_casadi_turns_into_any_error_is_not_lost():
+    for lost in (ValueError, TypeError, RuntimeError, None):
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            if lost is not None:
+                raise lost("what was interrupted")
+    with pytest.raises(ValueError, match="a failure"), interruptible():
+        raise ValueError("a failure")

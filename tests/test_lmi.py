@@ -364,3 +364,36 @@ def test_leaders_that_do_not_decay_are_refused():
         lmi.Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[1.0]]), np.array([[-1.0]])).interval()
     weak = lmi.Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1e-170]]), np.array([[1.0]])).interval()
     assert math.isfinite(weak.exact)  # a weak coupling still bounds rho
+
+
+def test_where_clarabel_panics_it_is_asked_again_without_splitting_the_matrix():
+    """It panics on this pattern: five followers, three of which listen to each other, of nineteen leaders."""
+    A_F = np.diag([3.5, 9.9, 3.2, 2.8, 4.9])
+    A_F[[0, 1, 2, 4], [4, 4, 0, 1]] = 0.36, 3.2, -1.7, -4.1
+    A_FL = np.zeros((5, 19))
+    A_FL[[0, 1, 1, 2, 2, 3, 3, 4, 4], [8, 5, 18, 2, 10, 3, 13, 11, 12]] = 3.1, 4.6, -2, -0.56, 0.94, -2, -0.8, 0.5, 0.3
+    found = lmi.coupled_lyapunov([lmi.FixedLeader(np.ones(19), np.full(19, 3.0))], A_FL, A_F)
+    form = np.block([[3 * np.eye(19), A_FL.T * found.followers], [found.followers[:, None] * A_FL, np.zeros((5, 5))]])
+    form[19:, 19:] = found.followers[:, None] * A_F + A_F.T * found.followers
+    assert np.linalg.eigvalsh(form)[0] > 0
+
+
+class PanicException(BaseException):
+    """The name of what pyo3 raises."""
+
+
+@pytest.mark.parametrize(
+    ("raised", "seen"),
+    [
+        (PanicException("index"), "Clarabel panicked"),
+        (ValueError("contains NaN or Inf"), "NaN"),
+        (KeyboardInterrupt(), ""),
+    ],
+)
+def test_what_a_solver_raises_is_no_certificate_but_for_interrupts(monkeypatch, raised, seen):
+    def solve(self, **options):
+        raise raised
+
+    monkeypatch.setattr(cp.Problem, "solve", solve)
+    with pytest.raises(lmi.NoCertificate if seen else KeyboardInterrupt, match=seen or None):
+        lmi.diagonal_lyapunov([[2.0, 1.0], [1.0, 2.0]])
