@@ -20,16 +20,20 @@ from typing import Any
 import numpy as np
 
 from lmi.errors import LMIError
+from ptcc_certify.actuator import Actuator
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.document import Writer, certificate_document, outcome_witness
+from ptcc_certify.effort import Effort, Limits, Starts, bound_effort, starts_within
 from ptcc_certify.enclosed import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
+from ptcc_certify.gain import parameter
 from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.input_bounds import Form
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
@@ -38,7 +42,7 @@ from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
 from ptcc_certify.rationals import as_fraction, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
 from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
-from ptcc_certify.simulation import simulate
+from ptcc_certify.simulation import PAST, simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.sliding_simulation import rounding_slack
 from ptcc_certify.structure import Claim, Structure, analyse
@@ -106,6 +110,12 @@ class Certificate:
     method : str
     at : Fraction or None
         Instant for which the bound was optimised.
+    starts : Starts or None
+        The set of starts for which the input is bounded; None: that of ``start`` alone.
+    limits : tuple of Limits
+        Limits of the gain that are judged besides.
+    delta : Fraction or None
+        Nominal protocol: bound of the disturbances that are judged besides.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
     """
@@ -129,6 +139,9 @@ class Certificate:
     limit: RateLimit | None
     method: str
     at: Fraction | None
+    starts: Starts | None
+    limits: tuple[Limits, ...]
+    delta: Fraction | None
     notes: tuple[str, ...]
 
     @property
@@ -212,7 +225,41 @@ class Certificate:
             found.append(Obligation("sliding-bound", "protocol"))
             if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
                 found.append(Obligation("reaching-time", "reaching_time"))
+        if self.effort is not None:
+            found += self.effort.obligations
         return tuple(found)
+
+    @cached_property
+    def effort(self) -> Effort | None:
+        """What is proved about the input; None if no decay was proved."""
+        if self.rate is None and not self.constant:
+            return None
+        forms: list[Form | None] = []
+        V = self.lyapunov
+        if V is not None and V.blocks and self.proof.rate is not None:
+            gauge = [] if self.structure.gauge is None else self.structure.gauge[list(V.nodes)].tolist()
+            weights = V.weights
+            forms.append(Form(self.proof.rate, V.coordinates, V.nodes, weights, None, min(weights), gauge))
+        forms += [
+            None
+            if m.dominance is not None
+            else Form(m.rate, "E", m.nodes, m.diagonal, m.matrix, m.lowest if m.matrix else min(m.diagonal or ()))
+            for m in self.sharpening.members
+        ]
+        return bound_effort(
+            self.structure,
+            self.protocol,
+            forms,
+            rate=self.rate,
+            limit=None if self.limit is None else self.limit.value,
+            start=self.start,
+            starts=self.starts,
+            sigma0=self.sigma0,
+            influence=self.influence,
+            distances=[None if m.distance is None else m.distance.agents for m in self.envelope.members],
+            limits=self.limits,
+            delta=self.delta,
+        )
 
     @cached_property
     def checked(self) -> CheckReport | None:
@@ -386,6 +433,9 @@ def certify(
     simulation: bool | None = None,
     method: str = "best",
     at: Any = None,
+    starts: Any = None,
+    limits: Sequence[Actuator | Limits] = (),
+    delta: Any = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -408,6 +458,13 @@ def certify(
         Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.sharpen`.
     at : number, optional
         An instant before the deadline at which the bound should be smallest.
+    starts : Starts or positive number, optional
+        The set of starts for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
+        ``||X(0)||_inf <= R``.
+    limits : sequence of Actuator
+        Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+    delta : number, optional
+        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -453,6 +510,13 @@ ReachingTime(0, 1 before T_r)))
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
     instant = None if at is None else _instant(at, protocol)
     structure = analyse(graph)
+    region = starts if starts is None or isinstance(starts, Starts) else starts_within(structure, starts)
+    if region is not None and len(region.center) != graph.n_nodes:
+        raise ParameterError(f"the starts have {len(region.center)} entries for {graph.n_nodes} agents")
+    if sliding and (limits or delta is not None):
+        raise ParameterError("limits and delta of certify are for the nominal protocol; the sliding mode has its own")
+    spread = None if delta is None else parameter("delta", delta)
+    judged = tuple(_limits(entry, protocol) for entry in limits)
     start = None if x0 is None else _start(structure, x0, "x0")
     manifold, reaching = _reaching(structure, protocol, sigma0)
     trajectory = comparison = None
@@ -462,9 +526,9 @@ ReachingTime(0, 1 before T_r)))
         simulation = False
     begin = None if simulation is False else start
     if isinstance(protocol, SlidingModeProtocol) and disturbance is not None and begin is None:
-        T = float(protocol.T)
-        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, T)
-        source.check(protocol.delta, graph.labels, T, rounding_slack(protocol))
+        horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
+        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
+        source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
     if begin is not None:
         progress(STEPS[0])
         more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
@@ -520,6 +584,9 @@ ReachingTime(0, 1 before T_r)))
         limit=limit,
         method=method,
         at=instant,
+        starts=region,
+        limits=judged,
+        delta=spread,
         notes=tuple(notes),
     )
     if trajectory is not None and (certificate.envelope.members or sliding):
@@ -530,6 +597,17 @@ ReachingTime(0, 1 before T_r)))
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
         certificate = replace(certificate, notes=(note, *certificate.notes))
     return certificate
+
+
+def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
+    """Return limits of the gain, or refuse them."""
+    limits = Limits(entry.gain_cap, entry.stop_before, entry.sample_period)
+    if limits == Limits():
+        raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
+    for name, value in (("stop_before", limits.stop_before), ("sample_period", limits.sample_period)):
+        if value is not None and not value < protocol.T:
+            raise ParameterError(f"{name} = {float(value):.6g} is not below the deadline {float(protocol.T):.6g}")
+    return limits
 
 
 def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
@@ -634,7 +712,7 @@ def _precision_note(graph: SignedDigraph) -> str:
     decades = len(str(ratio.numerator // ratio.denominator)) - 1
     if decades < MANY_DECADES:
         return "no rate was proved"
-    return f"no rate was proved; the weights span {decades} decades, of which float64 resolves less than 16"
+    return f"no rate was proved; the weights span {decades} decades, which may be too many for float64"
 
 
 def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], notes: list[str]) -> float | None:

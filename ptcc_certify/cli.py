@@ -23,6 +23,7 @@ import click
 from ptcc_certify.errors import ParameterError, PTCCError
 
 if TYPE_CHECKING:
+    from ptcc_certify.actuator import Actuator
     from ptcc_certify.certificate import Certificate
     from ptcc_certify.graph import SignedDigraph
     from ptcc_certify.protocols import Protocol
@@ -64,16 +65,22 @@ _protocol_options = _options(
     click.option("--mu1", show_default="2", help="Sliding mode: switching gain, above delta."),
     click.option("--mu2", show_default="1", help="Sliding mode: constant part of the reaching gain."),
     click.option("--mu3", show_default="1", help="Sliding mode: factor of its growing part."),
-    click.option("--delta", show_default="1", help="Sliding mode: bound of every disturbance."),
+    click.option("--delta", show_default="1", help="Bound of every disturbance."),
     click.option(
         "--disturbance",
         metavar="EXPR",
         show_default="adversary",
-        help="Of the simulated run: an expression of k and t, adversary, telegraph or none.",
+        help="Of the simulated run: an expression of k and t, adversary (sliding mode), telegraph or none.",
     ),
     click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
     click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random starts."),
+)
+_LIMITS = ("gain_cap", "stop_before", "sample_period")
+_limit_options = _options(
+    click.option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
+    click.option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
+    click.option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
 )
 _SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
@@ -135,6 +142,8 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     show_default=True,
     help="Lyapunov functions searched beside the paper's.",
 )
+@_limit_options
+@click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
 @click.option(
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
@@ -151,6 +160,7 @@ def certify(
     method: str,
     at: str | None,
     simulation: bool | None,
+    initial_bound: str | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -161,11 +171,15 @@ def certify(
     from ptcc_certify.summary import certificate_lines
 
     expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
+    bound = _number(initial_bound, "--initial-bound")
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
     start = _start(x0, seed, signed)
-    sliding = _sliding_options(protocol, options, seed, signed)
+    more = _sliding_options(protocol, options, seed, signed)
+    if kind == "nominal":
+        actuator = _actuator(options)
+        more = {"limits": [] if actuator is None else [actuator], "delta": _number(options["delta"], "--delta")}
     with _progress(STEPS) as begin:
         certificate = run(
             signed,
@@ -174,8 +188,9 @@ def certify(
             method=method,
             at=instant,
             simulation=simulation,
+            starts=bound,
             progress=begin,
-            **sliding,
+            **more,
         )
     if output:
         certificate.save(output)
@@ -221,6 +236,7 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
 @cli.command()
 @_graph_options
 @_protocol_options
+@_limit_options
 @click.option(
     "--dimension", type=click.IntRange(1, 1000), default=1, show_default=True, help="State components per agent."
 )
@@ -252,17 +268,20 @@ def simulate(
     if suffix in FIGURES and dimension > 1:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     _refuse_output(output, graph)
-    protocol = _protocol(kind, options)
+    protocol = _protocol(kind, options, ("delta", "disturbance"))
     if kind == "sliding-mode" and dimension > 1:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = _read(graph, **options)
+    more = _sliding_options(protocol, options, seed, signed)
+    if kind == "nominal":
+        more = {"actuator": _actuator(options), "delta": options["delta"], "disturbance": options["disturbance"]}
     trajectory = run(
         signed,
         protocol,
         _start_columns(x0, seed, signed, dimension),
         samples=samples,
         boundary_layer=boundary_layer,
-        **_sliding_options(protocol, options, seed, signed),
+        **more,
     )
     if output and suffix in FIGURES:
         from ptcc_certify.plots import plot_run
@@ -273,7 +292,7 @@ def simulate(
         write_atomically(output, trajectory.to_csv())
     else:
         click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
-    if protocol.prescribed and not trajectory.deadline_resolved:
+    if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return OK
 
@@ -371,18 +390,23 @@ def _read(
     )
 
 
-def _protocol(kind: str, options: dict[str, Any]) -> Protocol:
+def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
+    """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
     from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     if kind == "nominal":
         for name in (*_SLIDING_DEFAULTS, "disturbance", "sigma0"):
-            if options[name] is not None:
+            if options[name] is not None and name not in disturbed:
                 flag = name.replace("_", "-")
                 raise ParameterError(
                     f"--{flag} belongs to --protocol sliding-mode; leave it out or change the protocol"
                 )
         return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
+    for name in _LIMITS:
+        if options[name] is not None:
+            flag = name.replace("_", "-")
+            raise ParameterError(f"--{flag} belongs to --protocol nominal; leave it out or change the protocol")
     if options["T"] is not None:
         raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
     own = {name: default if options[name] is None else options[name] for name, default in _SLIDING_DEFAULTS.items()}
@@ -402,6 +426,15 @@ def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, gra
         "sigma0": _sigma0(options["sigma0"], seed, graph),
         "disturbance": as_disturbance(source, graph.n_nodes, protocol.delta, horizon, seed),
     }
+
+
+def _actuator(options: dict[str, Any]) -> Actuator | None:
+    """Return the limits of the gain; None if there are none."""
+    from ptcc_certify.actuator import Actuator
+
+    given = {name: _number(options[name], f"--{name.replace('_', '-')}") for name in _LIMITS}
+    actuator = Actuator(**given)
+    return None if actuator.ideal else actuator
 
 
 def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:

@@ -13,6 +13,7 @@ import numpy as np
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.checker import MANY_COMPONENTS, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, digest
 from ptcc_certify.dominance import DominantMember
+from ptcc_certify.effort import Peak, effort_section, peak_witness
 from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
@@ -47,14 +48,14 @@ class Writer:
     ----------
     files : dict of str to bytes
         Names and contents of the side files, ``.npy`` vectors of 64-bit numbers.
-    told : set of int
-        The proofs of leader groups that are written already, by identity.
+    told : set of tuple
+        The proofs of leader groups that are written already: first row, rate, weights.
     """
 
     def __init__(self, labels: Sequence[str], files: bool = False):
         self.labels, self._aside = labels, files
         self.files: dict[str, bytes] = {}
-        self.told: set[int] = set()
+        self.told: set[tuple[int, Fraction, bytes]] = set()
 
     def aside(self, length: int) -> bool:
         """Tell whether a vector of this length goes to a side file."""
@@ -133,7 +134,7 @@ def certificate_document(certificate: Certificate, verdict: str, files: bool = F
         "sigma0": out.state("sigma", certificate.sigma0),
         "outcome": outcome,
         "reaching_time": _reaching_section(certificate),
-        "effort": None,
+        "effort": effort_section(certificate.effort, graph.labels, format_exact),
         "proof": [obligation_section(o, certificate, out) for o in certificate.obligations],
         "verdict": verdict,
     }
@@ -322,8 +323,10 @@ def _dominance_witness(member: DominantMember, out: Writer) -> dict[str, Any]:
     first = 0
     for proof in member.groups:
         rate = format_exact(proof.rate)
-        told = id(proof) in out.told
-        out.told.add(id(proof))
+        unit = math.frexp(float(proof.weights[0]))[1]
+        key = first, proof.rate, np.ldexp(proof.weights, -unit).tobytes()
+        told = key in out.told
+        out.told.add(key)
         if proof.factor is None or told:
             groups.append(rate)
         else:
@@ -573,6 +576,8 @@ def obligation_section(obligation: Obligation, certificate: Certificate, out: Wr
     witness = obligation.witness
     if isinstance(witness, DominantMember):
         witness = _dominance_witness(witness, out)
+    elif isinstance(witness, Peak):
+        witness = peak_witness(witness, certificate.graph.labels, format_exact)
     elif isinstance(witness, EnclosedOutcome):
         u = witness.witness
         by_label = zip(certificate.graph.labels, map(repr, u.tolist()), strict=True)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptcc_certify.actuator import Actuator, as_forcing, simulate_limited
 from ptcc_certify.cvodes import NominalMotion, interruptible
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
@@ -30,6 +31,8 @@ from ptcc_certify.trajectory import Trajectory
 if TYPE_CHECKING:
     from ptcc_certify.graph import Exact, SignedDigraph
 
+#: How far a run goes past the deadline unless told otherwise, as a share of it.
+PAST = 0.25
 _PAST_SAMPLES = 5
 # 1 - t/T at 0.5 T, 0.9 T, 0.99 T.
 _MARKS = (0.5, 0.1, 0.01)
@@ -43,10 +46,14 @@ def simulate(
     sigma0: Any = None,
     disturbance: Any = None,
     boundary_layer: float | None = None,
+    actuator: Actuator | None = None,
+    delta: Exact | None = None,
+    noise: Any = None,
+    noise_bound: Exact | None = None,
     times: Iterable[Exact] | None = None,
     remaining: float = 1e-8,
     samples: int = 201,
-    past: float = 0.25,
+    past: float = PAST,
     rtol: float = 1e-11,
     atol: float = 1e-11,
 ) -> Trajectory:
@@ -54,6 +61,9 @@ def simulate(
 
     The nominal protocol gives ``X' = -gain(t) L X``. The sliding-mode protocol under a disturbance gives the Filippov
     solution: every sliding variable reaches 0 at a root of its own equation and stays there.
+
+    The nominal protocol may act through an :class:`~ptcc_certify.actuator.Actuator`, and under a disturbance and
+    measurement noise: ``X' = -gain(t) L (X + n) + d``, the gain being the one that acts.
 
     Parameters
     ----------
@@ -68,9 +78,17 @@ def simulate(
         Sliding mode: ``sigma(0)``, by default 0, which leaves no reaching phase.
     disturbance : optional
         Sliding mode: whatever :func:`ptcc_certify.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``; by
-        default the adversary ``d_k = delta sign(sigma_k)``. It is refused where it exceeds ``delta``.
+        default the adversary ``d_k = delta sign(sigma_k)``. It is refused where it exceeds ``delta``. Nominal
+        protocol: one that reads neither states nor sliding variables, by default none.
     boundary_layer : float, optional
         Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
+    actuator : Actuator, optional
+        Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
+    delta : int, float, str or Fraction, optional
+        Nominal protocol: the bound of the disturbance, needed with it.
+    noise, noise_bound : optional
+        Nominal protocol: what is added to every measurement, and its bound, like ``disturbance`` and ``delta``; with
+        an actuator that bounds the gain.
     times : increasing numbers >= 0, optional
         The instants wanted. One that a float cannot tell from ``T`` counts as ``T``.
     remaining, samples : float, int
@@ -79,7 +97,8 @@ def simulate(
     past : float
         Without ``times``: go on to ``T (1 + past)``.
     rtol, atol : float
-        Tolerances of CVODES; ``atol`` is relative to the largest entry of each column of ``x0``.
+        Tolerances of CVODES; ``atol`` is relative to the largest entry of each column of ``x0``, or to ``delta T`` or
+        ``noise_bound`` of the nominal protocol if that is larger.
 
     Returns
     -------
@@ -91,7 +110,7 @@ def simulate(
     ParameterError
         ``x0`` has a wrong shape or an entry that is not finite, or an option is outside its domain.
     SimulationError
-        The integrator failed; the message names the cause.
+        The integrator failed, or a sampled run outgrew floats; the message names the cause.
 
     Examples
     --------
@@ -101,6 +120,9 @@ def simulate(
     >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1])
     >>> run.final_state.round(9)
     array([ 1., -1.])
+    >>> run = simulate(foes, run.protocol, [3, 1], actuator=Actuator(gain_cap=11))  # e^(-2 s_eff(T)) = 0.00018
+    >>> run.final_state.round(5)
+    array([ 1.00037, -0.99963])
     >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*k*t)")
@@ -113,6 +135,10 @@ def simulate(
         if not 1e-15 <= tolerance <= 0.1:
             raise ParameterError(f"{name} = {tolerance} is outside its domain; {name} must be between 1e-15 and 0.1")
     if isinstance(protocol, SlidingModeProtocol):
+        nominal = {"actuator": actuator, "delta": delta, "noise": noise, "noise_bound": noise_bound}
+        for name, value in nominal.items():
+            if value is not None:
+                raise ParameterError(f"{name} belongs to the nominal protocol; leave it out or change the protocol")
         if np.ndim(x0) != 1 or np.ndim(sigma0) > 1:
             raise ParameterError("the sliding mode is simulated from one start at a time; give N numbers x0 and sigma0")
         if boundary_layer is not None and not 1e-12 <= boundary_layer <= 1e12:
@@ -133,10 +159,15 @@ def simulate(
                 atol=atol,
                 boundary_layer=boundary_layer,
             )
-    for name, value in (("sigma0", sigma0), ("disturbance", disturbance), ("boundary_layer", boundary_layer)):
+    for name, value in (("sigma0", sigma0), ("boundary_layer", boundary_layer)):
         if value is not None:
             raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
     t, left = _default_instants(protocol, remaining, samples, past) if times is None else _instants(protocol, times)
+    with interruptible():
+        forcing = as_forcing(graph, protocol.T, disturbance, delta, noise, noise_bound, float(t[-1]))
+        if forcing is not None or (actuator is not None and not actuator.ideal):
+            begin = start[:, 0] if np.ndim(x0) == 1 else start
+            return simulate_limited(graph, protocol, begin, t, left, actuator, forcing, rtol=rtol, atol=atol)
     scale = np.abs(start).max(axis=0)
     scale[scale == 0] = 1
     gain, T = protocol.gain, float(protocol.T)

@@ -59,7 +59,7 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
 
 
 def certificate_lines(certificate: Certificate, name: str) -> list[str]:
-    """Return the lines of ``ptcc certify``: at most 24 for a connected graph."""
+    """Return the lines of ``ptcc certify``: at most 28 for a connected graph."""
     structure, p = certificate.structure, certificate.protocol
     graph = structure.graph
     negative = int((graph.sign < 0).sum())
@@ -85,6 +85,7 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
             groups = ", ".join(map(str, certificate.outcome.degenerate))
             lines.append(_line("", f"degenerate start: leader group {groups} meets at 0, although it is balanced"))
     lines += _rate_lines(certificate)
+    lines += _effort_lines(certificate)
     lines += _simulation_lines(certificate)
     lines += [_line("note", note) for note in certificate.notes[:3]]
     lines.append(_line("verdict", certificate.verdict))
@@ -151,6 +152,66 @@ def _distance_lines(certificate: Certificate) -> list[str]:
         listed = _listed([f"{label} {_up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
         lines.append(_line("", f"at t = {float(certificate.at):.12g}: {listed}"))
     return lines
+
+
+def _effort_lines(certificate: Certificate) -> list[str]:
+    """Tell whether the input stays finite, and how large it gets."""
+    effort = certificate.effort
+    if effort is None or certificate.constant:
+        return []
+    lower, upper = effort.threshold
+    product = f"rho2 kappa min Re lambda >= {_down(lower, 5)}" if lower is not None else "nothing else is proved"
+    if effort.bounded:
+        how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
+        lines = [_line("input", f"bounded up to the deadline for every start: {how}")]
+    elif effort.bounded is False:
+        below = f" <= {_up(upper, 5)}" if upper is not None and effort.by == "limit" else " = 1 or less"
+        lines = [
+            _line("INPUT", "NOT BOUNDED: the state converges, but from some starts the input grows without limit"),
+            _line("", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"),
+        ]
+    else:
+        lines = [_line("input", f"bounded or not is undecided: {product}, it takes 1")]
+    sizes = []
+    if effort.peak is not None:
+        most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
+        label = certificate.graph.labels[most]
+        sizes = [f"|u_k| <= {_up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {_up(effort.peak.norm, 4)}"]
+    sizes += [f"int ||u||^2 dt <= {_up(effort.energy.value, 4)}"] if effort.energy is not None else []
+    sizes += [f"int ||u|| dt <= {_up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
+    if sizes:
+        whom = "" if effort.starts is None else " for all these starts"
+        part = " (integrals of the nominal part)" if effort.sliding is not None else ""
+        lines.append(_line("effort", ", ".join(sizes) + whom + part))
+    if effort.sliding is not None and not effort.sliding.bounded:
+        lines.append(_line("", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"))
+    for entry in effort.limited:
+        named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
+        said = [f"{what}{float(x):.6g}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
+        agents = "" if entry.agents is None else f", every agent within {_up(max(entry.agents), 3)} of its outcome"
+        largest = "" if entry.largest is None else f", |u_k| <= {_up(entry.largest, 4)}"
+        lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {_up(entry.norm, 3)}{agents}{largest}"))
+    if effort.longest_period is not None:
+        lines.append(_line("limited", f"not certified with this period; up to {_down(effort.longest_period, 4)} it is"))
+    elif len(effort.limited) < len(certificate.limits):
+        lines.append(_line("limited", "nothing is certified under these limits"))
+    if effort.disturbed is not None:
+        d, drift = effort.disturbed, effort.disturbed.drift
+        ends = "" if drift is None else ", and all end where they would without"
+        if drift is not None and any(drift):
+            ends = f", every agent ends within {_up(max(drift), 4)} of its outcome"
+        more = f"|d_k| <= {float(d.delta):.6g} adds at most {_up(max(d.inputs), 4)} to |u_k|"
+        lines.append(_line("disturbed", f"{more}{ends}"))
+    elif certificate.delta is not None:
+        lines.append(_line("disturbed", "nothing is certified: the rate proves no bounded input"))
+    return lines
+
+
+def _remedy(certificate: Certificate) -> str:
+    """Say what makes the input bounded."""
+    if certificate.rate is None:
+        return "raise rho2 * kappa"
+    return f"raise rho2 * kappa to {_up(2 / certificate.rate, 5)} or more"
 
 
 def _sliding_share(certificate: Certificate) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError
 
 if TYPE_CHECKING:
+    from ptcc_certify.actuator import Actuator
     from ptcc_certify.graph import SignedDigraph
     from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 
@@ -33,7 +34,7 @@ class Trajectory:
     remaining : (M,) array
         ``max(0, 1 - t/T)``, accurate where ``t`` itself no longer tells it from 0.
     clock : (M,) array
-        ``s``; infinite from ``T`` on unless ``rho2 = 0``.
+        ``s``; infinite from ``T`` on unless ``rho2 = 0``. Behind an actuator the integral of the gain that acts.
     states : (N, M) or (N, S, M) array
         ``X``, or S columns of states.
     rtol, atol : float
@@ -42,9 +43,16 @@ class Trajectory:
         Which instant is ``T``; None if none is, or if there is no deadline.
     deadline_residual : float or None
         How far from settled the state at ``T`` is: the larger of ``max_k |e_k|/(2 D_k)`` and of the change over the
-        last doubling of ``tau``, relative to the largest entry of the start. None if ``T`` was not reached.
+        last doubling of ``tau``, relative to the largest entry of the start. None if ``T`` was not reached. If an
+        actuator bounds the gain, the former alone, at the first instant from ``T`` on.
     stats : mapping
         ``steps``, ``rhs`` (evaluations of the right-hand side, and of its derivatives in GMRES), ``seconds``.
+    actuator : Actuator or None
+        What limits the nominal protocol's input; None if nothing does.
+    forcing : str or None
+        Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
+    held_input : array or None
+        The input held at the instants, of the shape of ``states``, if the actuator samples.
     """
 
     graph: SignedDigraph
@@ -58,10 +66,14 @@ class Trajectory:
     deadline_index: int | None
     deadline_residual: float | None
     stats: Mapping[str, float]
+    actuator: Actuator | None = field(default=None, kw_only=True)
+    forcing: str | None = field(default=None, kw_only=True)
+    held_input: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        for array in (self.t, self.remaining, self.clock, self.states):
-            array.flags.writeable = False
+        for array in (self.t, self.remaining, self.clock, self.states, self.held_input):
+            if array is not None:
+                array.flags.writeable = False
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -100,7 +112,14 @@ class Trajectory:
 
     @property
     def input(self) -> np.ndarray:
-        """``u = gain E``, of the shape of ``states``; the gain is ``rho1`` from ``T`` on."""
+        """``u = gain E``, of the shape of ``states``; the gain is ``rho1`` from ``T`` on.
+
+        Behind an actuator with the gain that acts, or as it is held. Measurement noise is left out.
+        """
+        if self.held_input is not None:
+            return self.held_input
+        if self.actuator is not None:
+            return self.actuator.limit(self.protocol.gain).value(self.t, self.remaining) * self.error
         return self.protocol.gain.value_at_remaining(self.remaining) * self.error
 
     def at(self, fraction: float) -> np.ndarray:
@@ -157,7 +176,8 @@ class Trajectory:
         else:
             word = "settled" if self.deadline_resolved else "NOT settled"
             deadline = f"{word} at T = {float(self.protocol.T):.6g} (residual {self.deadline_residual:.1e})"
-        return f"Trajectory({len(self.labels)} agents{runs}, {self.t.size} instants, {span}, {deadline})"
+        more = "".join(f", {part}" for part in (self.actuator, self.forcing) if part is not None)
+        return f"Trajectory({len(self.labels)} agents{runs}, {self.t.size} instants, {span}, {deadline}{more})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

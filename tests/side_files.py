@@ -115,6 +115,11 @@ def with_factors(data: Json) -> Json:
     groups = [c for c in data["structure"]["closed_components"] if len(c["nodes"]) > 1]
     for key in ("diagonal", "certified"):
         data["rates"][key] = str(exact(data["rates"][key]) * slower)
+    lower = exact(data["effort"]["threshold"]["lower"]) * slower
+    data["effort"]["threshold"]["lower"] = str(lower)
+    if data["effort"]["bounded"] and lower < 1:
+        data["effort"]["bounded"] = None
+        data["proof"] = [step for step in data["proof"] if step["kind"] != "input-threshold"]
     for step in data["proof"]:
         if step["kind"] == "dominance":
             member = data["lyapunov"]["members"][int(step["of"][len("lyapunov.members[") : -1])]

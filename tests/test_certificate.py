@@ -102,6 +102,10 @@ def kernel(A: Rows) -> flint.fmpq_mat:
     return flint.fmpq_mat(flint.fmpz_mat([row[:nullity] for row in vectors.tolist()]))
 
 
+#: Obligations with a witness.
+WITNESSED = ("rate-limit", "input-threshold", "input-peak", "input-energy", "input-length")
+
+
 class Recheck:
     """Everything that a certificate under the nominal protocol claims, from its JSON alone: structure by reachability,
     definiteness and eigenvalues by characteristic polynomials, nothing of the package. Unless ``sharp`` is false, also
@@ -280,10 +284,26 @@ class Recheck:
             expected += [("distance", of, [])] if member["distance"] is not None else []
         if self.data["rates"]["limit"] is not None:
             expected.append(("rate-limit", "rates", ["limit"]))
+        expected += self.effort_steps
         assert [(s["kind"], s["of"], list(s["numbers"])) for s in self.data["proof"]] == expected
         for step in self.data["proof"]:
             assert set(step) == {"kind", "of", "statement", "lemma", "numbers", "witness"}
-            assert (step["witness"] is not None) == (step["kind"] == "rate-limit")  # the outcome is exact, not in balls
+            assert (step["witness"] is not None) == (step["kind"] in WITNESSED)  # the outcome is exact, not in balls
+
+    @property
+    def effort_steps(self) -> list[tuple[str, str, list[str]]]:
+        """The steps about the input; what they state is judged in test_effort.py."""
+        said = self.data["effort"]
+        assert (said is None) == (self.data["rates"]["certified"] is None and bool(self.data["graph"]["edges"]))
+        if said is None:
+            return []
+        steps: list[tuple[str, str, list[str]]] = []
+        steps += [("input-threshold", "effort", [])] if said["bounded"] is not None else []
+        steps += [
+            ("input-constants", f"lyapunov.members[{k}]", []) for k, c in enumerate(said["constants"]) if c is not None
+        ]
+        kinds = {"peak": "input-peak", "energy": "input-energy", "path_length": "input-length"}
+        return steps + [(kind, "effort", ["z"]) for key, kind in kinds.items() if said[key] is not None]
 
     def digest(self) -> None:
         said = {key: value for key, value in self.data.items() if key not in ("digest", "unverified")}
@@ -741,6 +761,8 @@ KEYS = {
     "prefactor": "value of",
     "outcome": "final_state degenerate influence",
     "outcome.influence": "components followers",
+    "effort": "bounded threshold starts constants peak energy path_length sliding limited disturbed",
+    "effort.threshold": "lower upper",
     "unverified": "spectral tightness paper_rate search residual final_state simulation notes",
     "unverified.search": "method at tried diagonal_limit",
     "unverified.simulation": "worst_ratio floor resolved_until ratios stop tolerances deadline_resolved judged "
@@ -766,7 +788,7 @@ def test_every_key_of_the_schema_is_there(name: str):
     for step in data["proof"]:
         assert set(step) == {"kind", "of", "statement", "lemma", "numbers", "witness"}
         assert (step["statement"], step["lemma"]) == OBLIGATIONS[step["kind"]]
-        assert all(number(text) > 0 or text in rates for text in step["numbers"].values())
+        assert all(number(text) > 0 or text in (rates | {"0"}) for text in step["numbers"].values())
     assert len(data["graph"]["sha256"]) == 64
     Recheck(data).digest()
     said = structure_document(example(name).structure)
@@ -776,7 +798,8 @@ def test_every_key_of_the_schema_is_there(name: str):
 #: Where integers and booleans may stand outside ``unverified``; everything else there is text.
 PLAIN = re.compile(
     r"\.structure\.(balanced|sign_symmetric)|\.structure\.closed_components\[\]\.(balanced|gauge\[\])"
-    r"|\.graph\.read\.undirected|.*\.times_rho|\.outcome\.degenerate\[\]"
+    r"|\.graph\.read\.undirected|.*\.times_rho|\.outcome\.degenerate\[\]|\.effort\.bounded"
+    r"|\.proof\[\]\.witness(\.norm|\.agents\.\*\[\])?"
 )
 #: Where the texts are exact numbers.
 EXACT = re.compile(
@@ -784,6 +807,7 @@ EXACT = re.compile(
     r"|.*\.diagonal\[\]|.*\.(lower_triangle|vectors)\[\]\[\]|.*\.distance\.(norm|agents\.\*)|\.paper\.rho_interval\.\w+|\.rates\.\w+|\.prefactor\.value|\.initial_state\.\*"
     r"|\.outcome\.final_state\.\*|\.outcome\.influence\.components\[\]\.voices\[\]"
     r"|\.outcome\.influence\.followers\.\*\[\]|\.components\[\]\.outcome\.\*|\.proof\[\]\.numbers\.\w+"
+    r"|\.effort\.(threshold\.\w+|constants\[\]\.\*|peak\.(agents\.\*|largest|norm)|energy|path_length)"
 )
 #: Objects whose keys are labels of nodes.
 BY_LABEL = {
@@ -792,6 +816,9 @@ BY_LABEL = {
     ".outcome.influence.followers",
     ".components[].outcome",
     ".lyapunov.members[].distance.agents",
+    ".effort.constants[]",
+    ".effort.peak.agents",
+    ".proof[].witness.agents",
 }
 
 
@@ -915,6 +942,8 @@ def refused(data: dict[str, Any]) -> bool:
     true = stands(Recheck(data, sharp=False))
     assert not check(data).accepted  # the digest tells, whatever the change
     report = check({**data, "digest": digest(data)})
+    if (report.rejected or "").startswith(("input-", "effort")):  # judged in test_effort.py
+        return True
     assert report.accepted == true, report.reason
     assert true or report.rejected != "digest"
     return not true or not stands(Recheck(data))
@@ -1011,10 +1040,11 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
 
     def spoilt(change: Callable[[dict[str, Any]], None]) -> bool:
         copy = json.loads(json.dumps(data))
-        change(copy["proof"][-1]["witness"])
+        change(copy["proof"][place]["witness"])
         return refused(copy)
 
-    witness = data["proof"][-1]["witness"]
+    place = [step["kind"] for step in data["proof"]].index("rate-limit")
+    witness = data["proof"][place]["witness"]
     assert spoilt(lambda said: said["vectors"].pop())
     assert spoilt(lambda said: said["nodes"].pop())
     assert spoilt(lambda said: said["lower_triangle"].pop())
@@ -1195,6 +1225,7 @@ def test_one_agent_keeps_its_state():
         ("structure", "graph"),
         ("claim", "graph"),
         ("outcome", "graph"),
+        ("input-threshold", "effort"),
     ]
     assert data["paper"]["objective"] == "none: every agent keeps its state"
 

@@ -4,7 +4,7 @@ Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from 
 outside ``unverified``, step by step as the proof lists them. Imports the standard library and three modules on exact
 arithmetic, nothing that makes certificates; python-flint and NumPy are used where they are installed. ``FORMAT.md``
 specifies the file. The modules, in the order of the proof: ``reading``, ``vectors``, ``digraph``, ``structure``,
-``outcome``, ``lyapunov``.
+``outcome``, ``lyapunov``, ``effort``.
 
     python -m ptcc_certify.checker certificate.json [--stdlib]
 """
@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.checker.lyapunov import LyapunovCheck
+from ptcc_certify.checker.effort import INPUT_NODES, EffortCheck
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
 from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
@@ -28,6 +28,7 @@ from ptcc_certify.errors import FormatError
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]"
 
 __all__ = [
+    "INPUT_NODES",
     "MANY_COMPONENTS",
     "OBLIGATIONS",
     "REACHING_BITS",
@@ -82,7 +83,7 @@ def check(
     return CheckReport(False, "", tuple(run.steps), run.at, reason, run.exact.name, run.sha256)
 
 
-class _Check(LyapunovCheck):
+class _Check(EffortCheck):
     """One run through a whole certificate."""
 
     def everything(self) -> None:
@@ -93,7 +94,6 @@ class _Check(LyapunovCheck):
         need(self.data["schema"] == SCHEMA, "an unknown schema")
         need(isinstance(self.data["producer"], str), "producer is not a text")
         need(isinstance(self.data["unverified"], dict), "unverified is not an object")
-        need(self.data["effort"] is None, "effort is not null")
         entries(self.data["proof"], "proof")
         self.protocol()
         self.graph()
@@ -105,6 +105,7 @@ class _Check(LyapunovCheck):
         self.rates()
         self.limit()
         self.sliding()
+        self.effort()
         self.at = "proof"
         need(self.next == len(self.data["proof"]), "an obligation that nothing asks for")
         self.at = "verdict"

@@ -14,11 +14,13 @@ from typing import Any
 from ptcc_certify.checker.outcome import OutcomeCheck
 from ptcc_certify.checker.reading import entries, exact, fields, integers, need, same, short, shown, triangle
 from ptcc_certify.checker.vectors import Numbers, beside
+from ptcc_certify.input_bounds import Form
 from ptcc_certify.sparse_definite import residual_definite
 
 Matrix = list[list[int]]
 Sparse = list[dict[int, int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
+
 #: Products of entries up to which sparse matrices are multiplied.
 LARGEST_PRODUCT = 50_000_000
 
@@ -233,6 +235,7 @@ class LyapunovCheck(OutcomeCheck):
         self.at = "lyapunov"
         members = entries(fields(self.data["lyapunov"], ("members",), "lyapunov")["members"], "members")
         self.found: list[tuple[Fraction, Fraction, str, str]] = []  # rate, prefactor, class, coordinates
+        self.forms: list[Form | None] = []  # None: by rows, in a large graph
         self.proved: set[tuple[int, Fraction, tuple[int, ...]]] = set()  # group, its rate and weights
         need(self.paper_rate is None or bool(members), "the paper's certificate is not among the members")
         need(bool(self.moving) or not members, "a Lyapunov function where nothing moves")
@@ -245,6 +248,18 @@ class LyapunovCheck(OutcomeCheck):
                 equal = all(same(member[key], paper[key]) for key in keys) and member["class"] == "paper"
                 need(equal, "the first member is not the paper's certificate")
                 self.found.append((self.paper_rate, exact(paper["prefactor"]), "paper", paper["coordinates"]))
+                own = list(self.weights.values())
+                self.forms.append(
+                    Form(
+                        self.paper_rate,
+                        paper["coordinates"],
+                        list(self.weights),
+                        own,
+                        None,
+                        min(own),
+                        self.gauges[0] or [],
+                    )
+                )
                 if paper["coordinates"] == "eps":
                     form, scale = self._deviation()
                 else:
@@ -289,6 +304,7 @@ class LyapunovCheck(OutcomeCheck):
                 self._dominance(nodes, diagonal, rate, of)
                 need(exact(member["prefactor"]) == high / low, "the prefactor is another")
                 self.found.append((rate, high / low, kind, "E"))
+                self.forms.append(None)
                 return [], Fraction(1)
             weights = list(diagonal)
             form, scale = self._weighted(dict(zip(nodes, weights, strict=True)))
@@ -304,6 +320,8 @@ class LyapunovCheck(OutcomeCheck):
             self.done(f"{shown(high / low)}")
         need(exact(member["prefactor"]) == high / low, "the prefactor is another")
         self.found.append((rate, high / low, kind, "E"))
+        full = kind == "full"
+        self.forms.append(Form(rate, "E", nodes, None if full else weights, rows if full else None, low))
         return form, scale
 
     def _dominance(self, nodes: Sequence[int], weights: Numbers, rate: Fraction, of: str) -> None:

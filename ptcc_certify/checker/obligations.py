@@ -30,6 +30,20 @@ OBLIGATIONS = {
     "rate-limit": ("H B + B'H > 0, B = A - (limit/2) I, H negative on the vectors", "inertia of Lyapunov equations"),
     "sliding-bound": ("mu1 > delta, mu2, mu3 > 0, so the bound holds and sigma = 0 from T_r on", "Proposition 1"),
     "reaching-time": ("|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at z_k", "comparison with the adversary"),
+    "input-threshold": (
+        "nonzero eigenvalues of L have rho2 kappa Re lambda >= 1, semisimple where that is 1; or some has not",
+        "gain e^(-lambda s) stays bounded, or not",
+    ),
+    "input-constants": ("e_k^2 <= c_k E'P E for every agent", "Schur complement"),
+    "input-peak": ("gain |e_k| <= peak_k up to the deadline", "|e_k| <= min(held_k, sqrt(c_k V(0)) e^(-rate s / 2))"),
+    "input-energy": ("int ||gain E||^2 dt <= energy", "the same in norm"),
+    "input-length": ("int ||gain E|| dt <= path length", "the same in norm"),
+    "input-sliding": ("|u_k - gain e_k| <= mu1 + (mu2 + mu3 kappa/T_r) |sigma_k(0)|", "Proposition 1"),
+    "limited-gain": ("what is left at the deadline if the gain is capped, stopped or held", "Lyapunov decrease"),
+    "nominal-disturbed": (
+        "|d_k| <= delta adds at most these to the inputs of the nominal protocol and to where the agents end",
+        "variation of constants",
+    ),
     "outcome": ("L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))", "Lemmas 2, 8 and 9"),
 }
 

@@ -1,0 +1,647 @@
+"""Control effort: how large the input gets, whether it stays finite at the deadline, what limits of actuators leave.
+
+The gain is infinite at the deadline; the input ``u = gain E`` stays bounded for every start iff
+``rho2 kappa Re lambda >= 1`` for all nonzero eigenvalues of ``L``, those on that line being semisimple. Bounds are
+formed in exact arithmetic (:mod:`ptcc_certify.input_bounds`) from the proved Lyapunov functions; here their free
+parameters are chosen, in floating point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptcc_certify.checker import INPUT_NODES
+from ptcc_certify.definite import arithmetic
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.input_bounds import (
+    Form,
+    InputBounds,
+    Limits,
+    PrescribedGain,
+    Starts,
+    decay_above,
+    energy_above,
+    length_above,
+    limited_rate,
+    peak_above,
+    root_above,
+    rounded,
+)
+from ptcc_certify.outcomes import Influence
+from ptcc_certify.protocols import Protocol, SlidingModeProtocol
+from ptcc_certify.rationals import as_fraction, nearest_float
+from ptcc_certify.spectral_line import LARGEST, nonzero_spectrum_beyond
+from ptcc_certify.structure import Structure
+from ptcc_certify.theorems import Obligation
+
+if TYPE_CHECKING:
+    pass
+
+#: Bits of the bounds that are written, and of the instants that witness them.
+KEPT_BITS, INSTANT_BITS = 40, 24
+#: Beyond this ``z = ln(T/(T - t))`` no bound is formed.
+LATEST = 50_000
+#: By how much constants of full matrices are raised until they are proved.
+RAISES = (1e-9, 1e-6, 1e-3, 1.0)
+
+Of = Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction]
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A bound, and what proves it: a member of the envelope and an instant ``z = ln(T/(T - t))``."""
+
+    value: Fraction
+    member: int
+    z: Fraction
+
+
+@dataclass(frozen=True)
+class Peak:
+    """``sup |u_k|`` of every agent, and of the norm ``||u||_2``."""
+
+    agents: tuple[Fraction, ...]
+    how: tuple[Witness, ...]
+    norm: Fraction
+    norm_how: Witness
+
+    @property
+    def largest(self) -> Fraction:
+        """``sup max_k |u_k|``."""
+        return max(self.agents)
+
+
+@dataclass(frozen=True)
+class SlidingPart:
+    """The sliding part of the input: bounded for every start iff ``mu3 kappa >= 1``, and its bound for every agent."""
+
+    bounded: bool
+    agents: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Limited:
+    """What is left at the deadline under limits of the gain: ``||E||``, and each agent's distance to its outcome.
+
+    ``largest`` bounds ``max_k |u_k|``; None if the input is held.
+    """
+
+    limits: Limits
+    clock: Fraction
+    member: int
+    growth: Fraction
+    norm: Fraction
+    agents: tuple[Fraction, ...] | None
+    largest: Fraction | None
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """What disturbances ``|d_k| <= delta`` of the nominal protocol add to the inputs, and to where the agents end."""
+
+    delta: Fraction
+    member: int
+    inputs: tuple[Fraction, ...]
+    drift: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is proved about the input.
+
+    Attributes
+    ----------
+    bounded : bool or None
+        Whether ``u`` (the nominal part, under the sliding-mode protocol) stays bounded up to the deadline for every
+        start; None: undecided.
+    by : {"rate", "limit", "spectrum"} or None
+        What decides it: a proved rate, a proved limit of rates, or the exact location of the spectrum.
+    threshold : pair of Fraction or None
+        Proved bounds of ``rho2 kappa min Re lambda``; the input is bounded from 1 on.
+    starts : Starts or None
+        The set of starts that the bounds are for; None: the start of the certificate.
+    constants : tuple of (tuple of Fraction or None)
+        ``c_k`` of every member with a full matrix, ``e_k^2 <= c_k V``.
+    peak : Peak or None
+        None: not bounded, or not proved.
+    energy, path_length : Witness or None
+        Bounds of ``int ||u||^2 dt`` and ``int ||u|| dt`` (of the nominal part).
+    sliding : SlidingPart or None
+    limited : tuple of Limited
+        Of those limits under which something is certified.
+    longest_period : Fraction or None
+        Where sampling is not certified: a period, with the same largest gain, up to which it would be.
+    disturbed : Disturbed or None
+    """
+
+    bounded: bool | None
+    by: str | None
+    threshold: tuple[Fraction | None, Fraction | None]
+    starts: Starts | None
+    constants: tuple[tuple[Fraction, ...] | None, ...]
+    peak: Peak | None = None
+    energy: Witness | None = None
+    path_length: Witness | None = None
+    sliding: SlidingPart | None = None
+    limited: tuple[Limited, ...] = ()
+    longest_period: Fraction | None = None
+    disturbed: Disturbed | None = None
+
+    @property
+    def obligations(self) -> list[Obligation]:
+        """What the independent check verifies, in its order."""
+        found = [Obligation("input-threshold", "effort", witness=self.by)] if self.bounded is not None else []
+        found += [
+            Obligation("input-constants", f"lyapunov.members[{k}]")
+            for k, c in enumerate(self.constants)
+            if c is not None
+        ]
+        if self.sliding is not None and self.sliding.agents is not None:
+            found.append(Obligation("input-sliding", "effort"))
+        if self.peak is not None:
+            found.append(Obligation("input-peak", "effort", {"z": self.peak.norm_how.z}, self.peak))
+        for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
+            if bound is not None:
+                found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
+        for k, entry in enumerate(self.limited):
+            found.append(Obligation("limited-gain", f"effort.limited[{k}]", {"growth": entry.growth}, entry.member))
+        if self.disturbed is not None:
+            numbers = {"delta": self.disturbed.delta}
+            found.append(Obligation("nominal-disturbed", "effort", numbers, self.disturbed.member))
+        return found
+
+
+# ---------------------------------------------------------------------- starts
+
+
+def starts_within(structure: Structure, bound: Any) -> Starts:
+    """Return all starts with ``||X(0)||_inf <= bound``.
+
+    Raises
+    ------
+    ParameterError
+        The bound is not a positive number.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> starts_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
+    (Fraction(1, 2), Fraction(1, 2))
+    """
+    try:
+        R = as_fraction(bound, "the bound of starts")
+    except NumberError as error:
+        raise ParameterError(f"the bound of starts: {error}") from None
+    if not 0 < R <= 10**300:
+        raise ParameterError("the bound of starts is outside its domain; it must be positive, and at most 1e300")
+    n = structure.graph.n_nodes
+    return Starts((Fraction(0),) * n, (R,) * n)
+
+
+def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
+    """Return all starts with ``low_k <= x_k(0) <= high_k``.
+
+    Examples
+    --------
+    >>> box([0, 1], [2, 1])
+    Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
+    """
+    ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
+    if any(a > b for a, b in ends):
+        raise ParameterError("a box whose lower end exceeds its upper end")
+    return Starts(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
+
+
+def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
+    """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
+
+    Examples
+    --------
+    >>> ellipsoid([0, 0], [[1, 0], [0, 2]]).axes
+    ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
+    """
+    middle = tuple(as_fraction(x, "center") for x in center)
+    vectors = tuple(tuple(as_fraction(x, "axes") for x in axis) for axis in axes)
+    if not vectors or any(len(axis) != len(middle) for axis in vectors):
+        raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
+    return Starts(middle, axes=vectors)
+
+
+# ---------------------------------------------------------------------- bounds
+
+
+def bound_effort(
+    structure: Structure,
+    protocol: Protocol,
+    forms: Sequence[Form | None],
+    *,
+    rate: Fraction | None,
+    limit: Fraction | None,
+    start: Sequence[Fraction] | None = None,
+    starts: Starts | None = None,
+    sigma0: Sequence[Fraction] | None = None,
+    influence: Influence | None = None,
+    distances: Sequence[Sequence[Fraction] | None] = (),
+    limits: Sequence[Limits] = (),
+    delta: Fraction | None = None,
+) -> Effort:
+    """Bound the input.
+
+    Parameters
+    ----------
+    structure : Structure
+    protocol : NominalProtocol or SlidingModeProtocol
+    forms : sequence of Form or None
+        The members of the envelope; None for those of large graphs.
+    rate, limit : Fraction or None
+        The largest proved rate, and the proved limit of rates.
+    start, starts
+        ``X(0)``, or a set of starts instead.
+    sigma0 : sequence of Fraction or None
+    influence : Influence, optional
+        ``Q``, for the drift under disturbances.
+    distances : sequence
+        Of every member, the constants from ``V`` to the distances of agents to their outcomes, or None.
+    limits : sequence of Limits
+        Nominal protocol: limits of the gain to be judged.
+    delta : Fraction, optional
+        Nominal protocol: bound of the disturbances to be judged.
+    """
+    gain = _prescribed(protocol)
+    still = not any(len(c.nodes) > 1 or not c.balanced for c in structure.closed_components) and not len(
+        structure.followers
+    )
+    bounded, by = _bounded(structure, gain.k, rate, limit, still)
+    threshold = tuple(None if r is None else gain.k * r / 2 for r in (rate, limit))
+    sliding = _sliding_part(protocol, sigma0)
+    effort: dict[str, Any] = {"bounded": bounded, "by": by, "threshold": threshold, "sliding": sliding}
+    n = structure.graph.n_nodes
+    center = start if starts is None else starts.center
+    if center is None or still or n > INPUT_NODES:
+        return Effort(**effort, starts=None, constants=(None,) * len(forms))
+    constants = tuple(None if f is None or f.matrix is None else _proved_constants(f, n) for f in forms)
+    region = starts or Starts(tuple(center))
+    if sigma0 is not None:
+        moved = tuple(x - s for x, s in zip(region.center, sigma0, strict=True))
+        region = Starts(moved, region.radius, region.axes)
+    bounds = InputBounds(
+        structure.graph.exact_rows(range(n)),
+        gain,
+        forms,
+        constants,
+        region,
+        [abs(s) for s in sigma0 or ()] if any(sigma0 or ()) else (),
+        protocol.T_s if isinstance(protocol, SlidingModeProtocol) else Fraction(0),
+    )
+    usable = [k for k, f in enumerate(forms) if f is not None and f.rate > 0 and _usable(bounds, k)]
+    own = [Fraction(0)] * n if sliding is None else sliding.agents
+    peak = None
+    if own is not None:
+        peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
+    ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
+    entries = [_limited(bounds, usable, entry, distances, peak) for entry in limits]
+    return Effort(
+        **effort,
+        starts=starts,
+        constants=constants,
+        peak=peak,
+        energy=_least(bounds, energy_above, ample),
+        path_length=_least(bounds, length_above, usable),
+        limited=tuple(entry for entry in entries if entry is not None),
+        longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
+        disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
+    )
+
+
+def _prescribed(protocol: Protocol) -> PrescribedGain:
+    return PrescribedGain(protocol.T, protocol.rho1, protocol.rho2 * protocol.kappa)
+
+
+def _bounded(
+    structure: Structure, k: Fraction, rate: Fraction | None, limit: Fraction | None, still: bool
+) -> tuple[bool | None, str | None]:
+    """Decide whether the input stays bounded for every start, and by what."""
+    if still or (rate is not None and rate * k >= 2):
+        return True, "rate"
+    if limit is not None and limit * k <= 2:
+        return False, "limit"
+    graph = structure.graph
+    if graph.n_nodes > LARGEST:
+        return None, None
+    unit = math.lcm(*{graph.exact_weight(i).denominator for i in range(graph.n_edges)})
+    rows = [{j: int(x * unit) for j, x in row.items()} for row in graph.exact_rows(range(graph.n_nodes))]
+    labels = structure.strong_component
+    components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
+    balanced = [sorted(c.nodes) for c in structure.closed_components if c.balanced]
+    still_parts = {k for k, nodes in enumerate(components) if nodes in balanced}
+    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k)
+    return place in ("beyond", "on"), "spectrum"
+
+
+def _sliding_part(protocol: Protocol, sigma0: Sequence[Fraction] | None) -> SlidingPart | None:
+    """Bound the sliding part of every input; None for the nominal protocol."""
+    if not isinstance(protocol, SlidingModeProtocol) or sigma0 is None:
+        return None
+    pole = protocol.mu3 * protocol.kappa
+    push = protocol.mu2 + pole / protocol.T_r
+    known = pole >= 1 or not any(sigma0)
+    return SlidingPart(pole >= 1, tuple(protocol.mu1 + push * abs(s) for s in sigma0) if known else None)
+
+
+def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
+    """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
+    matrix = form.matrix or ()
+    scale = math.lcm(*(x.denominator for row in matrix for x in row))
+    P = [[int(x * scale) for x in row] for row in matrix]
+    top = max(abs(x) for row in P for x in row)
+    try:
+        inverse = np.linalg.inv(np.array([[x / top for x in row] for row in P]))
+    except np.linalg.LinAlgError:
+        return None
+    place = {v: i for i, v in enumerate(form.nodes)}
+    exact = arithmetic()
+    for raise_ in RAISES:
+        sizes = np.abs(np.diag(inverse)) * (1 + raise_)
+        if not np.isfinite(sizes).all():
+            return None
+        c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
+        asked = []
+        for v, i in place.items():
+            p, q = (c[v] / scale).as_integer_ratio()
+            asked.append(([q * (j == i) for j in range(len(P))], q * p))
+        if exact.bounded(P, asked) is None:
+            return tuple(c)
+    return None
+
+
+def _kept(x: Fraction) -> Fraction:
+    """Round up to the bits that are written."""
+    return rounded(x, KEPT_BITS, up=True)
+
+
+def _usable(bounds: InputBounds, k: int) -> bool:
+    try:
+        bounds.constant(k)
+        bounds.start(k)
+    except (ValueError, OverflowError):
+        return False
+    return True
+
+
+def _log(x: Fraction) -> float:
+    """Return the natural logarithm of a nonnegative rational of any size."""
+    return math.log(x.numerator) - math.log(x.denominator) if x else -math.inf
+
+
+def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
+    """Return ``z`` where what is held meets what decays: the instant that serves the bounds best."""
+    held = bounds.held_norm if agent is None else bounds.held[agent]
+    start = bounds.root_constant(k, agent) * bounds.start(k)
+    if not held or not start:
+        return 0.0
+    s = 2 * (_log(start) - _log(held)) / nearest_float(bounds.form(k).rate)
+    linear, pole = nearest_float(bounds.gain.rho1 * bounds.gain.T), nearest_float(bounds.gain.k)
+    low, high = 0.0, s / pole
+    if not 0 < high < math.inf:
+        return 0.0 if high <= 0 else math.inf
+    for _ in range(60):
+        z = (low + high) / 2
+        low, high = (z, high) if -linear * math.expm1(-z) + pole * z < s else (low, z)
+    return high
+
+
+def _best(bounds: InputBounds, of: Of, agent: int | None, members: Sequence[int]) -> Witness | None:
+    """Return the bound of the member whose decay takes over first, which is the least peak."""
+    found = sorted((_crossing(bounds, agent, k), bounds.root_constant(k, agent) * bounds.start(k), k) for k in members)
+    for z, _, k in found:
+        if z <= LATEST:
+            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
+            try:
+                return Witness(_kept(bounds.bound(of, agent, k, instant)), k, instant)
+            except (ValueError, OverflowError):
+                continue
+    return None
+
+
+def _least(bounds: InputBounds, of: Of, members: Sequence[int]) -> Witness | None:
+    """Return the least bound of the norm over some members."""
+    found = [_best(bounds, of, None, [k]) for k in members]
+    return min((w for w in found if w is not None), key=lambda w: w.value, default=None)
+
+
+def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
+    """Bound the peak of every agent's input, and of the norm."""
+    agents = [_best(bounds, peak_above, v, members) for v in range(len(bounds.rows))]
+    norm = _best(bounds, peak_above, None, members)
+    if norm is None or any(a is None for a in agents):
+        return None
+    how = tuple(a for a in agents if a is not None)
+    whole = _kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
+    return Peak(tuple(_kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
+
+
+def _limited(
+    bounds: InputBounds,
+    members: Sequence[int],
+    limits: Limits,
+    distances: Sequence[Sequence[Fraction] | None],
+    peak: Peak | None,
+) -> Limited | None:
+    """Bound what is left at the deadline under limits of the gain; None if nothing is certified."""
+    gain = bounds.gain
+    top = limits.largest_gain(gain)
+    if top is None:
+        return None
+    clock = limits.clock_below(gain)
+    found: Limited | None = None
+    for k in members:
+        form = bounds.form(k)
+        growth = Fraction(0) if limits.sample_period is None else step_growth(bounds, k)
+        if growth is None or (rate := limited_rate(form.rate, growth, limits, gain)) <= 0:
+            continue
+        left = decay_above(rate / 2 * clock) * bounds.start(k)
+        norm = _kept(bounds.root_constant(k, None) * left)
+        if found is None or norm < found.norm:
+            known = distances[k] if k < len(distances) else None
+            agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
+            largest = None
+            if limits.sample_period is None:
+                largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
+            found = Limited(limits, clock, k, growth, norm, agents, largest)
+    return found
+
+
+def _longest_period(bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits]) -> Fraction | None:
+    """Return the largest ``rate / (growth largest_gain)``, rounded down; None if nothing else limits the gain."""
+    tops = [Limits(entry.gain_cap, entry.stop_before).largest_gain(bounds.gain) for entry in limits]
+    growths = [(bounds.form(k).rate, step_growth(bounds, k)) for k in members]
+    found = [rate / (m * top) for rate, m in growths if m for top in tops if top is not None]
+    return rounded(max(found), INSTANT_BITS) if found else None
+
+
+def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
+    """Return ``m`` with ``L'P L <= m P``, in floating point and raised a little; the check proves it."""
+    form = bounds.form(k)
+    if form.coordinates != "E":
+        return None
+    A = np.array([[float(bounds.rows[v].get(w, 0)) for w in form.nodes] for v in form.nodes])
+    if form.diagonal is not None:
+        R = np.diag(np.sqrt([float(w) for w in form.diagonal]))
+    else:
+        R = np.linalg.cholesky(np.array([[float(x) for x in row] for row in form.matrix or ()])).T
+    size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2)) ** 2
+    return _kept(Fraction(size * (1 + 1e-9))) if math.isfinite(size) else None
+
+
+def _disturbed(
+    bounds: InputBounds, members: Sequence[int], delta: Fraction, influence: Influence | None
+) -> Disturbed | None:
+    """Bound what disturbances add under the nominal protocol."""
+    drift = None
+    if influence is not None and influence.exact:
+        T, sizes = bounds.gain.T, [Fraction(0)] * len(bounds.rows)
+        for v in range(len(sizes)):
+            sizes[v] = sum((abs(Fraction(x)) for x in influence.row(v).values()), Fraction(0))
+        drift = tuple(delta * T * x for x in sizes)
+    found: Disturbed | None = None
+    for k in members:
+        try:
+            inputs = tuple(map(_kept, bounds.disturbed(k, delta)))
+        except ValueError:
+            continue
+        if found is None or max(inputs) < max(found.inputs):
+            found = Disturbed(delta, k, inputs, drift)
+    return found
+
+
+# ---------------------------------------------------------------------- worst start
+
+
+@dataclass(frozen=True)
+class WorstStart:
+    """A start of the set from which the input gets largest, in floating point.
+
+    Attributes
+    ----------
+    x0 : (N,) array
+    agent : int
+        Whose input is largest.
+    t : float
+        When.
+    size : float
+        ``|u_agent(t)|``.
+    """
+
+    x0: np.ndarray
+    agent: int
+    t: float
+    size: float
+
+
+def worst_start(
+    structure: Structure, protocol: Protocol, starts: Starts, *, samples: int = 120, latest: float = 14.0
+) -> WorstStart:
+    """Return the start from which some ``|u_k(t)|`` is largest under the nominal part of the protocol (numerical).
+
+    ``u(t) = -gain L e^(-L s) X(0)`` is linear in the start: at each of ``samples`` instants, evenly spaced in
+    ``z = ln(T/(T - t))`` up to ``latest``, the maximum over the set is exact.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> from ptcc_certify.structure import analyse
+    >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
+    >>> worst = worst_start(pair, NominalProtocol(1, 1, 1, 1), starts_within(pair, 3))
+    >>> worst.x0, worst.t, worst.size
+    (array([-3., -3.]), 0.0, 12.0)
+    """
+    from scipy.linalg import expm
+
+    L = structure.graph.dense_laplacian()
+    center = np.array([nearest_float(x) for x in starts.center])
+    radius = np.array([nearest_float(x) for x in starts.radius]) if starts.radius else np.zeros(len(center))
+    axes = np.array([[nearest_float(x) for x in axis] for axis in starts.axes])
+    best: WorstStart | None = None
+    gain = protocol.gain
+    for z in np.linspace(0.0, latest, samples):
+        M = -float(gain.value_at_remaining(math.exp(-z))) * (L @ expm(-L * float(gain.clock_at_tau(z))))
+        middle = M @ center
+        reach = np.linalg.norm(M @ axes.T, axis=1) if axes.size else np.abs(M) @ radius
+        k = int(np.argmax(np.abs(middle) + reach))
+        size = float(abs(middle[k]) + reach[k])
+        if best is None or size > best.size * (1 + 1e-12):
+            sign = -1.0 if middle[k] < 0 else 1.0
+            if axes.size:
+                along = axes @ M[k]
+                x0 = center + sign * along @ axes / (np.linalg.norm(along) or 1.0)
+            else:
+                x0 = center + sign * radius * np.sign(M[k])
+            best = WorstStart(x0, k, float(gain.time_at_tau(z)), size)
+    assert best is not None
+    return best
+
+
+# ---------------------------------------------------------------------- JSON
+
+
+def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[[Fraction], str]) -> Any:
+    """Return the section ``effort`` of a certificate."""
+    if effort is None:
+        return None
+
+    def by_agent(values: Sequence[Fraction] | None) -> dict[str, str] | None:
+        return None if values is None else dict(zip(labels, map(text, values), strict=True))
+
+    def maybe(value: Fraction | None) -> str | None:
+        return None if value is None else text(value)
+
+    region: dict[str, Any] | None = None
+    if effort.starts is not None:
+        region = {"center": by_agent(effort.starts.center)}
+        if effort.starts.axes:
+            region["axes"] = [by_agent(axis) for axis in effort.starts.axes]
+        else:
+            region["radius"] = by_agent(effort.starts.radius or (Fraction(0),) * len(labels))
+    peak, disturbed = effort.peak, effort.disturbed
+    return {
+        "bounded": effort.bounded,
+        "threshold": {"lower": maybe(effort.threshold[0]), "upper": maybe(effort.threshold[1])},
+        "starts": region,
+        "constants": [by_agent(c) for c in effort.constants],
+        "peak": peak and {"agents": by_agent(peak.agents), "largest": text(peak.largest), "norm": text(peak.norm)},
+        "energy": None if effort.energy is None else text(effort.energy.value),
+        "path_length": None if effort.path_length is None else text(effort.path_length.value),
+        "sliding": effort.sliding and {"bounded": effort.sliding.bounded, "agents": by_agent(effort.sliding.agents)},
+        "limited": [
+            {
+                "gain_cap": maybe(entry.limits.gain_cap),
+                "stop_before": maybe(entry.limits.stop_before),
+                "sample_period": maybe(entry.limits.sample_period),
+                "clock": text(entry.clock),
+                "norm": text(entry.norm),
+                "agents": by_agent(entry.agents),
+                "largest": maybe(entry.largest),
+            }
+            for entry in effort.limited
+        ],
+        "disturbed": disturbed
+        and {
+            "delta": text(disturbed.delta),
+            "inputs": by_agent(disturbed.inputs),
+            "drift": by_agent(disturbed.drift),
+        },
+    }
+
+
+def peak_witness(peak: Peak, labels: Sequence[str], text: Callable[[Fraction], str]) -> Mapping[str, Any]:
+    """Return what proves the peaks: a member and an instant for every agent, and for the norm."""
+    agents = {label: [how.member, text(how.z)] for label, how in zip(labels, peak.how, strict=True)}
+    return {"agents": agents, "norm": peak.norm_how.member}

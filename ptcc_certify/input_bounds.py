@@ -1,0 +1,472 @@
+"""Proved bounds of the input of the nominal protocol, ``u = gain(t) E``, with the standard library alone.
+
+With ``k = rho2 kappa`` and ``z = ln(T/(T - t))`` the gain is ``rho1 + (k/T) e^z`` and the stretched clock
+``s = rho1 T (1 - e^-z) + k z``. What is known of an agent is ``|e_k| <= min(held, start e^(-rate s / 2))``: ``held``
+for all times, ``start`` from a Lyapunov function of that rate. The bounds below use ``held`` up to an instant ``z`` and
+``start`` from there on; every ``z`` gives a valid one. All arguments are rationals, every rounding is upwards (or
+downwards where a name says ``below``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from operator import mul
+
+from ptcc_certify.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
+
+#: Bits to which bounds are rounded.
+BITS = 64
+
+Linear = Mapping[int, Fraction]
+
+
+def root_above(x: Fraction) -> Fraction:
+    """Bound a square root from above.
+
+    Examples
+    --------
+    >>> float(root_above(Fraction(9, 4)))
+    1.5
+    """
+    return rounded(sqrt(rounded(x, BITS, up=True), BITS)[1], BITS, up=True)
+
+
+def decay_above(x: Fraction) -> Fraction:
+    """Bound ``e^-x`` from above for ``x >= 0``; beyond ``x = 100,000`` it is no longer made smaller.
+
+    Examples
+    --------
+    >>> float(decay_above(Fraction(1)))
+    0.36787944117144233
+    """
+    return exp(-min(rounded(x, BITS), Fraction(LARGEST_EXPONENT)), BITS)[1]
+
+
+@dataclass(frozen=True)
+class PrescribedGain:
+    """``gain = rho1 + k/(T - t)`` before ``T``, in terms of ``z = ln(T/(T - t))``.
+
+    Attributes
+    ----------
+    T, rho1, k : Fraction
+        ``k = rho2 kappa``; all positive.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> float(gain.above(Fraction(0))), float(gain.clock_below(Fraction(1)))
+    (3.0, 2.6321205588285577)
+    """
+
+    T: Fraction
+    rho1: Fraction
+    k: Fraction
+
+    def above(self, z: Fraction) -> Fraction:
+        """Bound the gain at ``z`` from above."""
+        return rounded(self.rho1 + self.k / self.T * exp(z, BITS)[1], BITS, up=True)
+
+    def clock_below(self, z: Fraction) -> Fraction:
+        """Bound the clock ``s`` at ``z`` from below."""
+        return rounded(self.rho1 * self.T * (1 - exp(-z, BITS)[1]) + self.k * z, BITS)
+
+    def clock_above(self, z: Fraction) -> Fraction:
+        """Bound the clock ``s`` at ``z`` from above."""
+        return rounded(self.rho1 * self.T * (1 - exp(-z, BITS)[0]) + self.k * z, BITS, up=True)
+
+
+def peak_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
+    """Bound ``sup_t gain(t) |e_k(t)|`` for ``rate k >= 2``.
+
+    Up to ``z`` the gain grows to its value there; from there on ``gain e^(-rate s / 2)`` no longer grows, since
+    ``gain' <= gain^2 / k``.
+
+    Raises
+    ------
+    ValueError
+        ``rate k < 2``: the bound grows without limit.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
+    >>> float(peak_above(gain, Fraction(1), Fraction(3), Fraction(2), Fraction(0)))  # 2 * 3 at the start
+    6.0
+    >>> float(peak_above(gain, Fraction(1), Fraction(3), Fraction(2), Fraction(3, 5))) < 3
+    True
+    """
+    if rate * gain.k < 2:
+        raise ValueError("the input is not bounded by this rate")
+    top = gain.above(z)
+    late = start * decay_above(rate / 2 * gain.clock_below(z)) * top
+    return rounded(late if z == 0 else max(held * top, late), BITS, up=True)
+
+
+def energy_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
+    """Bound ``int_0^T (gain |e|)^2 dt`` for ``rate k > 1``.
+
+    Up to ``z`` it is ``held^2 (rho1^2 t + 2 rho1 k z + (k^2/T)(e^z - 1))``, and from there on, integrated by parts,
+    ``start^2 e^(-rate s) (gain + (k/T) e^z / (rate k - 1)) / rate`` at most.
+
+    Raises
+    ------
+    ValueError
+        ``rate k <= 1``: the bound is infinite.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1, 10**9), Fraction(1))
+    >>> round(float(energy_above(gain, Fraction(1), Fraction(1), Fraction(2), Fraction(0))), 6)  # int (1-t)^(2-2) dt
+    1.0
+    """
+    rho1, k, T = gain.rho1, gain.k, gain.T
+    if rate * k <= 1:
+        raise ValueError("the energy is not bounded by this rate")
+    grown = exp(z, BITS)[1]
+    early = held**2 * (rho1**2 * T * (1 - exp(-z, BITS)[0]) + 2 * rho1 * k * z + k**2 / T * (grown - 1))
+    left = decay_above(rate * gain.clock_below(z))
+    late = start**2 * left * (gain.above(z) + k / T * grown / (rate * k - 1)) / rate
+    return rounded((early if z else 0) + late, BITS, up=True)
+
+
+def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
+    """Bound ``int_0^T gain |e| dt = int |e| ds`` by ``held s(z) + (2/rate) start e^(-rate s(z) / 2)``.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
+    >>> float(length_above(gain, Fraction(1), Fraction(3), Fraction(2), Fraction(0)))
+    3.0
+    """
+    late = 2 / rate * start * decay_above(rate / 2 * gain.clock_below(z))
+    return rounded((held * gain.clock_above(z) if z else 0) + late, BITS, up=True)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an actuator leaves of the gain: capped at ``gain_cap``, 0 from ``T - stop_before`` on, or held.
+
+    Attributes
+    ----------
+    gain_cap, stop_before : Fraction or None
+        ``stop_before < T``.
+    sample_period : Fraction or None
+        Gain and input are held over so long a time, from 0 on; the last period ends at the deadline, or at the stop.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
+    >>> capped = Limits(gain_cap=Fraction(11))
+    >>> capped.largest_gain(gain), float(capped.clock_below(gain))  # rho1 T + k (1 + ln(T (11 - rho1)/k))
+    (Fraction(11, 1), 4.302585092994046)
+    """
+
+    gain_cap: Fraction | None = None
+    stop_before: Fraction | None = None
+    sample_period: Fraction | None = None
+
+    def largest_gain(self, gain: PrescribedGain) -> Fraction | None:
+        """Return the largest gain that acts; None if it grows without limit."""
+        latest = self.stop_before
+        if self.sample_period is not None:
+            end = gain.T - (latest or 0)
+            periods = -(-end // self.sample_period)  # those that begin before the end
+            latest = gain.T - self.sample_period * (periods - 1)
+        ends = [self.gain_cap] if self.gain_cap is not None else []
+        if latest is not None:
+            ends.append(gain.rho1 + gain.k / latest)
+        return min(ends, default=None)
+
+    def clock_below(self, gain: PrescribedGain) -> Fraction:
+        """Bound the integral of the gain up to the deadline from below.
+
+        With sampling it is a sum of values at the beginnings of periods, which lacks at most
+        ``h (largest gain - gain(0))``, since the gain never falls.
+
+        Raises
+        ------
+        ValueError
+            Nothing limits the gain: the integral is infinite.
+        """
+        top = self.largest_gain(gain)
+        if top is None:
+            raise ValueError("nothing limits the gain")
+        T, rho1, k = gain.T, gain.rho1, gain.k
+        end = T - (self.stop_before or 0)
+        first = rho1 + k / T
+        if top <= first:
+            return rounded(top * end, BITS)
+        # From `turn` on the gain is `top`, unless the stop comes first.
+        turn = min(T - k / (top - rho1), end)
+        s = rho1 * turn + k * log(T / (T - turn), BITS)[0] + top * (end - turn)
+        if self.sample_period is not None:
+            s -= self.sample_period * (top - first)
+        return rounded(max(s, Fraction(0)), BITS)
+
+
+def limited_rate(rate: Fraction, growth: Fraction, limits: Limits, gain: PrescribedGain) -> Fraction:
+    """Return the rate at which ``V`` decays under the limits, on the clock: ``rate - h gain growth`` if sampled.
+
+    With ``F L + L'F >= rate F`` and ``L'F L <= growth F`` a step ``X - eta L X`` leaves
+    ``V (1 - eta rate + eta^2 growth) <= V e^(-eta (rate - eta growth))``.
+    """
+    if limits.sample_period is None:
+        return rate
+    return rate - limits.sample_period * (limits.largest_gain(gain) or 0) * growth
+
+
+@dataclass(frozen=True)
+class Form:
+    """A Lyapunov function ``z'P z`` that decays: ``V <= e^(-rate s) V(0)``.
+
+    Attributes
+    ----------
+    rate : Fraction
+    coordinates : {"E", "eps"}
+        ``E = -L X`` on the nodes, or the weighted deviation ``eps = X - (p'G X / p'1) G 1``.
+    nodes : list of int
+    diagonal : list of Fraction or None
+    matrix : list of list of Fraction or None
+        ``P``, its diagonal if it is diagonal.
+    lowest : Fraction
+        Not above the smallest eigenvalue of ``P``.
+    gauge : list of int
+        Camps of the nodes, for the coordinates ``eps``.
+    """
+
+    rate: Fraction
+    coordinates: str
+    nodes: Sequence[int]
+    diagonal: Sequence[Fraction] | None
+    matrix: Sequence[Sequence[Fraction]] | None
+    lowest: Fraction
+    gauge: Sequence[int] = ()
+
+    def value(self, z: Sequence[Fraction]) -> Fraction:
+        """Return ``z'P z``."""
+        if self.diagonal is not None:
+            return sum((w * x * x for w, x in zip(self.diagonal, z, strict=True)), Fraction(0))
+        return sum((x * sum(map(mul, row, z)) for row, x in zip(self.matrix or (), z, strict=True)), Fraction(0))
+
+    def largest_value(self, sizes: Sequence[Fraction]) -> Fraction:
+        """Bound ``z'P z`` where ``|z_i| <= sizes_i``."""
+        if self.diagonal is not None:
+            return self.value(sizes)
+        rows = ([abs(p) for p in row] for row in self.matrix or ())
+        return sum((x * sum(map(mul, row, sizes)) for row, x in zip(rows, sizes, strict=True)), Fraction(0))
+
+
+@dataclass(frozen=True)
+class Starts:
+    """A set of starts: a point, a box, or an ellipsoid.
+
+    Attributes
+    ----------
+    center : N numbers
+    radius : N numbers
+        ``|x_k - center_k| <= radius_k``; empty for a point or an ellipsoid.
+    axes : vectors of N numbers
+        ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``; empty for a point or a box.
+
+    Examples
+    --------
+    >>> box = Starts([Fraction(1), Fraction(0)], [Fraction(1), Fraction(2)])
+    >>> box.largest({0: Fraction(1), 1: Fraction(-1)})  # |x_1 - x_2| over 0..2 and -2..2
+    Fraction(4, 1)
+    """
+
+    center: Sequence[Fraction]
+    radius: Sequence[Fraction] = ()
+    axes: Sequence[Sequence[Fraction]] = ()
+
+    @property
+    def point(self) -> bool:
+        """Whether there is one start only."""
+        return not self.radius and not self.axes
+
+    def largest(self, row: Linear) -> Fraction:
+        """Bound the size of a linear function over the set."""
+        size = abs(sum((x * self.center[j] for j, x in row.items()), Fraction(0)))
+        if self.radius:
+            size += sum((abs(x) * self.radius[j] for j, x in row.items()), Fraction(0))
+        elif self.axes:
+            shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in self.axes]
+            size += root_above(sum((x * x for x in shares), Fraction(0)))
+        return size
+
+
+@dataclass(frozen=True)
+class InputBounds:
+    """Bounds of the input over a set of starts.
+
+    Attributes
+    ----------
+    rows : list of dict of int to Fraction
+        Of ``L``.
+    gain : PrescribedGain
+        Under the sliding-mode protocol with ``T = T_r + T_s``.
+    forms : list of Form or None
+    constants : list of (list of Fraction or None)
+        ``c_k`` of full matrices, ``e_k^2 <= c_k V``; those of diagonal ones follow.
+    starts : Starts
+        Of ``X(0) - sigma(0)``.
+    sigma0 : list of Fraction
+        Sizes ``|sigma_k(0)|``; empty if all are 0.
+    T_s : Fraction
+        Sliding mode: how long before ``T`` the sliding variables are 0 at the latest.
+    """
+
+    rows: Sequence[Linear]
+    gain: PrescribedGain
+    forms: Sequence[Form | None]
+    constants: Sequence[Sequence[Fraction] | None]
+    starts: Starts
+    sigma0: Sequence[Fraction] = ()
+    T_s: Fraction = Fraction(0)
+    _roots: dict[int, Fraction] = field(default_factory=dict)
+
+    def form(self, k: int) -> Form:
+        """Return the Lyapunov function ``k``.
+
+        Raises
+        ------
+        ValueError
+            It is one of a large graph, or does not decay.
+        """
+        form = self.forms[k]
+        if form is None or form.rate <= 0:
+            raise ValueError("a member that says nothing of single agents")
+        return form
+
+    @cached_property
+    def quiet(self) -> Fraction:
+        """``z`` from which on the sliding variables are 0, ``ln(T/T_s)`` from above; 0 if they always are."""
+        return log(self.gain.T / self.T_s, BITS)[1] if self.sigma0 else Fraction(0)
+
+    def _pushed(self, row: Linear) -> Fraction:
+        return sum((abs(x) * self.sigma0[j] for j, x in row.items()), Fraction(0))
+
+    @cached_property
+    def _pushed_twice(self) -> list[Fraction]:
+        """``|L^2| |sigma(0)|``, where sliding variables move."""
+        pushed = []
+        for row in self.rows:
+            square: dict[int, Fraction] = {}
+            for j, x in row.items():
+                for i, y in self.rows[j].items():
+                    square[i] = square.get(i, Fraction(0)) + x * y
+            pushed.append(self._pushed(square))
+        return pushed
+
+    @cached_property
+    def held(self) -> list[Fraction]:
+        """What no ``|e_k|`` ever exceeds: ``e^(-L s)`` expands neither ``max |x_k|`` nor ``max |e_k|``."""
+        largest = max(map(self.starts.largest, self.rows))
+        heard = [2 * row.get(v, Fraction(0)) for v, row in enumerate(self.rows)]
+        if self.sigma0:
+            largest += max(self._pushed_twice) * self.gain.clock_above(self.quiet)
+            return [largest + self._pushed(row) if h else h for row, h in zip(self.rows, heard, strict=True)]
+        states = max(self.starts.largest({v: Fraction(1)}) for v in range(len(self.rows)))
+        return [min(largest, h * states) for h in heard]
+
+    @cached_property
+    def held_norm(self) -> Fraction:
+        """What ``||E||`` never exceeds."""
+        return root_above(sum((x * x for x in self.held), Fraction(0)))
+
+    def start(self, k: int) -> Fraction:
+        """Bound ``v`` so that ``sqrt(V) <= e^(-rate s / 2) v`` for all starts, once no sliding variable moves.
+
+        In the reaching phase ``y = x - sigma`` moves by ``dy/ds = -L (y + sigma)``, ``|sigma| <= |sigma(0)|``.
+        """
+        if k not in self._roots:
+            form = self.form(k)
+            rows = [self.rows[v] for v in form.nodes] if form.coordinates == "E" else _deviations(form)
+            if self.starts.point:
+                V = form.value([sum((x * self.starts.center[j] for j, x in r.items()), Fraction(0)) for r in rows])
+            else:
+                V = form.largest_value([self.starts.largest(row) for row in rows])
+            root = root_above(V)
+            if self.sigma0:
+                if form.coordinates != "E":
+                    raise ValueError("deviations say nothing of the reaching phase")
+                size = root_above(form.largest_value([self._pushed_twice[v] for v in form.nodes]))
+                alpha = form.rate / 2
+                root += size * (exp(alpha * self.gain.clock_above(self.quiet), BITS)[1] - 1) / alpha
+            self._roots[k] = rounded(root, BITS, up=True)
+        return self._roots[k]
+
+    def constant(self, k: int) -> Sequence[Fraction]:
+        """Return ``c_v`` with ``e_v^2 <= c_v V`` for every agent.
+
+        Raises
+        ------
+        ValueError
+            Those of a full matrix are not known.
+        """
+        form, known = self.form(k), self.constants[k]
+        if known is not None:
+            return known
+        if form.diagonal is None:
+            raise ValueError("a full matrix without constants")
+        weight = dict(zip(form.nodes, form.diagonal, strict=True))
+        if form.coordinates == "E":
+            return [1 / weight[v] if v in weight else Fraction(0) for v in range(len(self.rows))]
+        return [sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in self.rows]
+
+    def root_constant(self, k: int, v: int | None) -> Fraction:
+        """Return ``c`` with ``|e_v| <= c sqrt(V)``, or ``||E|| <= c sqrt(V)`` without an agent."""
+        if v is not None:
+            return root_above(self.constant(k)[v])
+        form = self.form(k)
+        return root_above(1 / form.lowest if form.coordinates == "E" else sum(self.constant(k), Fraction(0)))
+
+    def bound(
+        self,
+        of: Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction],
+        v: int | None,
+        k: int,
+        z: Fraction,
+    ) -> Fraction:
+        """Bound the peak, the energy or the length ``of`` an agent's ``gain e_v``, or of ``gain ||E||``.
+
+        Raises
+        ------
+        ValueError
+            Sliding variables still move at ``z``, or ``z`` is beyond 100,000, or the bound is infinite.
+        """
+        if not self.quiet <= z <= LARGEST_EXPONENT:
+            raise ValueError("an instant at which sliding variables still move, or one too late")
+        held = self.held_norm if v is None else self.held[v]
+        return of(self.gain, held, self.root_constant(k, v) * self.start(k), self.form(k).rate, z)
+
+    def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
+        """Bound what disturbances ``|d_k| <= delta`` add to the inputs of the nominal protocol.
+
+        ``dE/ds = -L E - L d / gain``, and ``int_0^t ((T - t)/(T - r))^q dr <= (T - t)/(q - 1)``, ``q = rate k / 2``.
+
+        Raises
+        ------
+        ValueError
+            ``rate k <= 2``, or deviations.
+        """
+        form = self.form(k)
+        q = form.rate * self.gain.k / 2
+        if q <= 1 or form.coordinates != "E":
+            raise ValueError("the input may grow without limit")
+        pushed = root_above(form.largest_value([2 * self.rows[v].get(v, Fraction(0)) for v in form.nodes]))
+        each = pushed * delta * (self.gain.rho1 * self.gain.T + self.gain.k) / (q - 1)
+        return [root_above(c) * each for c in self.constant(k)]
+
+
+def _deviations(form: Form) -> list[dict[int, Fraction]]:
+    """Return the rows of ``X - (p'G X / p'1) G 1``."""
+    p = form.diagonal or ()
+    total, rows = sum(p), []
+    for v, g in zip(form.nodes, form.gauge, strict=True):
+        row = {w: -g * h * x / total for w, h, x in zip(form.nodes, form.gauge, p, strict=True)}
+        row[v] += 1
+        rows.append(row)
+    return rows
