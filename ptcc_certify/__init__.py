@@ -73,6 +73,8 @@ _EXPORTS = {
     "Effort": "effort",
     "WorstStart": "effort",
     "worst_start": "effort",
+    "Design": "gain_design",
+    "design": "gain_design",
     "check": "checker",
     "CheckReport": "checker",
     "SymbolicLyapunov": "symbolic",
@@ -85,6 +87,7 @@ _EXPORTS = {
     "plot_decay": "plots",
     "plot_run": "plots",
     "plot_sliding": "plots",
+    "plot_trade_off": "plots",
 }
 __all__ = sorted(_EXPORTS)
 

@@ -26,7 +26,7 @@ from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.document import Writer, certificate_document, outcome_witness
-from ptcc_certify.effort import Effort, Limits, Starts, bound_effort, starts_within
+from ptcc_certify.effort import Effort, Limits, Starts, WorstStart, bound_effort, starts_within, worst_start
 from ptcc_certify.enclosed import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.error_system import ErrorSystem
@@ -229,11 +229,9 @@ class Certificate:
             found += self.effort.obligations
         return tuple(found)
 
-    @cached_property
-    def effort(self) -> Effort | None:
-        """What is proved about the input; None if no decay was proved."""
-        if self.rate is None and not self.constant:
-            return None
+    @property
+    def forms(self) -> list[Form | None]:
+        """The Lyapunov functions of the envelope as bounds of the input take them; None for those of large graphs."""
         forms: list[Form | None] = []
         V = self.lyapunov
         if V is not None and V.blocks and self.proof.rate is not None:
@@ -246,10 +244,17 @@ class Certificate:
             else Form(m.rate, "E", m.nodes, m.diagonal, m.matrix, m.lowest if m.matrix else min(m.diagonal or ()))
             for m in self.sharpening.members
         ]
+        return forms
+
+    @cached_property
+    def effort(self) -> Effort | None:
+        """What is proved about the input; None if no decay was proved."""
+        if self.rate is None and not self.constant:
+            return None
         return bound_effort(
             self.structure,
             self.protocol,
-            forms,
+            self.forms,
             rate=self.rate,
             limit=None if self.limit is None else self.limit.value,
             start=self.start,
@@ -260,6 +265,13 @@ class Certificate:
             limits=self.limits,
             delta=self.delta,
         )
+
+    @cached_property
+    def worst_start(self) -> WorstStart | None:
+        """The start of the set ``starts`` from which the input gets largest (numerical); None without a set."""
+        if self.starts is None or self.graph.n_nodes > EXACT_NODES:
+            return None
+        return worst_start(self.structure, self.protocol, self.starts)
 
     @cached_property
     def checked(self) -> CheckReport | None:

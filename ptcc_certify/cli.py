@@ -25,6 +25,7 @@ from ptcc_certify.errors import ParameterError, PTCCError
 if TYPE_CHECKING:
     from ptcc_certify.actuator import Actuator
     from ptcc_certify.certificate import Certificate
+    from ptcc_certify.gain_design import Design
     from ptcc_certify.graph import SignedDigraph
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.structure import Structure
@@ -144,6 +145,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 )
 @_limit_options
 @click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
+@click.option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
 @click.option(
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
@@ -161,6 +163,7 @@ def certify(
     at: str | None,
     simulation: bool | None,
     initial_bound: str | None,
+    max_input: str | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -171,7 +174,7 @@ def certify(
     from ptcc_certify.summary import certificate_lines
 
     expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
-    bound = _number(initial_bound, "--initial-bound")
+    bound, most = _number(initial_bound, "--initial-bound"), _number(max_input, "--max-input")
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
@@ -200,7 +203,7 @@ def certify(
         _print(certificate_lines(certificate, graph))
         if output:
             click.echo(f"written    {output}")
-    return _exit_code(certificate, expected, wanted)
+    return _exit_code(certificate, expected, wanted) or _input_code(certificate, most)
 
 
 @cli.command()
@@ -295,6 +298,67 @@ def simulate(
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return OK
+
+
+@cli.command()
+@_graph_options
+@click.option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all starts.")
+@click.option("--initial-bound", metavar="R", required=True, help="All starts with |x_k(0)| <= R.")
+@click.option("--deadline", metavar="T", help="Ask for this deadline.")
+@click.option("--shortest-deadline", is_flag=True, help="Ask for the shortest deadline.")
+@click.option("--residual", metavar="r", help="Every agent may be so far from its outcome at the deadline.")
+@click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
+@click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
+@_json_option
+def design(
+    graph: str,
+    max_input: str,
+    initial_bound: str,
+    deadline: str | None,
+    shortest_deadline: bool,
+    residual: str | None,
+    input_norm: str | None,
+    curve: str | None,
+    output: str | None,
+    as_json: bool,
+    **read: Any,
+) -> int:
+    """Find gains of the nominal protocol whose input is proved to stay within a limit.
+
+    Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
+    """
+    from ptcc_certify.gain_design import INFEASIBLE, MET
+    from ptcc_certify.gain_design import design as run
+
+    if (deadline is None) != shortest_deadline:
+        raise ParameterError("give --deadline T, or ask for the --shortest-deadline: one of the two")
+    for path in (output, curve):
+        _refuse_output(path, graph)
+    if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
+        raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
+    U, R = _number(max_input, "--max-input"), _number(initial_bound, "--initial-bound")
+    T, r = _number(deadline, "--deadline"), _number(residual, "--residual")
+    assert U is not None and R is not None
+    found = run(
+        _read(graph, **read),
+        max_input=U,
+        initial_bound=R,
+        deadline=T,
+        residual=r,
+        input_norm=2 if input_norm else None,
+    )
+    if output and found.certificate is not None:
+        found.certificate.save(output)
+    if curve:
+        _save_curve(found, curve)
+    if as_json:
+        _print_json(found.to_dict())
+    else:
+        _print(found.lines())
+        if output and found.certificate is not None:
+            click.echo(f"written    {output}")
+    return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
 
 
 @cli.command()
@@ -547,6 +611,23 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
     return UNDECIDED
 
 
+def _input_code(certificate: Certificate, most: Fraction | None) -> int:
+    """Return the exit code of --max-input."""
+    effort = certificate.effort
+    if most is None or certificate.constant:
+        return OK
+    if effort is not None and effort.peak is not None and effort.peak.largest <= most:
+        return OK
+    if effort is not None and effort.first is not None and effort.first > most:
+        click.echo(f"refuted: the input is up to {float(effort.first):.6g} at the start (proved)", err=True)
+        return REFUTED_EXPECTATION
+    if effort is not None and effort.bounded is False and effort.starts is not None:
+        click.echo("refuted: from some of these starts the input grows without limit (proved)", err=True)
+        return REFUTED_EXPECTATION
+    click.echo("undecided: no such peak is proved, and none is excluded", err=True)
+    return UNDECIDED
+
+
 def _refuse_output(output: str | None, graph: str) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
     if not output:
@@ -565,6 +646,21 @@ def _save_figure(figure: Any, path: str | Path) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=Path(path).suffix.lower().lstrip("."), dpi=150)
     write_atomically(path, buffer.getvalue())
+
+
+def _save_curve(found: Design, path: str) -> None:
+    """Write peak input against deadline: CSV, or a figure."""
+    from ptcc_certify.io import write_atomically
+
+    if Path(path).suffix.lower() == ".csv":
+        curve = found.trade_off(found.deadlines())
+        rows = zip(*(values.tolist() for values in curve), strict=True)
+        lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
+        write_atomically(path, "\n".join(lines) + "\n")
+    else:
+        from ptcc_certify.plots import plot_trade_off
+
+        _save_figure(plot_trade_off(found).figure, path)
 
 
 def _make_folder(path: str) -> None:

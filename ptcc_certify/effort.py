@@ -138,6 +138,9 @@ class Effort:
     longest_period : Fraction or None
         Where sampling is not certified: a period, with the same largest gain, up to which it would be.
     disturbed : Disturbed or None
+    first : Fraction or None
+        Nominal protocol: ``sup max_k |u_k(0)|`` over the starts, exactly, which no peak falls below; None for an
+        ellipsoid.
     """
 
     bounded: bool | None
@@ -152,6 +155,7 @@ class Effort:
     limited: tuple[Limited, ...] = ()
     longest_period: Fraction | None = None
     disturbed: Disturbed | None = None
+    first: Fraction | None = None
 
     @property
     def obligations(self) -> list[Obligation]:
@@ -317,6 +321,7 @@ def bound_effort(
         limited=tuple(entry for entry in entries if entry is not None),
         longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
         disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
+        first=None if sliding or region.axes else (gain.rho1 + gain.k / gain.T) * max(map(region.largest, bounds.rows)),
     )
 
 

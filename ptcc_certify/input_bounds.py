@@ -9,6 +9,7 @@ downwards where a name says ``below``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -284,7 +285,7 @@ class Starts:
     @property
     def point(self) -> bool:
         """Whether there is one start only."""
-        return not self.radius and not self.axes
+        return not any(self.radius) and not self.axes
 
     def largest(self, row: Linear) -> Fraction:
         """Bound the size of a linear function over the set."""
@@ -384,11 +385,7 @@ class InputBounds:
         if k not in self._roots:
             form = self.form(k)
             rows = [self.rows[v] for v in form.nodes] if form.coordinates == "E" else _deviations(form)
-            if self.starts.point:
-                V = form.value([sum((x * self.starts.center[j] for j, x in r.items()), Fraction(0)) for r in rows])
-            else:
-                V = form.largest_value([self.starts.largest(row) for row in rows])
-            root = root_above(V)
+            root = _largest_root(form, rows, self.starts)
             if self.sigma0:
                 if form.coordinates != "E":
                     raise ValueError("deviations say nothing of the reaching phase")
@@ -459,6 +456,52 @@ class InputBounds:
         pushed = root_above(form.largest_value([2 * self.rows[v].get(v, Fraction(0)) for v in form.nodes]))
         each = pushed * delta * (self.gain.rho1 * self.gain.T + self.gain.k) / (q - 1)
         return [root_above(c) * each for c in self.constant(k)]
+
+
+def _largest_root(form: Form, rows: Sequence[Linear], starts: Starts) -> Fraction:
+    """Bound ``sqrt(z'P z)`` over the starts, ``z = A X(0)`` with the rows of ``A``; ``sqrt(V)`` is a norm.
+
+    The lesser of two bounds: from the largest ``|z_i|``, and from the center and ``M = A'P A``, with
+    ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid.
+    """
+
+    def moved(x: Sequence[Fraction]) -> list[Fraction]:
+        return [sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
+
+    middle = root_above(form.value(moved(starts.center)))
+    if starts.point:
+        return middle
+    if starts.axes:
+        spread = sum((form.value(moved(axis)) for axis in starts.axes), Fraction(0))
+    else:
+        spread = _spread(form, rows, starts.radius)
+    entries = root_above(form.largest_value([starts.largest(row) for row in rows]))
+    return min(entries, middle + root_above(spread))
+
+
+def _spread(form: Form, rows: Sequence[Linear], radius: Sequence[Fraction]) -> Fraction:
+    """Return ``sum_jl |M_jl| radius_j radius_l``, ``M = A'P A``; in integers."""
+    n = len(radius)
+    unit, scale = (
+        math.lcm(*(x.denominator for row in rows for x in row.values())),
+        math.lcm(*(r.denominator for r in radius)),
+    )
+    A = [{j: x.numerator * (unit // x.denominator) for j, x in row.items()} for row in rows]
+    R = [r.numerator * (scale // r.denominator) for r in radius]
+    lines = [[w] for w in form.diagonal] if form.diagonal is not None else form.matrix or ()
+    common = math.lcm(*(x.denominator for line in lines for x in line))
+    M = [[0] * n for _ in range(n)]
+    for i, line in enumerate(lines):
+        moved = [0] * n  # row i of P A
+        for place, w in enumerate(line, i if form.diagonal is not None else 0):
+            if w:
+                times = w.numerator * (common // w.denominator)
+                for j, a in A[place].items():
+                    moved[j] += times * a
+        for j, a in A[i].items():
+            M[j] = [m + a * x for m, x in zip(M[j], moved, strict=True)]
+    total = sum(r * sum(abs(m) * q for m, q in zip(row, R, strict=True)) for r, row in zip(R, M, strict=True))
+    return Fraction(total, common * unit**2 * scale**2)
 
 
 def _deviations(form: Form) -> list[dict[int, Fraction]]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ptcc_certify.certificate import Certificate
+    from ptcc_certify.gain_design import Design
     from ptcc_certify.reaching import ReachingTime
 
 #: Colour-blind safe (Okabe and Ito): first camp, second camp, unbalanced leaders, followers.
@@ -175,6 +176,36 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
     ax.set_xlabel("time left, $1 - t/T$")
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
     ax.set_ylabel(rf"$\|{name}(t)\| / \|{name}(0)\|$")
+    _legend_above(ax)
+    return ax
+
+
+def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
+    """Draw the peak input that is certified against the deadline, and below which no gains can stay.
+
+    Both axes are logarithmic. The limit that was asked for is a horizontal line.
+
+    Parameters
+    ----------
+    found : Design
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+    """
+    ax, curve = _axes(ax), found.trade_off(found.deadlines())
+    if np.isfinite(curve.certified).any():
+        ax.loglog(curve.deadlines, curve.certified, color="#0072B2", label="certified with these gains")
+    if np.isfinite(curve.lower).any():
+        ax.fill_between(curve.deadlines, curve.lower * 1e-3, curve.lower, color="#7F7F7F", alpha=0.3, linewidth=0)
+        ax.loglog(curve.deadlines, curve.lower, color="#7F7F7F", linestyle="--", label="no gains stay below")
+        ax.set_ylim(bottom=float(np.nanmin(curve.lower)) / 3)
+    ax.axhline(float(found.max_input), color="#D55E00", linewidth=0.9, linestyle=":", label="asked for")
+    if found.protocol is not None and found.peak:
+        ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color="#0072B2", label="this design")
+    ax.set_xlabel("deadline $T$")
+    ax.set_ylabel(r"peak input $\|u\|_2$" if found.input_norm == 2 else r"peak input $\max_k |u_k|$")
     _legend_above(ax)
     return ax
 

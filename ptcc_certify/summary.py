@@ -183,6 +183,10 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         whom = "" if effort.starts is None else " for all these starts"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         lines.append(_line("effort", ", ".join(sizes) + whom + part))
+    if sizes and (worst := certificate.worst_start) is not None:
+        labels = certificate.graph.labels
+        where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
+        lines.append(_line("", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"))
     if effort.sliding is not None and not effort.sliding.bounded:
         lines.append(_line("", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"))
     for entry in effort.limited:

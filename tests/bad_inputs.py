@@ -297,6 +297,63 @@ def _disturbed(name: str, says: str, text: str, *more: str) -> BadInput:
     return _sliding(f"disturbance: {name}", says, "--disturbance", text, *more)
 
 
+def _input(name: str, says: str, *args: str, command: str = "certify") -> BadInput:
+    return BadInput(name, (command, "fig1a", *args), says)
+
+
+INPUT = [
+    _input("initial-bound of 0", "bound of starts", "--initial-bound", "0"),
+    _input("initial-bound of words", "--initial-bound", "--initial-bound", "far"),
+    _input("max-input of words", "--max-input", "--max-input", "1 V"),
+    _input("gain-cap below 0", "gain_cap", "--gain-cap", "-3"),
+    _input("gain-cap that is no number", "--gain-cap", "--gain-cap", "nan"),
+    _input("stop-before beyond the deadline", "stop_before", "--stop-before", "2"),
+    _input("sample-period beyond the deadline", "sample_period", "--sample-period", "1.5"),
+    _input("delta of 0 under the nominal protocol", "delta", "--delta", "0"),
+    _input("gain-cap of the sliding mode", "--gain-cap", "--protocol", "sliding-mode", "--gain-cap", "9"),
+    _input("simulate: stop-before beyond the deadline", "stop_before", "--stop-before", "1", command="simulate"),
+    _input("simulate: a disturbance without delta", "delta", "--disturbance", "t", command="simulate"),
+    _input("simulate: a disturbance beyond delta", "beyond", "--disturbance", "2", "--delta", "1", command="simulate"),
+    _input("design without limits", "--max-input", command="design"),
+    _input("design without a deadline", "--deadline", "--max-input", "1", "--initial-bound", "1", command="design"),
+    _input(
+        "design with both deadlines",
+        "one of the two",
+        "--max-input",
+        "1",
+        "--initial-bound",
+        "1",
+        "--deadline",
+        "1",
+        "--shortest-deadline",
+        command="design",
+    ),
+    _input(
+        "design within nothing",
+        "max_input",
+        "--max-input",
+        "0",
+        "--initial-bound",
+        "1",
+        "--deadline",
+        "1",
+        command="design",
+    ),
+    _input(
+        "design with an odd curve",
+        "curve",
+        "--max-input",
+        "1",
+        "--initial-bound",
+        "1",
+        "--deadline",
+        "1",
+        "--curve",
+        "x.gif",
+        command="design",
+    ),
+]
+
 SLIDING = [
     _disturbed("beyond delta, with no run to show it", "beyond delta", "2", "--x0", "1,1,1,1,1,1", "--no-simulation"),
     _disturbed("code", "__import__", "__import__('os')"),
@@ -358,7 +415,7 @@ SLIDING = [
     ),
 ]
 
-BAD_INPUTS = FILES + OPTIONS + SLIDING
+BAD_INPUTS = FILES + OPTIONS + INPUT + SLIDING
 
 
 def main() -> None:

@@ -621,6 +621,51 @@ def test_simulate_writes_tables(name: str):
     assert Path(name).read_text(encoding="utf-8") == ptcc("simulate", "fig1a").out
 
 
+# ---------------------------------------------------------------------- the input, design
+
+
+@pytest.mark.parametrize(
+    ("most", "code", "says"), [("1000", 0, ""), ("100", 3, "at the start"), ("652", 4, "undecided")]
+)
+def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
+    run = ptcc("certify", "fig1a", "--no-simulation", "--max-input", most)
+    assert run.code == code and says in run.err
+
+
+def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
+    words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
+    run = ptcc(*words)
+    assert run.code == 0 and "INPUT      NOT BOUNDED" in run.out and "raise rho2 * kappa to 0.38337" in run.out
+    refuted = ptcc(*words, "--initial-bound", "1", "--max-input", "1e9")
+    assert refuted.code == 3 and "without limit" in refuted.err
+
+
+def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
+    run = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "1/1000", "--delta", "0.1")
+    assert run.code == 0 and "held for 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
+    coarse = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "0.5")
+    assert "not certified with this period; up to 0.00" in coarse.out
+    rows = ptcc("simulate", "fig1a", "--gain-cap", "20", "--samples", "11").out.splitlines()
+    assert (
+        rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines() and rows[0] == "t,remaining,1,2,3,4,5,6"
+    )
+
+
+def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
+    asked = ("design", "fig1a", "--max-input", "10", "--initial-bound", "1")
+    met = ptcc(*asked, "--deadline", "2", "-o", "d.json", "--curve", "d.csv")
+    assert met.code == 0 and "verdict               met" in met.out
+    assert ptcc("check", "d.json", "fig1a").code == 0
+    lines = Path("d.csv").read_text().splitlines()
+    assert lines[0] == "deadline,certified_peak,no_gains_below" and len(lines) == 62
+    assert ptcc(*asked, "--deadline", "0.7").code == 3
+    assert ptcc(*asked, "--deadline", "0.9", "-o", "none.json").code == 4
+    assert not Path("none.json").exists()
+    assert ptcc(*asked, "--shortest-deadline", "--curve", "d.png").code == 0 and Path("d.png").stat().st_size > 5000
+    data = json.loads(ptcc(*asked, "--shortest-deadline", "--input-norm", "2", "--json").out)
+    assert data["verdict"] == "met" and data["input_norm"] == 2 and Fraction(data["peak"]) <= 10
+
+
 # ---------------------------------------------------------------------- examples, cite, imports
 
 

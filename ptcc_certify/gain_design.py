@@ -1,0 +1,658 @@
+"""Gains, and the shortest deadline, for which an input is proved to stay within what the actuators give.
+
+With ``k = rho2 kappa`` and ``a = rho1 T`` the gain is ``(a + k e^z)/T`` at ``z = ln(T/(T - t))``, and the stretched
+clock ``s = a (1 - e^-z) + k z``, which knows no ``T``. So a bound of the input over a set of starts is ``phi(a, k)/T``
+exactly: smallest peak and shortest deadline are one question, ``T = phi/U``. Of every agent ``|e_v|`` is at most
+``held_v``, and ``B_vi e^(-rate_i s/2)`` for each proved Lyapunov function ``i``. The bounded input up to ``T`` needs
+``rate_i k >= 2``; then the peak is the gain where both meet, at the clock ``sigma_vi = (2/rate_i) ln(B_vi/held_v)``:
+
+    phi(a, k) = max_v held_v (a + k e^(z_v)),    a (1 - e^(-z_v)) + k z_v = min_i sigma_vi
+    phi(a, k) = max_v B_v (a + k),               where B_v = B_vi < held_v, since then z_v = 0
+
+Which function serves an agent best depends on ``k`` only, by ``rate_i k >= 2``.
+
+* For a fixed ``k`` this is convex in ``a``: ``dz/da = -(1 - e^-z)/(a e^-z + k)``, hence
+  ``d(a + k e^z)/da = 1 - k (e^z - 1)/(a e^-z + k)``, which grows with ``a`` since ``z`` falls and
+  ``a e^-z + k`` grows; a maximum of convex functions is convex.
+* For one agent the smallest admissible ``k = 2/rate_i`` is best: at a fixed ``z`` clock costs peak
+  ``1/(1 - e^-z) = e^z/(e^z - 1)`` by ``a`` and ``e^z/z``, which is more, by ``k``. With several agents,
+  whose ``z_v`` differ, that is not proved; each member's
+  ``2/rate_i`` is tried, and nothing between.
+
+Where a residual is allowed at the deadline, the gain may be constant instead: a cap ``g`` that always acts gives the
+clock ``g T`` and a peak of at most ``g max held``, so ``phi = s max held`` with the least clock ``s`` that proves the
+residual, ``sqrt(c_v) start_i e^(-rate_i s/2) <= r``.
+
+Two bounds hold for all gains of the protocol, whatever the certificate:
+
+* without a residual the input must stay bounded, hence ``k >= 1/min Re lambda >= 2/limit``, and
+  ``u(0) = (a + k)/T e(0)``: ``U T > (2/limit) sup |e_v(0)|``. This needs a set of starts with inner points.
+* an agent moves at most ``U T``: ``U T >= sup |x_v(0) - (Q X(0))_v| - r``.
+
+The search is in floating point; what is answered is then proved: a :class:`~ptcc_certify.certificate.Certificate` with
+the gains found, whose bound of the input is compared with ``U`` exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.checker import INPUT_NODES
+from ptcc_certify.effort import Limits, Starts, WorstStart, starts_within, worst_start
+from ptcc_certify.enclosure import rounded, sqrt
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.gain import parameter
+from ptcc_certify.input_bounds import BITS, InputBounds, Linear, PrescribedGain
+from ptcc_certify.lemmas import laplacian_spectrum
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.rationals import format_exact, nearest_float, shorten
+from ptcc_certify.structure import Structure, analyse
+
+if TYPE_CHECKING:
+    from ptcc_certify.graph import Exact, SignedDigraph
+
+MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
+#: Significant decimal digits of the gains and deadlines that are found.
+DIGITS = 10
+#: ``rho1 T / k`` is sought between these.
+_LEAST, _MOST = 1e-3, 1e6
+#: The exact bound is not below what the search finds by such a factor.
+_HOPELESS = Fraction(1001, 1000)
+#: How often a deadline is lengthened by a little until the exact bound agrees.
+_NUDGES = 20
+_KEPT_BITS = 40
+
+
+class TradeOff(NamedTuple):
+    """Deadlines (M,), the peak input certified at each, and below which none of all gains can stay."""
+
+    deadlines: np.ndarray
+    certified: np.ndarray
+    lower: np.ndarray
+
+
+@dataclass(frozen=True, repr=False)
+class Design:
+    """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
+
+    Attributes
+    ----------
+    verdict : {"met", "infeasible", "not with this certificate"}
+        ``infeasible``: no gains of the nominal protocol can, proved. The third says that the bounds of this
+        certificate do not suffice, and nothing about other gains.
+    binding : str
+        The limit that binds, and how far off it is.
+    max_input : Fraction
+        ``U``, of ``max_k |u_k|``, or of ``||u||_2``.
+    input_norm : {2, None}
+    starts : Starts
+        For all of which it holds.
+    asked_deadline, asked_residual : Fraction or None
+    deadline : Fraction or None
+        ``T``; None if none was asked for and none is certified.
+    protocol : NominalProtocol or None
+        The gains; None unless the verdict is ``met``.
+    limits : Limits or None
+        The cap of the gain that belongs to them; None if there is none.
+    certificate : Certificate or None
+        What proves it.
+    peak : Fraction or None
+        The certified peak of the input at ``deadline``, also if it is too large.
+    residual : Fraction or None
+        How far from its outcome an agent is at the deadline, at most; 0 without a cap.
+    product : Fraction or None
+        ``phi``, peak times deadline: what the gains found certify at any deadline.
+    lower_product : Fraction or None
+        Below which ``U T`` is too small for all gains of the protocol, proved.
+    lower_by : str
+        Why.
+    """
+
+    verdict: str
+    binding: str
+    max_input: Fraction
+    input_norm: int | None
+    starts: Starts
+    asked_deadline: Fraction | None
+    asked_residual: Fraction | None
+    deadline: Fraction | None = None
+    protocol: NominalProtocol | None = None
+    limits: Limits | None = None
+    certificate: Certificate | None = None
+    peak: Fraction | None = None
+    residual: Fraction | None = None
+    product: Fraction | None = None
+    lower_product: Fraction | None = None
+    lower_by: str = ""
+
+    @property
+    def shortest_possible(self) -> Fraction | None:
+        """No gains of the protocol meet a shorter deadline within ``max_input``; None if nothing is known."""
+        return None if self.lower_product is None else self.lower_product / self.max_input
+
+    @property
+    def shortest_certified(self) -> Fraction | None:
+        """The deadline from which on the gains found keep to ``max_input``; None if nothing is certified."""
+        return None if self.product is None else self.product / self.max_input
+
+    @property
+    def ratio(self) -> float | None:
+        """Shortest certified deadline over the shortest possible one, at least 1."""
+        if not self.product or not self.lower_product:
+            return None
+        return float(self.product / self.lower_product)
+
+    @cached_property
+    def worst(self) -> WorstStart | None:
+        """The start from which the input gets largest under these gains (numerical); None without gains."""
+        if self.protocol is None or self.certificate is None:
+            return None
+        structure = self.certificate.structure
+        if self.limits is None or self.limits.gain_cap is None:
+            return worst_start(structure, self.protocol, self.starts)
+        # The gain is constant, and max |e_k| never grows.
+        first = worst_start(structure, self.protocol, self.starts, samples=1)
+        share = self.limits.gain_cap / (self.protocol.rho1 + self.protocol.rho2 / self.protocol.T)
+        return replace(first, size=first.size * float(share))
+
+    def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
+        """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
+
+        The gains for a deadline ``T`` are those of ``protocol`` with ``rho1 T`` kept.
+
+        Examples
+        --------
+        >>> from ptcc_certify.graph import SignedDigraph
+        >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+        >>> design(pair, max_input=10, initial_bound=1).trade_off([1, 2]).lower.round(6)
+        array([1.5 , 0.75])
+        """
+        T = np.array([float(t) for t in deadlines])
+        certified, lower = (
+            np.full(T.shape, math.nan if x is None else nearest_float(x)) / T
+            for x in (self.product, self.lower_product)
+        )
+        return TradeOff(T, certified, lower)
+
+    def deadlines(self, count: int = 61) -> np.ndarray:
+        """Return deadlines about the one that was found or asked for, evenly spaced in their logarithms."""
+        known = (self.deadline, self.shortest_certified, self.shortest_possible, Fraction(1))
+        middle = nearest_float(next(T for T in known if T))
+        return np.geomspace(middle / 5, middle * 5, count)
+
+    def lines(self) -> list[str]:
+        """Return what the screen shows."""
+        norm = "||u||" if self.input_norm == 2 else "max |u_k|"
+        asked = f"{norm} <= {_short(self.max_input)}"
+        if self.asked_deadline is None:
+            asked += ", shortest deadline"
+        else:
+            asked += f", deadline {_short(self.asked_deadline)}"
+        if self.asked_residual is not None:
+            asked += f", residual {_short(self.asked_residual)}"
+        found = [("asked", asked), ("verdict", self.verdict), ("", self.binding)]
+        if self.protocol is not None:
+            p = self.protocol
+            found.append(("gains", f"T = {_short(p.T)}, rho1 = {_short(p.rho1)}, rho2 kappa = {_short(p.rho2)}"))
+        if self.limits is not None and self.limits.gain_cap is not None:
+            found.append(("", f"gain capped at {_short(self.limits.gain_cap)}, which acts from 0 on"))
+        if self.peak is not None:
+            found.append(("peak input", f"{_short(self.peak)} at most"))
+        if self.residual is not None:
+            left = f"{_short(self.residual)} at most" if self.residual else "none, every agent is at its outcome"
+            found.append(("left at the deadline", left))
+        if self.shortest_certified is not None:
+            found.append(("shortest deadline", f"{_short(self.shortest_certified)} certified"))
+        if self.shortest_possible is not None:
+            times = "" if self.ratio is None else f", {self.ratio:.3g} times shorter"
+            found.append(("", f"{_short(self.shortest_possible)} at least, whatever the gains{times}"))
+        width = max(len(name) for name, _ in found)
+        return [f"{name:<{width}}  {text}" for name, text in found]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
+
+        def text(x: Fraction | None) -> str | None:
+            return None if x is None else format_exact(x)
+
+        cap = None if self.limits is None else self.limits.gain_cap
+        return {
+            "verdict": self.verdict,
+            "binding": self.binding,
+            "max_input": text(self.max_input),
+            "input_norm": self.input_norm,
+            "asked": {"deadline": text(self.asked_deadline), "residual": text(self.asked_residual)},
+            "protocol": None if self.protocol is None else self.protocol.to_dict(),
+            "gain_cap": text(cap),
+            "deadline": text(self.deadline),
+            "peak": text(self.peak),
+            "residual": text(self.residual),
+            "shortest_certified": text(self.shortest_certified),
+            "shortest_possible": text(self.shortest_possible),
+            "ratio": self.ratio,
+        }
+
+    def _repr_html_(self) -> str:
+        import html
+
+        return f"<pre>{html.escape(chr(10).join(self.lines()))}</pre>"
+
+    def __repr__(self) -> str:
+        if self.protocol is None or self.peak is None:
+            return f"Design({self.verdict}: {self.binding})"
+        p, cap = self.protocol, ""
+        if self.limits is not None and self.limits.gain_cap is not None:
+            cap = f", gain_cap={_short(self.limits.gain_cap)}"
+        gains = f"T={_short(p.T)}, rho1={_short(p.rho1)}, rho2={_short(p.rho2)}{cap}"
+        return f"Design({self.verdict}, {gains}, peak {_short(self.peak)})"
+
+
+class Option(NamedTuple):
+    """Gains in units of a deadline: ``rho1 T``, ``k``, the clock of a capped gain or None, and about what ``phi``."""
+
+    a: Fraction
+    k: Fraction
+    clock: Fraction | None
+    product: Fraction
+
+
+class Fit(NamedTuple):
+    """Gains at a deadline, and what is proved of them; None where nothing is."""
+
+    deadline: Fraction
+    certificate: Certificate
+    limits: Limits | None
+    peak: Fraction | None
+    residual: Fraction | None
+
+
+def design(
+    graph: SignedDigraph,
+    *,
+    max_input: Exact,
+    initial_bound: Exact | Starts,
+    deadline: Exact | None = None,
+    residual: Exact | None = None,
+    input_norm: int | None = None,
+) -> Design:
+    """Find gains of the nominal protocol whose input is proved to stay within a limit, and the shortest deadline.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Up to 400 agents.
+    max_input : int, float, str or Fraction
+        Positive: bound of ``|u_k|`` for all agents, at all times, from all starts.
+    initial_bound : int, float, str, Fraction or Starts
+        All starts with ``||X(0)||_inf`` up to this; or another set.
+    deadline : int, float, str or Fraction, optional
+        ``T``: the gains with the smallest peak are sought. Without it the shortest one is.
+    residual : int, float, str or Fraction, optional
+        Positive: how far every agent may be from its outcome at the deadline. Then the gain may be capped.
+    input_norm : {2}, optional
+        ``max_input`` bounds ``||u||_2`` instead.
+
+    Returns
+    -------
+    Design
+        With ``kappa = 1``.
+
+    Raises
+    ------
+    ParameterError
+        A number that is not positive, another norm, or starts of the wrong length.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> trio = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
+    >>> design(trio, max_input=20, initial_bound=3, deadline=1)
+    Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18858, 1.18858 times the \
+one asked for)
+    >>> found = design(trio, max_input=20, initial_bound=3, deadline="2.5")
+    >>> found.verdict, bool(found.peak <= 20), found.certificate.verdict
+    ('met', True, 'certified')
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> found = design(pair, max_input=20, initial_bound=3, residual="2.9")  # 2 * 3 * gain_cap = 20
+    >>> found.verdict, float(found.limits.gain_cap)
+    ('met', 3.333333333)
+    """
+    U = parameter("max_input", max_input)
+    T = None if deadline is None else parameter("deadline", deadline)
+    r = None if residual is None else parameter("residual", residual)
+    if input_norm not in (None, 2):
+        raise ParameterError(f"input_norm = {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
+    structure = analyse(graph)
+    starts = initial_bound if isinstance(initial_bound, Starts) else starts_within(structure, initial_bound)
+    begin: dict[str, Any] = {"x0": starts.center} if starts.point else {"starts": starts}
+    base = certify(graph, _first_protocol(structure), **begin, simulation=False)
+    blank = Design(UNPROVED, "", U, input_norm, starts, T, r, deadline=T)
+    bounds, members = _bounds(base, starts)
+    lower, why = _lower_product(base, bounds, r)
+    blank = replace(blank, lower_product=lower, lower_by=why)
+    reason = _unusable(base)
+    if reason is not None:
+        return _missed(replace(blank, binding=reason))
+    best: Fit | None = None
+    for option in _options(base, bounds, members, input_norm, r):
+        fit = _fit(base, bounds, option, U, T, r, input_norm)
+        best = best or fit
+        if _meets(fit, U, r):
+            checked = fit.certificate.checked
+            if checked is None or not checked.accepted:
+                why = "" if checked is None else f" {checked.rejected}: {checked.reason}"
+                return replace(blank, binding=f"the independent check does not accept{why}")
+            return _met(replace(blank, verdict=MET), fit)
+        if T is not None and option.product > U * T * _HOPELESS:
+            break
+    if best is None or best.peak is None:
+        return _missed(replace(blank, binding="this certificate bounds no input"))
+    return _missed(replace(blank, peak=best.peak, product=best.peak * best.deadline))
+
+
+# ---------------------------------------------------------------------- what is known
+
+
+def _first_protocol(structure: Structure) -> NominalProtocol:
+    """Return gains on the scale of the graph, for whose clock the Lyapunov functions are chosen."""
+    k = 0.0
+    if structure.graph.n_edges:
+        try:
+            k = 2 / (laplacian_spectrum(structure).spectral_rate or 0.0)
+        except (np.linalg.LinAlgError, ZeroDivisionError):
+            k = 1 / float(np.mean(structure.graph.in_weight()))
+    if not 1e-250 < k < 1e250:
+        k = 1.0
+    return NominalProtocol(1, 2 * k, k, 1)
+
+
+def _unusable(base: Certificate) -> str | None:
+    """Tell why the certificate bounds no input; None if it does."""
+    n = base.graph.n_nodes
+    if base.constant:
+        return None
+    if n > INPUT_NODES:
+        return f"the input is bounded up to {INPUT_NODES} agents; the graph has {n}"
+    if base.effort is None:
+        return base.notes[0] if base.notes else "no decay was proved"
+    return None
+
+
+def _bounds(base: Certificate, starts: Starts) -> tuple[InputBounds, list[int]]:
+    """Return what bounds the input, and the members of the envelope that say something of single agents."""
+    forms = base.forms
+    constants = base.effort.constants if base.effort is not None else ()
+    gain = PrescribedGain(base.protocol.T, base.protocol.rho1, base.protocol.rho2)
+    bounds = InputBounds(base.graph.exact_rows(range(base.graph.n_nodes)), gain, forms, constants, starts)
+    members = []
+    for i in range(len(forms)):
+        try:
+            bounds.constant(i)
+            bounds.start(i)
+        except (ValueError, OverflowError):
+            continue
+        members.append(i)
+    return bounds, members
+
+
+def _lower_product(base: Certificate, bounds: InputBounds, residual: Fraction | None) -> tuple[Fraction | None, str]:
+    """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
+    best, why, labels = Fraction(0), "", base.graph.labels
+    if base.influence.exact and base.graph.n_nodes <= INPUT_NODES:
+        for v, label in enumerate(labels):
+            row = {j: -Fraction(x) for j, x in base.influence.row(v).items()}
+            row[v] = row.get(v, Fraction(0)) + 1
+            way = _largest_below(bounds.starts, row) - (residual or 0)
+            if way > best:
+                best, why = way, f"the way of agent {shorten(label)} to its outcome"
+    limit = base.rate_limit
+    if residual is None and limit and _has_inner_points(bounds.starts):
+        for heard, label in zip(bounds.rows, labels, strict=True):
+            first = 2 / limit * _largest_below(bounds.starts, heard)
+            if first > best:
+                best, why = first, f"the input of agent {shorten(label)} at the start"
+    return (rounded(best, _KEPT_BITS) if best > 0 else None), why
+
+
+def _largest_below(starts: Starts, row: Linear) -> Fraction:
+    """Bound the largest size of a linear function over the set from below; exact but for an ellipsoid's root."""
+    if not starts.axes:
+        return starts.largest(row)
+    size = abs(sum((x * starts.center[j] for j, x in row.items()), Fraction(0)))
+    shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in starts.axes]
+    return size + sqrt(rounded(sum((x * x for x in shares), Fraction(0)), BITS), BITS)[0]
+
+
+def _has_inner_points(starts: Starts) -> bool:
+    """Tell whether the set spans all directions, so that an input bounded on it is bounded for every start."""
+    if not starts.axes:
+        return bool(starts.radius) and min(starts.radius) > 0
+    import flint
+
+    rows = [[flint.fmpq(x.numerator, x.denominator) for x in axis] for axis in starts.axes]
+    return flint.fmpq_mat(rows).rank() == len(starts.center)
+
+
+# ---------------------------------------------------------------------- search
+
+
+def _options(
+    base: Certificate, bounds: InputBounds, members: Sequence[int], input_norm: int | None, residual: Fraction | None
+) -> list[Option]:
+    """Return gains by increasing ``phi``: the best without a cap, and a cap for each member if a residual is allowed.
+
+    In units of ``k`` and the largest ``held`` everything is free of dimensions.
+    """
+    agents: list[int | None] = [None] if input_norm == 2 else [*range(len(bounds.rows))]
+    held = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
+    top = max(held)
+    if base.constant or top == 0 or not members:
+        return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
+    rates = {i: bounds.form(i).rate for i in members}
+    decay = {i: [bounds.root_constant(i, v) * bounds.start(i) for v in agents] for i in members}
+    moving = [j for j, h in enumerate(held) if h and all(decay[i][j] for i in members)]
+    size = np.array([nearest_float(held[j] / top) for j in moving])
+    over = {i: np.array([_log(decay[i][j] / held[j]) for j in moving]) for i in members}
+    least = 2 / max(rates.values())
+    best = (math.inf, 1.0, least)
+    for i in members:
+        k = _decimal(2 / rates[i], up=True)
+        may = [j for j in members if rates[j] * k >= 2]
+        # The clock of the crossing, over k.
+        clocks = np.array([over[j] * nearest_float(2 / (rates[j] * k)) for j in may])
+        which, every = clocks.argmin(axis=0), np.arange(len(moving))
+        start = clocks[which, every]
+        share = size * np.exp(np.minimum(np.array([over[j] for j in may])[which, every], 0))
+        a, peak = least_peak(np.maximum(start, 0), share)
+        if peak * nearest_float(k / least) < best[0] * (1 - 1e-9):
+            best = (peak * nearest_float(k / least), a, k)
+    product, a, k = best
+    options = []
+    if math.isfinite(product):
+        options.append(Option(_decimal(Fraction(a) * k), k, None, Fraction(product) * least * top))
+    if residual is not None:
+        for i in members:
+            bound = base.envelope.members[i].distance
+            if bound is None:
+                continue
+            left = max(map(_log, bound.agents)) / 2 + _log(bounds.start(i)) - _log(residual)
+            clock = _decimal(Fraction(max(left, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
+            options.append(Option(clock, k, clock, clock * top))
+    return sorted(options, key=lambda option: option.product)
+
+
+def least_peak(clocks: np.ndarray, sizes: np.ndarray) -> tuple[float, float]:
+    """Return the ``a`` that makes ``max_v sizes_v (a + e^(z_v))`` least, ``a (1 - e^(-z_v)) + z_v = clocks_v``, and it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> a, peak = least_peak(np.array([1.0]), np.array([1.0]))  # with a = 0 it is e
+    >>> round(a, 3), round(peak, 3)
+    (0.403, 2.588)
+    """
+    from scipy.optimize import minimize_scalar
+
+    grid = np.geomspace(_LEAST, _MOST, 28)
+    values = [peak_factor(a, clocks, sizes) for a in grid]
+    i = int(np.argmin(values))
+    ends = (grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)])
+    near = minimize_scalar(
+        lambda a: peak_factor(a, clocks, sizes), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
+    )
+    return min([(float(near.x), float(near.fun)), (float(grid[i]), float(values[i]))], key=lambda pair: pair[1])
+
+
+def peak_factor(a: float, clocks: np.ndarray, sizes: np.ndarray) -> float:
+    """Return ``max_v sizes_v (a + e^(z_v))``, ``a (1 - e^(-z_v)) + z_v = clocks_v``, for ``k = 1``.
+
+    The clock is concave in ``z``, so that Newton's method from below grows to the root.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(peak_factor(0.0, np.array([1.0]), np.array([1.0])), 6)
+    2.718282
+    """
+    z = np.maximum(clocks / (1 + a), clocks - a)
+    for _ in range(40):
+        step = (clocks + a * np.expm1(-z) - z) / (a * np.exp(-z) + 1)
+        z = z + step
+        if np.abs(step).max(initial=0) <= 1e-13 * (1 + z.max(initial=0)):
+            break
+    with np.errstate(over="ignore"):
+        return float((sizes * (a + np.exp(z))).max(initial=0.0))
+
+
+# ---------------------------------------------------------------------- proof
+
+
+def _fit(
+    base: Certificate,
+    bounds: InputBounds,
+    option: Option,
+    U: Fraction,
+    deadline: Fraction | None,
+    residual: Fraction | None,
+    input_norm: int | None,
+) -> Fit:
+    """Return the gains at a deadline, or at the shortest one that is proved, and what is proved of them."""
+    T = deadline if deadline is not None else _decimal(option.product / U, up=True) or Fraction(1)
+    fit = _at(base, bounds, option, T, input_norm)
+    if deadline is None:
+        for nudge in range(_NUDGES):
+            if fit.peak is None or fit.peak <= U:
+                break
+            T = _decimal(T * fit.peak / U * (1 + nudge * Fraction(1, 10**9)), up=True)
+            fit = _at(base, bounds, option, T, input_norm)
+    return fit
+
+
+def _at(base: Certificate, bounds: InputBounds, option: Option, T: Fraction, input_norm: int | None) -> Fit:
+    if option.clock is None:
+        protocol = NominalProtocol(T, _decimal(option.a / T), option.k, 1)
+        cert = replace(base, protocol=protocol, limits=())
+        effort = cert.effort
+        if effort is None or effort.peak is None:
+            return Fit(T, cert, None, Fraction(0) if not any(bounds.held) else None, Fraction(0))
+        return Fit(T, cert, None, effort.peak.norm if input_norm == 2 else effort.peak.largest, Fraction(0))
+    cap = _decimal(option.clock / T, up=True)
+    limits = Limits(gain_cap=cap)
+    cert = replace(base, protocol=NominalProtocol(T, cap, option.k, 1), limits=(limits,))
+    entries = cert.effort.limited if cert.effort is not None else ()
+    if not entries or entries[0].agents is None:
+        return Fit(T, cert, limits, None, None)
+    peak = entries[0].largest if input_norm is None else cap * bounds.held_norm
+    return Fit(T, cert, limits, peak, max(entries[0].agents))
+
+
+def _meets(fit: Fit, U: Fraction, residual: Fraction | None) -> bool:
+    if fit.peak is None or fit.residual is None:
+        return False
+    return fit.peak <= U and fit.residual <= (residual or 0)
+
+
+def _met(asked: Design, fit: Fit) -> Design:
+    """Return the answer with gains."""
+    assert fit.peak is not None
+    cert, protocol = fit.certificate, fit.certificate.protocol
+    assert isinstance(protocol, NominalProtocol)
+    effort = cert.effort
+    if not fit.peak:
+        binding = "nothing binds: no agent moves, whatever the gains"
+    elif fit.limits is not None:
+        slack = _percent(fit.peak, asked.max_input)
+        binding = f"the capped gain times the largest error at the start, {slack}"
+    else:
+        assert effort is not None and effort.peak is not None
+        agents = effort.peak.agents
+        v = max(range(len(agents)), key=agents.__getitem__)
+        how = effort.peak.norm_how if asked.input_norm == 2 else effort.peak.how[v]
+        whose = "||u||" if asked.input_norm == 2 else f"the input of agent {shorten(cert.graph.labels[v])}"
+        when = f"{nearest_float(protocol.T) * -math.expm1(-nearest_float(how.z)):.4g}"
+        binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, asked.max_input)}"
+    return replace(
+        asked,
+        binding=binding,
+        deadline=fit.deadline,
+        protocol=protocol,
+        limits=fit.limits,
+        certificate=cert,
+        peak=fit.peak,
+        residual=fit.residual,
+        product=fit.peak * fit.deadline,
+    )
+
+
+def _missed(asked: Design) -> Design:
+    """Return the answer without gains; ``binding`` tells why if nothing is certified."""
+    U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
+    if T is not None and shortest is not None and shortest > T:
+        text = f"no gains meet a deadline below {_short(shortest)}, {_short(shortest / T)} times the one asked for"
+        return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
+    if asked.peak is None or asked.product is None:
+        return asked
+    if asked.peak <= U:
+        return replace(asked, binding="the residual is not proved")
+    over = f"the certified peak is {_short(asked.peak)}, {_short(asked.peak / U)} times max_input"
+    return replace(asked, binding=f"{over}; from T = {_short(asked.product / U)} on it is met")
+
+
+# ---------------------------------------------------------------------- numbers
+
+
+def _log(x: Fraction) -> float:
+    """Return the natural logarithm of a nonnegative rational of any size."""
+    return math.log(x.numerator) - math.log(x.denominator) if x else -math.inf
+
+
+def _decimal(x: Fraction, up: bool = False) -> Fraction:
+    """Round a nonnegative rational to a few decimal digits, to nearest or upwards.
+
+    Examples
+    --------
+    >>> float(_decimal(Fraction(2, 3))), float(_decimal(Fraction(1, 3), up=True)), float(_decimal(Fraction(0)))
+    (0.6666666667, 0.3333333334, 0.0)
+    """
+    if not x:
+        return x
+    shift = DIGITS - 1 - math.floor(_log(x) / math.log(10))
+    unit = Fraction(10) ** shift
+    scaled = x * unit
+    return Fraction(math.ceil(scaled) if up else round(scaled)) / unit
+
+
+def _short(x: Fraction) -> str:
+    return f"{nearest_float(x):.6g}"
+
+
+def _percent(part: Fraction, whole: Fraction) -> str:
+    return f"{nearest_float(100 * part / whole):.4g}% of max_input"
