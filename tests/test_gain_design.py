@@ -271,7 +271,7 @@ def test_bad_input_is_named_in_one_line(asked, said):
 
 
 def test_what_is_shown_and_written():
-    met, missed = designed("fig5a", 10, 1), designed("fig5a", 10, 1, deadline=2)
+    met, missed = designed("fig5a", 10, 1), designed("fig5a", 10, 1, deadline=1)
     assert missed.verdict == UNPROVED and "times max_input" in missed.binding
     assert missed.peak > 10 and missed.protocol is None and missed.certificate is None and missed.worst is None
     for found in (met, missed, designed("pair", 20, 3, residual="2.9")):
