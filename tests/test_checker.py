@@ -31,9 +31,11 @@ from side_files import Side, with_factors, with_side_files
 import ptcc_certify
 from ptcc_certify import certificate as certificate_module
 from ptcc_certify import checker, document, outcomes
+from ptcc_certify.actuator import Actuator
 from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.checker import check, digraph
 from ptcc_certify.definite import arithmetic
+from ptcc_certify.effort import box, ellipsoid
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graph import SignedDigraph
@@ -44,6 +46,7 @@ from ptcc_certify.sparse_definite import residual_definite
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+STRONG = NominalProtocol(T=1, rho1=1, rho2=50, kappa=2)
 
 
 def sliding(kappa: Fraction | int = 2) -> SlidingModeProtocol:
@@ -289,6 +292,32 @@ def test_no_mutant_is_accepted(name: str, slides: bool):
     stops, passed = judge(made(name, 5, slides), 37, SAMPLE.index((name, slides)), False)
     assert sum(stops.values()) > 50
     assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT, path)] == []
+
+
+#: Sets of starts may be smaller, bounds larger, limits others that leave no more.
+ABOUT_LIMITS = OF_ITS_OWN_RIGHT + r"|effort\.(starts|limited|disturbed)"
+
+
+def limited(name: str, ball: bool) -> Json:
+    """A certificate with a set of starts, limits of the gain and disturbances."""
+    graph = random_graph(np.random.default_rng(5), **{"weights": "decimals", **CLASSES[name]}).graph
+    n, half = graph.n_nodes, Fraction(1, 2)
+    axes = [[half * (i == j) + Fraction(1, 8) * (j == 0) for i in range(n)] for j in range(n)]
+    starts = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
+    step = Fraction(1, 10**7)
+    limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period=step)]
+    made = certify(graph, STRONG, starts=starts, limits=limits, delta="0.1", simulation=False)
+    assert made.effort is not None and len(made.effort.limited) == 3 and made.effort.disturbed is not None
+    return json.loads(made.to_json())
+
+
+@pytest.mark.parametrize(("name", "ball"), [("1.1", True), ("2.1 K>=2", False), ("2.2", True), ("3.1 mixed", False)])
+def test_no_mutant_about_limits_and_starts_is_accepted(name: str, ball: bool):
+    data = limited(name, ball)
+    accepted(data)
+    stops, passed = judge(data, 61, int(ball), False)
+    assert sum(stops.values()) > 30
+    assert [path for path in passed if not re.match(ABOUT_LIMITS, path)] == []
 
 
 @pytest.mark.campaign
