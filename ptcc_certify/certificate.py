@@ -522,9 +522,7 @@ ReachingTime(0, 1 before T_r)))
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
     instant = None if at is None else _instant(at, protocol)
     structure = analyse(graph)
-    region = starts if starts is None or isinstance(starts, Starts) else starts_within(structure, starts)
-    if region is not None and len(region.center) != graph.n_nodes:
-        raise ParameterError(f"the starts have {len(region.center)} entries for {graph.n_nodes} agents")
+    region = _starts(structure, starts)
     if sliding and (limits or delta is not None):
         raise ParameterError("limits and delta of certify are for the nominal protocol; the sliding mode has its own")
     spread = None if delta is None else parameter("delta", delta)
@@ -613,13 +611,38 @@ ReachingTime(0, 1 before T_r)))
 
 def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
     """Return limits of the gain, or refuse them."""
-    limits = Limits(entry.gain_cap, entry.stop_before, entry.sample_period)
-    if limits == Limits():
+    actuator = Actuator(entry.gain_cap, entry.stop_before, entry.sample_period)
+    if actuator.ideal:
         raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
-    for name, value in (("stop_before", limits.stop_before), ("sample_period", limits.sample_period)):
-        if value is not None and not value < protocol.T:
-            raise ParameterError(f"{name} = {float(value):.6g} is not below the deadline {float(protocol.T):.6g}")
+    limits = Limits(actuator.gain_cap, actuator.stop_before, actuator.sample_period)
+    T = protocol.T
+    if limits.stop_before is not None and limits.stop_before >= T:
+        raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
+    if limits.sample_period is not None and limits.sample_period > T:
+        raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
     return limits
+
+
+def _starts(structure: Structure, starts: Any) -> Starts | None:
+    """Return a set of starts, or refuse it."""
+    if starts is None:
+        return None
+    if not isinstance(starts, Starts):
+        return starts_within(structure, starts)
+    n = structure.graph.n_nodes
+    for name, vector in (("center", starts.center), ("radius", starts.radius or starts.center)):
+        if len(vector) != n:
+            raise ParameterError(f"{name} of the starts has {len(vector)} entries for {n} agents")
+    if any(len(axis) != n for axis in starts.axes):
+        raise ParameterError(f"an axis of the starts has another number of entries than {n} agents")
+    if starts.radius and starts.axes:
+        raise ParameterError("starts have a radius, for a box, or axes, for an ellipsoid; leave one out")
+    if any(r < 0 for r in starts.radius):
+        raise ParameterError("a radius of the starts is negative")
+    numbers = [x for vector in (starts.center, starts.radius, *starts.axes) for x in vector]
+    if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
+        raise ParameterError("the starts are beyond 1e300, or have too many digits to keep")
+    return starts
 
 
 def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:

@@ -35,7 +35,7 @@ from ptcc_certify.input_bounds import (
 )
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import as_fraction, nearest_float
+from ptcc_certify.rationals import as_fraction, nearest_float, writable
 from ptcc_certify.spectral_line import LARGEST, nonzero_spectrum_beyond
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import Obligation
@@ -46,7 +46,9 @@ if TYPE_CHECKING:
 #: Bits of the bounds that are written, and of the instants that witness them.
 KEPT_BITS, INSTANT_BITS = 40, 24
 #: Beyond this ``z = ln(T/(T - t))`` no bound is formed.
-LATEST = 50_000
+LATEST = 5_000
+#: Bounds below are raised to this, so that they can be written.
+LEAST = Fraction(1, 2**1200)
 #: By how much constants of full matrices are raised until they are proved.
 RAISES = (1e-9, 1e-6, 1e-3, 1.0)
 
@@ -376,7 +378,10 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
         sizes = np.abs(np.diag(inverse)) * (1 + raise_)
         if not np.isfinite(sizes).all():
             return None
-        c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
+        try:
+            c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
+        except OverflowError:
+            return None
         asked = []
         for v, i in place.items():
             p, q = (c[v] / scale).as_integer_ratio()
@@ -387,8 +392,17 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
 
 
 def _kept(x: Fraction) -> Fraction:
-    """Round up to the bits that are written."""
-    return rounded(x, KEPT_BITS, up=True)
+    """Round up to the bits that are written, and what is next to nothing to ``LEAST``.
+
+    Raises
+    ------
+    OverflowError
+        Too large to be written.
+    """
+    value = rounded(max(x, LEAST), KEPT_BITS, up=True) if x else x
+    if not writable(value):
+        raise OverflowError("a bound that is too large to be written")
+    return value
 
 
 def _usable(bounds: InputBounds, k: int) -> bool:
@@ -448,8 +462,11 @@ def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) 
     if norm is None or any(a is None for a in agents):
         return None
     how = tuple(a for a in agents if a is not None)
-    whole = _kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
-    return Peak(tuple(_kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
+    try:
+        whole = _kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
+        return Peak(tuple(_kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
+    except OverflowError:
+        return None
 
 
 def _limited(
@@ -472,14 +489,17 @@ def _limited(
         if growth is None or (rate := limited_rate(form.rate, growth, limits, gain)) <= 0:
             continue
         left = decay_above(rate / 2 * clock) * bounds.start(k)
-        norm = _kept(bounds.root_constant(k, None) * left)
-        if found is None or norm < found.norm:
-            known = distances[k] if k < len(distances) else None
-            agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
-            largest = None
-            if limits.sample_period is None:
-                largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
-            found = Limited(limits, clock, k, growth, norm, agents, largest)
+        try:
+            norm = _kept(bounds.root_constant(k, None) * left)
+            if found is None or norm < found.norm:
+                known = distances[k] if k < len(distances) else None
+                agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
+                largest = None
+                if limits.sample_period is None:
+                    largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
+                found = Limited(limits, clock, k, growth, norm, agents, largest)
+        except OverflowError:
+            continue
     return found
 
 
@@ -514,12 +534,12 @@ def _disturbed(
         T, sizes = bounds.gain.T, [Fraction(0)] * len(bounds.rows)
         for v in range(len(sizes)):
             sizes[v] = sum((abs(Fraction(x)) for x in influence.row(v).values()), Fraction(0))
-        drift = tuple(delta * T * x for x in sizes)
+        drift = tuple(_kept(delta * T * x) for x in sizes)
     found: Disturbed | None = None
     for k in members:
         try:
             inputs = tuple(map(_kept, bounds.disturbed(k, delta)))
-        except ValueError:
+        except (ValueError, OverflowError):
             continue
         if found is None or max(inputs) < max(found.inputs):
             found = Disturbed(delta, k, inputs, drift)

@@ -238,6 +238,7 @@ class EffortCheck(LyapunovCheck):
         step = self.open("limited-gain", of, ["growth"], witness=True)
         k = self._member(step["witness"])
         form = bounds.form(k)
+        need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
         rate = limited_rate(form.rate, step["growth"], limits, self.gain)
         need(rate > 0, "the period is too long for the certificate")
         if period is not None:
