@@ -116,6 +116,8 @@ class Certificate:
         Limits of the gain that are judged besides.
     delta : Fraction or None
         Nominal protocol: bound of the disturbances that are judged besides.
+    noise : Fraction or None
+        Nominal protocol: bound of the measurement noise that is judged under each of the limits.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
     """
@@ -142,6 +144,7 @@ class Certificate:
     starts: Starts | None
     limits: tuple[Limits, ...]
     delta: Fraction | None
+    noise: Fraction | None
     notes: tuple[str, ...]
 
     @property
@@ -264,6 +267,7 @@ class Certificate:
             distances=[None if m.distance is None else m.distance.agents for m in self.envelope.members],
             limits=self.limits,
             delta=self.delta,
+            noise=self.noise,
         )
 
     @cached_property
@@ -448,6 +452,7 @@ def certify(
     starts: Any = None,
     limits: Sequence[Actuator | Limits] = (),
     delta: Any = None,
+    noise: Any = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -477,6 +482,9 @@ def certify(
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
     delta : number, optional
         Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded.
+    noise : number, optional
+        Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
+        under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -523,8 +531,9 @@ ReachingTime(0, 1 before T_r)))
     instant = None if at is None else _instant(at, protocol)
     structure = analyse(graph)
     region = _starts(structure, starts)
-    if sliding and (limits or delta is not None):
-        raise ParameterError("limits and delta of certify are for the nominal protocol; the sliding mode has its own")
+    if sliding and (limits or delta is not None or noise is not None):
+        raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
+    blur = None if noise is None else parameter("noise", noise)
     spread = None if delta is None else parameter("delta", delta)
     judged = tuple(_limits(entry, protocol) for entry in limits)
     start = None if x0 is None else _start(structure, x0, "x0")
@@ -597,6 +606,7 @@ ReachingTime(0, 1 before T_r)))
         starts=region,
         limits=judged,
         delta=spread,
+        noise=blur,
         notes=tuple(notes),
     )
     if trajectory is not None and (certificate.envelope.members or sliding):

@@ -145,6 +145,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 )
 @_limit_options
 @click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
+@click.option("--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.")
 @click.option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
 @click.option(
@@ -182,7 +183,10 @@ def certify(
     more = _sliding_options(protocol, options, seed, signed)
     if kind == "nominal":
         actuator = _actuator(options)
-        more = {"limits": [] if actuator is None else [actuator], "delta": _number(options["delta"], "--delta")}
+        more = {"limits": [] if actuator is None else [actuator]}
+        more |= {name: _number(options[name], f"--{name}") for name in ("delta", "noise")}
+    elif options["noise"] is not None:
+        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
     with _progress(STEPS) as begin:
         certificate = run(
             signed,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -91,7 +91,8 @@ class SlidingPart:
 class Limited:
     """What is left at the deadline under limits of the gain: ``||E||``, and each agent's distance to its outcome.
 
-    ``largest`` bounds ``max_k |u_k|``; None if the input is held.
+    ``largest`` bounds ``max_k |u_k|``; None if the input is held. With measurement noise ``|n_k| <= noise``,
+    ``u = -gain L (X + n)``, ``noisy_norm`` bounds ``||E||`` at the deadline and ``noisy_largest`` every ``|u_k|``.
     """
 
     limits: Limits
@@ -101,6 +102,10 @@ class Limited:
     norm: Fraction
     agents: tuple[Fraction, ...] | None
     largest: Fraction | None
+    noise: Fraction | None = None
+    noise_member: int | None = None
+    noisy_norm: Fraction | None = None
+    noisy_largest: Fraction | None = None
 
 
 @dataclass(frozen=True)
@@ -176,7 +181,8 @@ class Effort:
             if bound is not None:
                 found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
         for k, entry in enumerate(self.limited):
-            found.append(Obligation("limited-gain", f"effort.limited[{k}]", {"growth": entry.growth}, entry.member))
+            witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
+            found.append(Obligation("limited-gain", f"effort.limited[{k}]", {"growth": entry.growth}, witness))
         if self.disturbed is not None:
             numbers = {"delta": self.disturbed.delta}
             found.append(Obligation("nominal-disturbed", "effort", numbers, self.disturbed.member))
@@ -257,6 +263,7 @@ def bound_effort(
     distances: Sequence[Sequence[Fraction] | None] = (),
     limits: Sequence[Limits] = (),
     delta: Fraction | None = None,
+    noise: Fraction | None = None,
 ) -> Effort:
     """Bound the input.
 
@@ -279,6 +286,8 @@ def bound_effort(
         Nominal protocol: limits of the gain to be judged.
     delta : Fraction, optional
         Nominal protocol: bound of the disturbances to be judged.
+    noise : Fraction, optional
+        Nominal protocol: bound of the measurement noise to be judged under each of the limits but sampling.
     """
     gain = _prescribed(protocol)
     still = not any(len(c.nodes) > 1 or not c.balanced for c in structure.closed_components) and not len(
@@ -312,7 +321,7 @@ def bound_effort(
     if own is not None:
         peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
     ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
-    entries = [_limited(bounds, usable, entry, distances, peak) for entry in limits]
+    entries = [_limited(bounds, usable, entry, distances, peak, noise) for entry in limits]
     return Effort(
         **effort,
         starts=starts,
@@ -475,6 +484,7 @@ def _limited(
     limits: Limits,
     distances: Sequence[Sequence[Fraction] | None],
     peak: Peak | None,
+    noise: Fraction | None,
 ) -> Limited | None:
     """Bound what is left at the deadline under limits of the gain; None if nothing is certified."""
     gain = bounds.gain
@@ -500,7 +510,23 @@ def _limited(
                 found = Limited(limits, clock, k, growth, norm, agents, largest)
         except OverflowError:
             continue
-    return found
+    if found is None or noise is None or limits.sample_period is not None:
+        return found
+    return _with_noise(bounds, members, found, top, noise)
+
+
+def _with_noise(bounds: InputBounds, members: Sequence[int], found: Limited, top: Fraction, noise: Fraction) -> Limited:
+    """Add the bounds under measurement noise, by the member that it moves least."""
+    result = found
+    for k in members:
+        try:
+            whole, each = bounds.noisy(k, noise)
+            norm, most = _kept(found.norm + whole), _kept((found.largest or 0) + top * max(each))
+        except (ValueError, OverflowError):
+            continue
+        if result.noisy_largest is None or most < result.noisy_largest:
+            result = replace(found, noise=noise, noise_member=k, noisy_norm=norm, noisy_largest=most)
+    return result
 
 
 def _longest_period(bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits]) -> Fraction | None:
@@ -654,6 +680,13 @@ def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[
                 "norm": text(entry.norm),
                 "agents": by_agent(entry.agents),
                 "largest": maybe(entry.largest),
+                "noise": None
+                if entry.noise is None
+                else {
+                    "bound": text(entry.noise),
+                    "norm": maybe(entry.noisy_norm),
+                    "largest": maybe(entry.noisy_largest),
+                },
             }
             for entry in effort.limited
         ],

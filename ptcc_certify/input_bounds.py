@@ -352,13 +352,17 @@ class InputBounds:
     @cached_property
     def _pushed_twice(self) -> list[Fraction]:
         """``|L^2| |sigma(0)|``, where sliding variables move."""
+        return self._squared(self.sigma0)
+
+    def _squared(self, sizes: Sequence[Fraction]) -> list[Fraction]:
+        """Return ``|L^2| sizes``."""
         pushed = []
         for row in self.rows:
             square: dict[int, Fraction] = {}
             for j, x in row.items():
                 for i, y in self.rows[j].items():
                     square[i] = square.get(i, Fraction(0)) + x * y
-            pushed.append(self._pushed(square))
+            pushed.append(sum((abs(x) * sizes[j] for j, x in square.items()), Fraction(0)))
         return pushed
 
     @cached_property
@@ -456,6 +460,27 @@ class InputBounds:
         pushed = root_above(form.largest_value([2 * self.rows[v].get(v, Fraction(0)) for v in form.nodes]))
         each = pushed * delta * (self.gain.rho1 * self.gain.T + self.gain.k) / (q - 1)
         return [root_above(c) * each for c in self.constant(k)]
+
+    def noisy(self, k: int, noise: Fraction) -> tuple[Fraction, list[Fraction]]:
+        """Bound what measurement noise ``|n_k| <= noise`` adds to ``||E||`` and to every ``|e_k - (L n)_k|``.
+
+        ``dE/ds = -L E + L^2 n``, so that ``sqrt(V)`` of what noise adds stays below ``2 w noise / rate``, ``w``
+        being the root of ``sum_ij |P_ij| q_i q_j``, ``q = |L^2| 1``.
+
+        Raises
+        ------
+        ValueError
+            Deviations.
+        """
+        form = self.form(k)
+        if form.coordinates != "E":
+            raise ValueError("deviations say nothing of noise")
+        every = [Fraction(1)] * len(self.rows)
+        twice = self._squared(every)
+        added = root_above(form.largest_value([twice[v] for v in form.nodes])) * noise * 2 / form.rate
+        own = (2 * row.get(v, Fraction(0)) * noise for v, row in enumerate(self.rows))
+        each = [root_above(c) * added + x for c, x in zip(self.constant(k), own, strict=True)]
+        return self.root_constant(k, None) * added, each
 
 
 def _largest_root(form: Form, rows: Sequence[Linear], starts: Starts) -> Fraction:

@@ -195,6 +195,11 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         agents = "" if entry.agents is None else f", every agent within {_up(max(entry.agents), 3)} of its outcome"
         largest = "" if entry.largest is None else f", |u_k| <= {_up(entry.largest, 4)}"
         lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {_up(entry.norm, 3)}{agents}{largest}"))
+        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
+            noise = f"noise |n_k| <= {float(entry.noise):.6g} leaves ||E|| <= {_up(entry.noisy_norm, 3)} at T"
+            lines.append(_line("", f"{noise}, |u_k| <= {_up(entry.noisy_largest, 4)}"))
+    if certificate.noise is not None and not any(entry.noise for entry in effort.limited):
+        lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
     if effort.longest_period is not None:
         lines.append(_line("limited", f"not certified with this period; up to {_down(effort.longest_period, 4)} it is"))
     elif len(effort.limited) < len(certificate.limits):

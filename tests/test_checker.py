@@ -306,8 +306,9 @@ def limited(name: str, ball: bool) -> Json:
     starts = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
     step = Fraction(1, 10**7)
     limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period=step)]
-    made = certify(graph, STRONG, starts=starts, limits=limits, delta="0.1", simulation=False)
+    made = certify(graph, STRONG, starts=starts, limits=limits, delta="0.1", noise="0.01", simulation=False)
     assert made.effort is not None and len(made.effort.limited) == 3 and made.effort.disturbed is not None
+    assert [entry.noise is None for entry in made.effort.limited] == [False, False, True]
     return json.loads(made.to_json())
 
 

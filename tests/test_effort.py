@@ -18,6 +18,7 @@ from scipy.linalg import expm
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.checker import check
+from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.effort import Effort, Limits, Starts, bound_effort, ellipsoid, starts_within, worst_start
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
@@ -26,6 +27,7 @@ from ptcc_certify.outcomes import outcome
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation import simulate
 from ptcc_certify.structure import analyse
+from ptcc_certify.summary import certificate_lines
 from ptcc_certify.trajectory import SlidingTrajectory
 
 F = Fraction
@@ -647,3 +649,34 @@ def test_every_example_has_its_effort(number: int):
         cert = certify(load_graph(name), example.protocol(), example.x0.split(","), sigma0=sigma0, simulation=False)
         assert cert.effort is not None and cert.verdict == "certified"
         assert cert.effort.bounded == (float(cert.protocol.gain.pole) * slowest(cert.graph) >= 1)
+
+
+# ---------------------------------------------------------------------- measurement noise
+
+
+@pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig3b", "fig5b"])
+@pytest.mark.parametrize("actuator", [Actuator(gain_cap=15), Actuator(stop_before="0.02")], ids=str)
+def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: Actuator):
+    graph, protocol, nu = load_graph(name), NominalProtocol(1, 1, 1, 2), 0.05
+    x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)
+    cert = certify(graph, protocol, [Fraction(x) for x in x0], limits=[actuator], noise="1/20", simulation=False)
+    assert cert.verdict == "certified" and cert.effort is not None
+    (entry,) = cert.effort.limited
+    assert entry.noisy_norm is not None and entry.noisy_largest is not None
+    L = graph.dense_laplacian()
+    for text in ("0.05*sin(40*t+k)", "0.05*sign(sin(7*t*k))", "0.05"):
+        run = simulate(graph, protocol, x0, actuator=actuator, noise=text, noise_bound="1/20", past=0, remaining=1e-6)
+        before = run.t < 1
+        agents = np.arange(graph.n_nodes)
+        n = as_disturbance(text, graph.n_nodes, "1/20", 1.0).values(run.t, agents, np.zeros(agents.size))
+        gain = actuator.limit(protocol.gain).value(run.t)
+        assert np.abs(n).max() <= nu + 1e-12
+        u = gain * (run.error - L @ n)
+        assert np.abs(u[:, before]).max() <= float(entry.noisy_largest) * (1 + 1e-9)
+        assert np.linalg.norm(run.error[:, before][:, -1]) <= float(entry.noisy_norm) * (1 + 1e-9)
+
+
+def test_noise_times_an_infinite_gain_is_not_certified():
+    cert = certify(load_graph("fig1a"), NominalProtocol(1, 1, 1, 2), [1] * 6, noise=1, simulation=False)
+    assert cert.effort is not None and cert.effort.limited == ()
+    assert any("noise      not certified" in line for line in certificate_lines(cert, "fig1a"))

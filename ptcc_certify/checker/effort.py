@@ -224,7 +224,7 @@ class EffortCheck(LyapunovCheck):
     def _limited(self, said: Any, of: str, peak: Any, bounds: InputBounds) -> None:
         """Verify what is left at the deadline under limits of the gain, and the largest input."""
         self.at = of
-        keys = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest")
+        keys = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
         fields(said, keys, of)
         need(not self.is_sliding, "limits are for the nominal protocol")
         cap, stop, period = (None if said[key] is None else exact(said[key]) for key in keys[:3])
@@ -236,7 +236,9 @@ class EffortCheck(LyapunovCheck):
         if top is None:
             raise RejectedError("nothing limits the gain")
         step = self.open("limited-gain", of, ["growth"], witness=True)
-        k = self._member(step["witness"])
+        noisy = said["noise"] is not None
+        chosen = entries(step["witness"], "the witness", 2) if noisy else [step["witness"]]
+        k = self._member(chosen[0])
         form = bounds.form(k)
         need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
         rate = limited_rate(form.rate, step["growth"], limits, self.gain)
@@ -257,6 +259,14 @@ class EffortCheck(LyapunovCheck):
         if said["largest"] is not None:
             ends = [top * max(bounds.held)] + ([exact(peak["largest"])] if peak is not None else [])
             need(exact(said["largest"]) >= min(ends), "the largest input is not proved")
+        if noisy:
+            need(period is None, "noise of a held gain")
+            noise = {key: exact(x) for key, x in fields(said["noise"], ("bound", "norm", "largest"), "noise").items()}
+            need(noise["bound"] > 0, "noise of no size")
+            whole, each = bounds.noisy(self._member(chosen[1]), noise["bound"])
+            need(noise["norm"] >= bounds.root_constant(k, None) * left + whole, "what is left by noise is not proved")
+            largest = exact(said["largest"]) + top * max(each)
+            need(noise["largest"] >= largest, "the largest input under noise is not proved")
         self.done(f"||E|| at most {shown(exact(said['norm']))} at the deadline")
 
     def _growth(self, form: Form, growth: Fraction) -> None:
