@@ -176,6 +176,8 @@ def certify(
 
     expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
     bound, most = _number(initial_bound, "--initial-bound"), _number(max_input, "--max-input")
+    if most is not None and most <= 0:
+        raise ParameterError("--max-input is outside its domain; it must be > 0")
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
@@ -616,16 +618,25 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
 
 
 def _input_code(certificate: Certificate, most: Fraction | None) -> int:
-    """Return the exit code of --max-input."""
+    """Return the exit code of --max-input; with limits of the gain, of the input under these."""
     effort = certificate.effort
     if most is None or certificate.constant:
         return OK
-    if effort is not None and effort.peak is not None and effort.peak.largest <= most:
+    if effort is not None and certificate.limits:
+        proved = [entry.largest for entry in effort.limited]
+        if len(proved) == len(certificate.limits) and all(x is not None and x <= most for x in proved):
+            return OK
+    elif effort is not None and effort.peak is not None and effort.peak.largest <= most:
         return OK
-    if effort is not None and effort.first is not None and effort.first > most:
-        click.echo(f"refuted: the input is up to {float(effort.first):.6g} at the start (proved)", err=True)
-        return REFUTED_EXPECTATION
-    if effort is not None and effort.bounded is False and effort.starts is not None:
+    if effort is not None and effort.first is not None:
+        p = certificate.protocol
+        gain = p.rho1 + p.rho2 * p.kappa / p.T
+        caps = [limits.gain_cap for limits in certificate.limits if limits.gain_cap is not None]
+        first = effort.first * min([Fraction(1), *(cap / gain for cap in caps)])
+        if first > most:
+            click.echo(f"refuted: the input is up to {float(first):.6g} at the start (proved)", err=True)
+            return REFUTED_EXPECTATION
+    if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
         click.echo("refuted: from some of these starts the input grows without limit (proved)", err=True)
         return REFUTED_EXPECTATION
     click.echo("undecided: no such peak is proved, and none is excluded", err=True)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,12 +36,9 @@ from ptcc_certify.input_bounds import (
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction, nearest_float, writable
-from ptcc_certify.spectral_line import LARGEST, nonzero_spectrum_beyond
+from ptcc_certify.spectral_line import LARGEST, nonzero_spectrum_beyond, tractable
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import Obligation
-
-if TYPE_CHECKING:
-    pass
 
 #: Bits of the bounds that are written, and of the instants that witness them.
 KEPT_BITS, INSTANT_BITS = 40, 24
@@ -225,6 +222,8 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     >>> box([0, 1], [2, 1])
     Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
     """
+    if len(low) != len(high):
+        raise ParameterError(f"a box of {len(low)} lower and {len(high)} upper ends; give one of each for every agent")
     ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
     if any(a > b for a, b in ends):
         raise ParameterError("a box whose lower end exceeds its upper end")
@@ -353,6 +352,8 @@ def _bounded(
         return None, None
     unit = math.lcm(*{graph.exact_weight(i).denominator for i in range(graph.n_edges)})
     rows = [{j: int(x * unit) for j, x in row.items()} for row in graph.exact_rows(range(graph.n_nodes))]
+    if not tractable(rows, unit):
+        return None, None
     labels = structure.strong_component
     components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
     balanced = [sorted(c.nodes) for c in structure.closed_components if c.balanced]
@@ -543,12 +544,16 @@ def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
     if form.coordinates != "E":
         return None
     A = np.array([[float(bounds.rows[v].get(w, 0)) for w in form.nodes] for v in form.nodes])
-    if form.diagonal is not None:
-        R = np.diag(np.sqrt([float(w) for w in form.diagonal]))
-    else:
-        R = np.linalg.cholesky(np.array([[float(x) for x in row] for row in form.matrix or ()])).T
-    size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2)) ** 2
-    return _kept(Fraction(size * (1 + 1e-9))) if math.isfinite(size) else None
+    try:
+        with np.errstate(all="ignore"):
+            if form.diagonal is not None:
+                R = np.diag(np.sqrt([float(w) for w in form.diagonal]))
+            else:
+                R = np.linalg.cholesky(np.array([[float(x) for x in row] for row in form.matrix or ()])).T
+            size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2))
+    except (np.linalg.LinAlgError, OverflowError):
+        return None
+    return _kept(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
 
 
 def _disturbed(

@@ -38,6 +38,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -205,15 +206,19 @@ class Design:
         if self.limits is not None and self.limits.gain_cap is not None:
             found.append(("", f"gain capped at {_short(self.limits.gain_cap)}, which acts from 0 on"))
         if self.peak is not None:
-            found.append(("peak input", f"{_short(self.peak)} at most"))
+            found.append(("peak input", f"{_short(self.peak, ROUND_CEILING)} at most"))
         if self.residual is not None:
-            left = f"{_short(self.residual)} at most" if self.residual else "none, every agent is at its outcome"
+            left = (
+                f"{_short(self.residual, ROUND_CEILING)} at most"
+                if self.residual
+                else "none, every agent is at its outcome"
+            )
             found.append(("left at the deadline", left))
         if self.shortest_certified is not None:
             found.append(("shortest deadline", f"{_short(self.shortest_certified)} certified"))
         if self.shortest_possible is not None:
             times = "" if self.ratio is None else f", {self.ratio:.3g} times shorter"
-            found.append(("", f"{_short(self.shortest_possible)} at least, whatever the gains{times}"))
+            found.append(("", f"{_short(self.shortest_possible, ROUND_FLOOR)} at least, whatever the gains{times}"))
         width = max(len(name) for name, _ in found)
         return [f"{name:<{width}}  {text}" for name, text in found]
 
@@ -616,7 +621,8 @@ def _missed(asked: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
     U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
     if T is not None and shortest is not None and shortest > T:
-        text = f"no gains meet a deadline below {_short(shortest)}, {_short(shortest / T)} times the one asked for"
+        least = _short(shortest, ROUND_FLOOR)
+        text = f"no gains meet a deadline below {least}, {_short(shortest / T)} times the one asked for"
         return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
     if asked.peak is None or asked.product is None:
         return asked
@@ -650,8 +656,10 @@ def _decimal(x: Fraction, up: bool = False) -> Fraction:
     return Fraction(math.ceil(scaled) if up else round(scaled)) / unit
 
 
-def _short(x: Fraction) -> str:
-    return f"{nearest_float(x):.6g}"
+def _short(x: Fraction, rounding: str = ROUND_HALF_EVEN) -> str:
+    """Write a nonnegative rational with six digits."""
+    value = Context(prec=6, rounding=rounding).divide(Decimal(x.numerator), Decimal(x.denominator))
+    return f"{float(value):.6g}" if not x or 1e-300 < value < Decimal("1e300") else f"{value.normalize():g}"
 
 
 def _percent(part: Fraction, whole: Fraction) -> str:

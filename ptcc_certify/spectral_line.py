@@ -17,6 +17,8 @@ from typing import Literal, NamedTuple
 
 #: Largest number of nodes for which the decision is meant to be asked; it takes seconds there.
 LARGEST = 120
+#: Largest product of N^3 and the bits of an entry of ``rows`` for which it takes seconds.
+MOST_WORK = 300_000_000
 #: Bits with which the array of Routh is enclosed, one after the other, before it is formed exactly.
 BITS = (512, 2048, 8192)
 
@@ -32,6 +34,18 @@ class OnLine(NamedTuple):
 
     zeros: int
     pairs: Polynomial  #: coefficients of ``G``, with its multiple roots
+
+
+def tractable(rows: Matrix, unit: int) -> bool:
+    """Tell whether :func:`nonzero_spectrum_beyond` takes some seconds at most.
+
+    Examples
+    --------
+    >>> tractable([{0: 1, 1: -1}, {}], 1), tractable([{0: 1}] * 121, 1)
+    (True, False)
+    """
+    longest = max((abs(x).bit_length() for row in rows for x in row.values()), default=0)
+    return len(rows) <= LARGEST and len(rows) ** 3 * max(longest, unit.bit_length()) <= MOST_WORK
 
 
 def nonzero_spectrum_beyond(

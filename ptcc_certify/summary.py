@@ -183,7 +183,8 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         whom = "" if effort.starts is None else " for all these starts"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         lines.append(_line("effort", ", ".join(sizes) + whom + part))
-    if sizes and (worst := certificate.worst_start) is not None:
+    worst = None if effort.peak is None or certificate.limits else certificate.worst_start
+    if worst is not None and math.isfinite(worst.size):
         labels = certificate.graph.labels
         where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
         lines.append(_line("", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"))
@@ -396,11 +397,13 @@ def _rounded(x: Fraction | float, digits: int, rounding: str) -> str:
     """Write a positive number that was proved with few digits, rounded to the safe side."""
     if isinstance(x, float) and not math.isfinite(x):
         return "infinity"
-    if x == 0:  # an exponential that left float64
-        return "1e-300"
+    if x == 0:  # a float is an exponential that left float64
+        return "0" if isinstance(x, Fraction) else "1e-300"
     exact = Fraction(x)
     context = Context(prec=digits, rounding=rounding)
-    return f"{float(context.divide(Decimal(exact.numerator), Decimal(exact.denominator))):.{digits}g}"
+    value = context.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+    beyond = not 1e-300 < abs(value) < Decimal("1e300")
+    return f"{value.normalize():g}" if beyond else f"{float(value):.{digits}g}"
 
 
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:

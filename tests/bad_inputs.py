@@ -305,6 +305,7 @@ INPUT = [
     _input("initial-bound of 0", "bound of starts", "--initial-bound", "0"),
     _input("initial-bound of words", "--initial-bound", "--initial-bound", "far"),
     _input("max-input of words", "--max-input", "--max-input", "1 V"),
+    _input("max-input of 0", "--max-input", "--max-input", "0"),
     _input("gain-cap below 0", "gain_cap", "--gain-cap", "-3"),
     _input("gain-cap that is no number", "--gain-cap", "--gain-cap", "nan"),
     _input("stop-before beyond the deadline", "stop_before", "--stop-before", "2"),

@@ -321,6 +321,23 @@ def test_no_mutant_about_limits_and_starts_is_accepted(name: str, ball: bool):
     assert [path for path in passed if not re.match(ABOUT_LIMITS, path)] == []
 
 
+def test_numbers_about_the_input_that_cost_too_much_are_refused():
+    data = limited("1.1", False)
+    primes = [p for p in range(10**6, 10**6 + 4000) if all(p % d for d in range(2, 1001))]
+    rows = [f"1/{p**600}" for p in primes]
+    starts = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
+    many = changed(data, ("effort", "starts", "center"), starts)
+    began = time.perf_counter()
+    report = check(resealed(many), stdlib=True)
+    assert not report.accepted and "denominator" in (report.reason or "")
+    assert time.perf_counter() - began < 20
+    aside = changed(data, ("effort", "starts", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(starts)})
+    assert "side file" in (check(resealed(aside), stdlib=True).reason or "")
+    grown = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "limited-gain")
+    odd = changed(data, ("proof", grown, "numbers", "growth"), "1")
+    assert "growth" in (check(resealed(odd), stdlib=True).reason or "")
+
+
 @pytest.mark.campaign
 def test_no_mutant_is_accepted_of_many_certificates():
     total, stops, forged, count, odd = 0, Counter[str](), Counter[str](), 0, list[str]()

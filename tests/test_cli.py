@@ -632,6 +632,16 @@ def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
     assert run.code == code and says in run.err
 
 
+def test_max_input_under_a_limit_is_about_what_the_limit_leaves(folder: Path):
+    Path("pair.csv").write_text("a,b,1\nb,a,-1\n")
+    words = ("certify", "pair.csv", "--initial-bound", "1", "--no-simulation")
+    assert ptcc(*words, "--gain-cap", "1", "--max-input", "3").code == 0
+    weak = ptcc(*words, "--gain-cap", "20", "--rho2", "0.1", "--kappa", "1", "--max-input", "50")
+    assert weak.code == 0 and "NOT BOUNDED" in weak.out
+    assert ptcc(*words, "--gain-cap", "2", "--max-input", "3").code == 3
+    assert ptcc(*words, "--gain-cap", "1", "--sample-period", "0.01", "--max-input", "3").code == 4
+
+
 def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
     run = ptcc(*words)

@@ -8,6 +8,7 @@ from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short, shown
+from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import (
     Form,
     InputBounds,
@@ -21,7 +22,7 @@ from ptcc_certify.input_bounds import (
     peak_above,
     root_above,
 )
-from ptcc_certify.spectral_line import LARGEST, nonzero_spectrum_beyond
+from ptcc_certify.spectral_line import nonzero_spectrum_beyond, tractable
 
 KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
 #: Graphs up to this size have bounds of the input.
@@ -58,6 +59,7 @@ class EffortCheck(LyapunovCheck):
 
     def _bounds(self, starts: Starts, constants: list[list[Fraction] | None]) -> InputBounds:
         """Return what bounds the input over the starts."""
+        integers([starts.center, starts.radius, *starts.axes])  # refused where they have no moderate denominator
         rows = [{j: Fraction(x, self.digraph.unit) for j, x in self.digraph.row(v).items()} for v in range(self.n)]
         if not self.is_sliding:
             return InputBounds(rows, self.gain, self.forms, constants, starts)
@@ -111,13 +113,15 @@ class EffortCheck(LyapunovCheck):
             below = limit is not None and exact(limit) * k <= 2
             need(not said["bounded"] and below, "no limit of rates proves that the input grows")
         else:
-            need(by == "spectrum" and self.n <= LARGEST, "another proof, or too large a graph")
+            need(by == "spectrum", "another proof")
             place = self._spectrum(1 / k)
             need(said["bounded"] == (place in ("beyond", "on")), f"the spectrum is {place} the line")
         self.done("the input stays bounded" if said["bounded"] else "the input of some start grows without limit")
 
     def _spectrum(self, line: Fraction) -> str:
         """Return where the nonzero eigenvalues of ``L`` lie, exactly."""
+        rows = [dict(self.digraph.row(v)) for v in range(min(self.n, INPUT_NODES))]
+        need(self.n <= INPUT_NODES and tractable(rows, self.digraph.unit), "too large a graph, or too long numbers")
         components, seen = [], [False] * self.n
         for v in range(self.n):
             if not seen[v]:
@@ -127,10 +131,14 @@ class EffortCheck(LyapunovCheck):
                     seen[w] = True
         balanced = [group for group, gauge in zip(self.closed, self.gauges, strict=True) if gauge is not None]
         still = {k for k, nodes in enumerate(components) if nodes in balanced}
-        rows = [dict(self.digraph.row(v)) for v in range(self.n)]
         return nonzero_spectrum_beyond(rows, self.digraph.unit, components, still, line)
 
     # ------------------------------------------------------------------ starts and constants
+
+    def _each(self, said: Any, what: str) -> Numbers:
+        """Read numbers by agent, which are in no side file here."""
+        need(not beside(said), f"{what} in a side file")
+        return self._by_agent(said, what)
 
     def _starts(self, said: Any) -> Starts | None:
         """Read the set of starts; None if there is none, or the graph is too large."""
@@ -141,10 +149,12 @@ class EffortCheck(LyapunovCheck):
         need(self.n <= INPUT_NODES and bool(self.moving), "starts of too large a graph, or of one that does not move")
         shape = "axes" if isinstance(said, dict) and "axes" in said else "radius"
         fields(said, ("center", shape), "starts")
-        center = list(self._by_agent(said["center"], "center"))
+        center = list(self._each(said["center"], "center"))
         if shape == "axes":
-            return Starts(center, axes=[list(self._by_agent(x, "an axis")) for x in entries(said["axes"], "axes")])
-        radius = list(self._by_agent(said["radius"], "radius"))
+            axes = entries(said["axes"], "axes")
+            need(len(axes) <= INPUT_NODES, "too many axes")
+            return Starts(center, axes=[list(self._each(x, "an axis")) for x in axes])
+        radius = list(self._each(said["radius"], "radius"))
         need(all(r >= 0 for r in radius), "a radius is negative")
         return Starts(center, radius)
 
@@ -159,7 +169,7 @@ class EffortCheck(LyapunovCheck):
             if form is None or form.matrix is None:
                 raise RejectedError("constants that follow from a diagonal")
             self.open("input-constants", f"lyapunov.members[{k}]")
-            found.append(list(self._by_agent(given, "constants")))
+            found.append(list(self._each(given, "constants")))
             P, scale = integers(form.matrix)
             place, forms = {v: i for i, v in enumerate(form.nodes)}, []
             for v, c in enumerate(found[-1] or []):
@@ -185,7 +195,7 @@ class EffortCheck(LyapunovCheck):
         witness = fields(step["witness"], ("agents", "norm"), "the witness")
         need(list(fields(witness["agents"], self.labels, "agents")) == self.labels, "agents are in another order")
         own = self._own() if self.is_sliding else [Fraction(0)] * self.n
-        claimed = self._by_agent(said["agents"], "agents")
+        claimed = self._each(said["agents"], "agents")
         for v, how in enumerate(witness["agents"].values()):
             k, z = entries(how, "an agent", 2)
             least = bounds.bound(peak_above, v, self._member(k), exact(z)) + own[v]
@@ -215,7 +225,7 @@ class EffortCheck(LyapunovCheck):
         need(said["bounded"] is bounded, "bounded for every start iff mu3 kappa >= 1")
         if said["agents"] is not None:
             self.open("input-sliding", "effort")
-            for label, x, own in zip(self.labels, self._by_agent(said["agents"], "agents"), self._own(), strict=True):
+            for label, x, own in zip(self.labels, self._each(said["agents"], "agents"), self._own(), strict=True):
                 need(x >= own, f"the sliding part of agent {short(label)} is not proved")
             self.done("for every disturbance within delta")
 
@@ -252,8 +262,8 @@ class EffortCheck(LyapunovCheck):
         if said["agents"] is not None:
             distance = self.data["lyapunov"]["members"][k]["distance"]
             need(distance is not None, "distances without constants")
-            roots = map(root_above, self._by_agent(distance["agents"], "agents"))
-            for label, x, root in zip(self.labels, self._by_agent(said["agents"], "agents"), roots, strict=True):
+            roots = map(root_above, self._each(distance["agents"], "agents"))
+            for label, x, root in zip(self.labels, self._each(said["agents"], "agents"), roots, strict=True):
                 need(x >= root * left, f"what is left of agent {short(label)} is not proved")
         need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
         if said["largest"] is not None:
@@ -307,10 +317,10 @@ class EffortCheck(LyapunovCheck):
         delta = exact(said["delta"])
         need(delta == step["delta"] and delta > 0, "another delta")
         inputs = bounds.disturbed(self._member(step["witness"]), delta)
-        for label, x, least in zip(self.labels, self._by_agent(said["inputs"], "inputs"), inputs, strict=True):
+        for label, x, least in zip(self.labels, self._each(said["inputs"], "inputs"), inputs, strict=True):
             need(x >= least, f"the input of agent {short(label)} is not proved")
         if said["drift"] is not None:
-            drift = self._by_agent(said["drift"], "drift")
+            drift = self._each(said["drift"], "drift")
             for label, x, row in zip(self.labels, drift, self.projection(), strict=True):
                 moved = delta * self.gain.T * sum(map(abs, row.values()), Fraction(0))
                 need(x >= moved, f"the drift of agent {short(label)} is not proved")
