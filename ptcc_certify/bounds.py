@@ -356,8 +356,11 @@ class Envelope:
         Raises
         ------
         ParameterError
-            The run is of another graph or protocol, or has no sample before the deadline.
+            The run is of another graph or protocol, disturbed or held over periods under the nominal protocol, or has
+            no sample before the deadline.
         """
+        if trajectory.forcing is not None or trajectory.held_input is not None:
+            raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
         if trajectory.graph != self.structure.graph or trajectory.protocol.gain != self.gain:
             raise ParameterError("the run is of another graph or protocol than the envelope")
         if not np.isfinite(trajectory.clock[0]):

@@ -680,3 +680,13 @@ def test_noise_times_an_infinite_gain_is_not_certified():
     cert = certify(load_graph("fig1a"), NominalProtocol(1, 1, 1, 2), [1] * 6, noise=1, simulation=False)
     assert cert.effort is not None and cert.effort.limited == ()
     assert any("noise      not certified" in line for line in certificate_lines(cert, "fig1a"))
+
+
+def test_an_envelope_is_compared_with_runs_it_speaks_of_only():
+    graph, protocol = load_graph("fig1a"), NominalProtocol(1, 1, 1, 2)
+    cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False)
+    capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=Actuator(gain_cap=9))
+    assert not cert.envelope.compare(capped).violated
+    for more in ({"actuator": Actuator(sample_period="0.01")}, {"disturbance": "t", "delta": 2}):
+        with pytest.raises(ParameterError, match="undisturbed"):
+            cert.envelope.compare(simulate(graph, protocol, [1, 2, 3, 4, 5, 6], **more))
