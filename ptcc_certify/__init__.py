@@ -88,6 +88,10 @@ _EXPORTS = {
     "plot_run": "plots",
     "plot_sliding": "plots",
     "plot_trade_off": "plots",
+    "plot_input": "plots",
+    "plot_graph": "plots",
+    "plot_spectrum": "plots",
+    "plot_frontier": "plots",
 }
 __all__ = sorted(_EXPORTS)
 

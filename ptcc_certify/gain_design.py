@@ -320,7 +320,7 @@ def design(
     >>> from ptcc_certify.graph import SignedDigraph
     >>> trio = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     >>> design(trio, max_input=20, initial_bound=3, deadline=1)
-    Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18858, 1.18858 times the \
+    Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18857, 1.18857 times the \
 one asked for)
     >>> found = design(trio, max_input=20, initial_bound=3, deadline="2.5")
     >>> found.verdict, bool(found.peak <= 20), found.certificate.verdict
@@ -621,8 +621,8 @@ def _missed(asked: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
     U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
     if T is not None and shortest is not None and shortest > T:
-        least = _short(shortest, ROUND_FLOOR)
-        text = f"no gains meet a deadline below {least}, {_short(shortest / T)} times the one asked for"
+        least, times = (_short(x, ROUND_FLOOR) for x in (shortest, shortest / T))
+        text = f"no gains meet a deadline below {least}, {times} times the one asked for"
         return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
     if asked.peak is None or asked.product is None:
         return asked

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptcc_certify.bounds import FLOOR_FACTOR
+from ptcc_certify.lemmas import laplacian_spectrum
+from ptcc_certify.rationals import shorten
 from ptcc_certify.sharpen import Sharpening
 from ptcc_certify.structure import Structure
 from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
     from ptcc_certify.certificate import Certificate
     from ptcc_certify.gain_design import Design
+    from ptcc_certify.graph import SignedDigraph
+    from ptcc_certify.protocols import Protocol
     from ptcc_certify.reaching import ReachingTime
 
 #: Colour-blind safe (Okabe and Ito): first camp, second camp, unbalanced leaders, followers.
@@ -29,6 +33,19 @@ CAMP_COLOURS = {
     "unbalanced leaders": "#CC79A7",
     "followers": "#7F7F7F",
 }
+#: Colour and line of an edge from an ally (+1) or an opponent (-1).
+EDGE_STYLES = {1: ("#4477AA", "-", "ally"), -1: ("#AA3344", "--", "opponent")}
+#: Colour and marker of the classes of certificates.
+CLASS_MARKERS = {
+    "paper": ("#000000", "s"),
+    "perron": ("#009E73", "^"),
+    "lmi": ("#0072B2", "o"),
+    "full": ("#D55E00", "D"),
+}
+#: Largest graph that is drawn, whose nodes are labelled, and whose layout is that of Kamada and Kawai.
+DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
+#: Decades of the input that are drawn below its size at the start; changes of sign go further down.
+INPUT_DECADES = 3
 
 
 def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | None = None) -> Axes:
@@ -47,26 +64,7 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
     Axes
     """
     ax = _axes(ax)
-    group = np.full(structure.graph.n_nodes, "followers", dtype=object)
-    for component in structure.closed_components:
-        for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
-            group[v] = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
-    seen: set[str] = set()
-    for node in np.argsort(group == "followers", kind="stable"):
-        name = str(group[node])
-        ax.plot(
-            trajectory.t,
-            trajectory.states[node],
-            color=CAMP_COLOURS[name],
-            linewidth=0.9 if name == "followers" else 1.6,
-            linestyle="--" if name == "followers" else "-",
-            label=None if name in seen else name,
-        )
-        seen.add(name)
-    if trajectory.protocol.prescribed:
-        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
-    if isinstance(trajectory, SlidingTrajectory):
-        ax.axvline(float(trajectory.protocol.T_r), color="#7F7F7F", linewidth=0.8, linestyle="-.", label="$T_r$")
+    _draw_agents(trajectory, trajectory.states, structure, ax)
     ax.set_xlabel("time $t$")
     ax.set_ylabel("state $x_k$")
     _legend_above(ax)
@@ -210,6 +208,252 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def plot_input(
+    trajectory: Trajectory, structure: Structure, certificate: Certificate | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same start proves.
+
+    The axis of the input is logarithmic, from three decades below its size at the start. Behind an actuator it is the
+    input that acts. No peak is drawn where none holds: for sampled inputs, and for runs with disturbance or noise of
+    the nominal protocol or with a boundary layer. Under caps and stops that ``certificate`` judges, theirs is drawn.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of one start.
+    structure : Structure
+        Of the same graph.
+    certificate : Certificate, optional
+        Of the same graph, protocol and start. One of a set of starts adds nothing.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        The trajectory holds several starts, or the certificate is of another graph, protocol or start.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> ax = plot_input(run, analyse(pair))
+    >>> len(ax.lines), ax.get_ylabel()
+    (3, 'input $|u_k|$')
+    """
+    if trajectory.states.ndim != 2:
+        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
+    peak = None if certificate is None else _certified_peak(trajectory, certificate)
+    ax, size = _axes(ax), np.abs(trajectory.input)
+    top = max(float(size.max(initial=0)), peak or 0.0)
+    if top > 0:
+        ax.set_yscale("log", nonpositive="clip")
+        ax.set_ylim((float(size[:, 0].max()) or top) * 10.0**-INPUT_DECADES, top * 2)
+    held = trajectory.held_input is not None
+    _draw_agents(trajectory, size, structure, ax, drawstyle="steps-post" if held else "default")
+    if peak is not None:
+        ax.axhline(peak, color="black", linewidth=0.9, linestyle="--", label="certified peak")
+    ax.set_xlabel("time $t$")
+    ax.set_ylabel("input $|u_k|$")
+    _legend_above(ax)
+    return ax
+
+
+def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
+    """Draw the signed digraph: arrows in the direction of information, solid from allies, dashed from opponents.
+
+    Nodes have the colours of their camps; leaders are larger and outlined. Up to 40 nodes are labelled. The layout is
+    the same in every run.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of up to 300 nodes.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        The graph has more than 300 nodes.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, analyse
+    >>> ax = plot_graph(analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])))
+    >>> len(ax.patches), [text.get_text() for text in ax.texts]
+    (3, ['a', 'b', 'c'])
+    """
+    from matplotlib.patches import FancyArrowPatch
+
+    graph = structure.graph
+    n = graph.n_nodes
+    if n > DRAWN_NODES:
+        raise ValueError(f"graphs are drawn up to {DRAWN_NODES} nodes; this one has {n}")
+    ax, place, group = _axes(ax, (6, 5)), _layout(graph), _camp_groups(structure)
+    leads = group != "followers"
+    area = np.where(leads, 1.7, 1.0) * min(max(6000 / n, 20), 170)  # points squared, as scatter takes them
+    for name, colour in CAMP_COLOURS.items():
+        own = group == name
+        if own.any():
+            edge, width = (colour, 0.5) if name == "followers" else ("black", 1.1)
+            x, y = place[own].T
+            ax.scatter(x, y, area[own], colour, edgecolors=edge, linewidths=width, zorder=2)
+            ax.plot([], [], "o", color=colour, markeredgecolor=edge, markersize=6, label=name)
+    radius, width, head = np.sqrt(area) / 2, 1.1 if n <= LABELLED_NODES else 0.6, 9 if n <= LABELLED_NODES else 5
+    for source, target, sign in zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), strict=True):
+        colour, line, _ = EDGE_STYLES[sign]
+        ax.add_artist(
+            FancyArrowPatch(
+                place[source],
+                place[target],
+                arrowstyle="-|>",
+                mutation_scale=head,
+                shrinkA=radius[source],
+                shrinkB=radius[target],
+                connectionstyle="arc3,rad=0.1",  # keeps the two directions apart
+                color=colour,
+                linestyle=line,
+                linewidth=width,
+                zorder=1,
+            )
+        )
+    for sign, (colour, line, name) in EDGE_STYLES.items():
+        if (graph.sign == sign).any():
+            ax.plot([], [], color=colour, linestyle=line, linewidth=width, label=name)
+    if n <= LABELLED_NODES:
+        inside = max(map(len, graph.labels)) <= 3
+        for v, label in enumerate(graph.labels):
+            ax.annotate(
+                shorten(label, 12),
+                place[v],
+                (0, 0) if inside else (0, radius[v] + 2),
+                textcoords="offset points",
+                ha="center",
+                va="center_baseline" if inside else "bottom",
+                color="white" if inside else "black",
+                fontsize=8,
+                parse_math=False,
+            )
+    ax.set_aspect("equal")
+    ax.margins(0.12)
+    ax.set_axis_off()
+    _legend_above(ax)
+    return ax
+
+
+def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the eigenvalues of ``L`` (numerical), and the line from which on the input stays bounded.
+
+    The zeros of balanced closed components are marked apart. From every start the input (its nominal part, under the
+    sliding-mode protocol) is bounded up to the deadline if all other eigenvalues lie right of ``1/(rho2 kappa)``; one
+    to its left leaves it unbounded. One unit is as long in both directions.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of strong components above 500 nodes only the eigenvalues nearest to 0 are computed.
+    protocol : NominalProtocol or SlidingModeProtocol, optional
+        Whose line is drawn; there is none with ``rho2 = 0``.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The eigenvalues were not found.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, analyse
+    >>> ax = plot_spectrum(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])))
+    >>> [(line.get_label(), line.get_xdata().round(6).tolist()) for line in ax.lines]
+    [('nonzero eigenvalues', [2.0, 4.0]), ('zero eigenvalues', [0.0])]
+    """
+    ax, spectrum = _axes(ax), laplacian_spectrum(structure)
+    if spectrum.nonzero.size:
+        values = spectrum.nonzero
+        ax.plot(values.real, values.imag, "o", color="#0072B2", markersize=5, alpha=0.7, label="nonzero eigenvalues")
+    if spectrum.kernel_dimension:
+        many = "" if spectrum.kernel_dimension == 1 else f" ({spectrum.kernel_dimension})"
+        ax.plot([0.0], [0.0], "x", color="#7F7F7F", markersize=7, label=f"zero eigenvalues{many}")
+    if protocol is not None and protocol.prescribed:
+        least = float(1 / (protocol.rho2 * protocol.kappa))
+        name = r"$1/(\rho_2 \kappa)$: input bounded to the right"
+        ax.axvline(least, color="#D55E00", linewidth=0.9, linestyle="--", label=name)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    ax.set_xlabel("real part of eigenvalue")
+    ax.set_ylabel("imaginary part of eigenvalue")
+    _legend_above(ax)
+    return ax
+
+
+def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
+    """Draw rate against prefactor of all proved Lyapunov functions by class, and what no rate exceeds.
+
+    A function of rate ``b`` and prefactor ``c`` proves ``||z(t)||^2 <= c e^(-b s) ||z(0)||^2``, ``z`` being ``E``, or
+    the ``eps`` of Theorem 1.1 for the paper's own. The axis of the prefactor is logarithmic.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        With a proved Lyapunov function.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        There is nothing to draw.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> ax = plot_frontier(certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)))
+    >>> [line.get_label() for line in ax.lines]
+    ['paper', 'perron', 'no rate exceeds (proved)', 'spectral rate (numerical)']
+    """
+    members = certificate.envelope.members
+    if not members:
+        raise ValueError("the certificate holds no proved Lyapunov function")
+    ax = _axes(ax)
+    ax.set_xscale("log")
+    for kind, (colour, marker) in CLASS_MARKERS.items():
+        own = [m for m in members if m.kind == kind]
+        if own:
+            points = [m.prefactor for m in own], [m.rate for m in own]
+            ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
+    rates = [m.rate for m in members]
+    if certificate.rate_limit is not None:
+        limit = float(certificate.rate_limit)
+        ax.axhline(limit, color="#7F7F7F", linewidth=2.2, alpha=0.6, label="no rate exceeds (proved)")
+        rates.append(limit)
+    if certificate.spectral_rate is not None:
+        rates.append(certificate.spectral_rate)
+        ax.axhline(rates[-1], color="black", linewidth=0.9, linestyle=":", label="spectral rate (numerical)")
+    low, high = min(0.0, *rates), max(0.0, *rates)
+    ax.set_ylim(low - 0.08 * (high - low) * (low < 0), high + 0.08 * (high - low))
+    ax.set_xlabel("prefactor of the squared norm")
+    ax.set_ylabel("proved rate")
+    _legend_above(ax)
+    return ax
+
+
 def _row_sum(certificate: Certificate) -> float:
     """Bound ``||dz||`` for an error of 1 in every state."""
     if certificate.envelope.coordinates == "eps":
@@ -217,14 +461,96 @@ def _row_sum(certificate: Certificate) -> float:
     return float(np.linalg.norm(abs(certificate.graph.laplacian()).sum(axis=1)))
 
 
+def _camp_groups(structure: Structure) -> np.ndarray:
+    """Return which of ``CAMP_COLOURS`` every node belongs to."""
+    group = np.full(structure.graph.n_nodes, "followers", dtype=object)
+    for component in structure.closed_components:
+        for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
+            group[v] = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
+    return group
+
+
+def _draw_agents(
+    trajectory: Trajectory, values: np.ndarray, structure: Structure, ax: Axes, drawstyle: str = "default"
+) -> None:
+    """Draw a line for every agent, leaders first and thick, and the deadlines."""
+    group = _camp_groups(structure)
+    seen: set[str] = set()
+    for node in np.argsort(group == "followers", kind="stable"):
+        name = str(group[node])
+        ax.plot(
+            trajectory.t,
+            values[node],
+            color=CAMP_COLOURS[name],
+            linewidth=0.9 if name == "followers" else 1.6,
+            linestyle="--" if name == "followers" else "-",
+            drawstyle=drawstyle,
+            label=None if name in seen else name,
+        )
+        seen.add(name)
+    if trajectory.protocol.prescribed:
+        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
+    if isinstance(trajectory, SlidingTrajectory):
+        ax.axvline(float(trajectory.protocol.T_r), color="#7F7F7F", linewidth=0.8, linestyle="-.", label="$T_r$")
+
+
+def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float | None:
+    """Return the proved bound of ``|u_k|`` that holds for a run; None if there is none.
+
+    Raises
+    ------
+    ValueError
+        The certificate is of another graph, protocol or start.
+    """
+    for name in ("graph", "protocol"):
+        if getattr(certificate, name) != getattr(trajectory, name):
+            raise ValueError(f"the certificate is of another {name} than the trajectory")
+    starts = [("start", certificate.start, trajectory.states[:, 0])] if 0.0 in trajectory.t[:1] else []
+    unproved = trajectory.forcing is not None
+    if isinstance(trajectory, SlidingTrajectory):
+        starts.append(("sigma(0)", certificate.sigma0, trajectory.sigma0))
+        unproved = trajectory.boundary_layer is not None
+    for name, proved, run in starts:
+        if proved is not None and not np.array_equal([float(x) for x in proved], run):
+            raise ValueError(f"the certificate is of another {name} than the trajectory")
+    effort, actuator = certificate.effort, trajectory.actuator
+    if effort is None or effort.starts is not None or certificate.start is None or unproved:
+        return None
+    if actuator is None:
+        return None if effort.peak is None else float(effort.peak.largest)
+    if actuator.sample_period is not None:
+        return None
+    for entry in effort.limited:
+        same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
+        if same and entry.limits.sample_period is None and entry.largest is not None:
+            return float(entry.largest)
+    # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
+    return None if effort.peak is None else float(effort.peak.largest)
+
+
+def _layout(graph: SignedDigraph) -> np.ndarray:
+    """Return places of the nodes, (N, 2), the same in every run."""
+    import networkx as nx
+
+    plain = nx.Graph(zip(graph.source.tolist(), graph.target.tolist(), strict=True))
+    plain.add_nodes_from(range(graph.n_nodes))
+    if graph.n_nodes > KAMADA_NODES:
+        place = nx.spring_layout(plain, seed=1)
+    else:
+        hops = dict(nx.all_pairs_shortest_path_length(plain))
+        apart = 2 + max(max(row.values()) for row in hops.values())  # between components
+        place = nx.kamada_kawai_layout(plain, {u: {v: hops[u].get(v, apart) for v in plain} for u in plain})
+    return np.array([place[v] for v in range(graph.n_nodes)])
+
+
 def _legend_above(ax: Axes) -> None:
     """Put the legend above the axes, where it covers no data."""
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small", frameon=False)
 
 
-def _axes(ax: Axes | None) -> Axes:
+def _axes(ax: Axes | None, size: tuple[float, float] = (6, 3.6)) -> Axes:
     if ax is not None:
         return ax
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(6, 3.6), layout="constrained").add_subplot()
+    return Figure(figsize=size, layout="constrained").add_subplot()

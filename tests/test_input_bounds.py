@@ -84,7 +84,7 @@ class Decay:
         """The integral over ``s``, of a function of ``z`` that decays."""
         ends = np.unique(np.append([0.0, *np.geomspace(1e-4, 400, 60)], self.crossing)).tolist()
         moved = lambda z: of(z) * (self.rho1 * self.T * math.exp(-z) + self.k)  # noqa: E731
-        return sum(quad(moved, a, b, epsabs=0, epsrel=1e-10)[0] for a, b in pairwise(ends))
+        return sum(quad(moved, a, b, epsabs=1e-200, epsrel=1e-10)[0] for a, b in pairwise(ends))
 
     def energy(self) -> float:
         return self.integral(lambda z: self.gain(z) * self.size(z) ** 2)
