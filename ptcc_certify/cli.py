@@ -623,7 +623,7 @@ def _input_code(certificate: Certificate, most: Fraction | None) -> int:
     if most is None or certificate.constant:
         return OK
     if effort is not None and certificate.limits:
-        proved = [entry.largest for entry in effort.limited]
+        proved = [entry.largest for entry in effort.residual]
         if len(proved) == len(certificate.limits) and all(x is not None and x <= most for x in proved):
             return OK
     elif effort is not None and effort.peak is not None and effort.peak.largest <= most:

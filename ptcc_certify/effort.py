@@ -137,7 +137,7 @@ class Effort:
     energy, path_length : Witness or None
         Bounds of ``int ||u||^2 dt`` and ``int ||u|| dt`` (of the nominal part).
     sliding : SlidingPart or None
-    limited : tuple of Limited
+    residual : tuple of Limited
         Of those limits under which something is certified.
     longest_period : Fraction or None
         Where sampling is not certified: a period, with the same largest gain, up to which it would be.
@@ -156,7 +156,7 @@ class Effort:
     energy: Witness | None = None
     path_length: Witness | None = None
     sliding: SlidingPart | None = None
-    limited: tuple[Limited, ...] = ()
+    residual: tuple[Limited, ...] = ()
     longest_period: Fraction | None = None
     disturbed: Disturbed | None = None
     first: Fraction | None = None
@@ -177,9 +177,9 @@ class Effort:
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
             if bound is not None:
                 found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
-        for k, entry in enumerate(self.limited):
+        for k, entry in enumerate(self.residual):
             witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
-            found.append(Obligation("limited-gain", f"effort.limited[{k}]", {"growth": entry.growth}, witness))
+            found.append(Obligation("limited-gain", f"effort.residual[{k}]", {"growth": entry.growth}, witness))
         if self.disturbed is not None:
             numbers = {"delta": self.disturbed.delta}
             found.append(Obligation("nominal-disturbed", "effort", numbers, self.disturbed.member))
@@ -328,7 +328,7 @@ def bound_effort(
         peak=peak,
         energy=_least(bounds, energy_above, ample),
         path_length=_least(bounds, length_above, usable),
-        limited=tuple(entry for entry in entries if entry is not None),
+        residual=tuple(entry for entry in entries if entry is not None),
         longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
         disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
         first=None if sliding or region.axes else (gain.rho1 + gain.k / gain.T) * max(map(region.largest, bounds.rows)),
@@ -676,7 +676,7 @@ def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[
         "energy": None if effort.energy is None else text(effort.energy.value),
         "path_length": None if effort.path_length is None else text(effort.path_length.value),
         "sliding": effort.sliding and {"bounded": effort.sliding.bounded, "agents": by_agent(effort.sliding.agents)},
-        "limited": [
+        "residual": [
             {
                 "gain_cap": maybe(entry.limits.gain_cap),
                 "stop_before": maybe(entry.limits.stop_before),
@@ -693,7 +693,7 @@ def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[
                     "largest": maybe(entry.noisy_largest),
                 },
             }
-            for entry in effort.limited
+            for entry in effort.residual
         ],
         "disturbed": disturbed
         and {

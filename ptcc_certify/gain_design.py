@@ -572,7 +572,7 @@ def _at(base: Certificate, bounds: InputBounds, option: Option, T: Fraction, inp
     cap = _decimal(option.clock / T, up=True)
     limits = Limits(gain_cap=cap)
     cert = replace(base, protocol=NominalProtocol(T, cap, option.k, 1), limits=(limits,))
-    entries = cert.effort.limited if cert.effort is not None else ()
+    entries = cert.effort.residual if cert.effort is not None else ()
     if not entries or entries[0].agents is None:
         return Fit(T, cert, limits, None, None)
     peak = entries[0].largest if input_norm is None else cap * bounds.held_norm

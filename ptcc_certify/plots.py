@@ -520,7 +520,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
         return None if effort.peak is None else float(effort.peak.largest)
     if actuator.sample_period is not None:
         return None
-    for entry in effort.limited:
+    for entry in effort.residual:
         same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
         if same and entry.limits.sample_period is None and entry.largest is not None:
             return float(entry.largest)

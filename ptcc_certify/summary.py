@@ -190,7 +190,7 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         lines.append(_line("", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"))
     if effort.sliding is not None and not effort.sliding.bounded:
         lines.append(_line("", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"))
-    for entry in effort.limited:
+    for entry in effort.residual:
         named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
         said = [f"{what}{float(x):.6g}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
         agents = "" if entry.agents is None else f", every agent within {_up(max(entry.agents), 3)} of its outcome"
@@ -199,11 +199,11 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {float(entry.noise):.6g} leaves ||E|| <= {_up(entry.noisy_norm, 3)} at T"
             lines.append(_line("", f"{noise}, |u_k| <= {_up(entry.noisy_largest, 4)}"))
-    if certificate.noise is not None and not any(entry.noise for entry in effort.limited):
+    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
         lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
     if effort.longest_period is not None:
         lines.append(_line("limited", f"not certified with this period; up to {_down(effort.longest_period, 4)} it is"))
-    elif len(effort.limited) < len(certificate.limits):
+    elif len(effort.residual) < len(certificate.limits):
         lines.append(_line("limited", "nothing is certified under these limits"))
     if effort.disturbed is not None:
         d, drift = effort.disturbed, effort.disturbed.drift

@@ -761,7 +761,7 @@ KEYS = {
     "prefactor": "value of",
     "outcome": "final_state degenerate influence",
     "outcome.influence": "components followers",
-    "effort": "bounded threshold starts constants peak energy path_length sliding limited disturbed",
+    "effort": "bounded threshold starts constants peak energy path_length sliding residual disturbed",
     "effort.threshold": "lower upper",
     "unverified": "spectral tightness paper_rate search residual final_state simulation notes",
     "unverified.search": "method at tried diagonal_limit",

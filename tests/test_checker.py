@@ -295,7 +295,7 @@ def test_no_mutant_is_accepted(name: str, slides: bool):
 
 
 #: Sets of starts may be smaller, bounds larger, limits others that leave no more.
-ABOUT_LIMITS = OF_ITS_OWN_RIGHT + r"|effort\.(starts|limited|disturbed)"
+ABOUT_LIMITS = OF_ITS_OWN_RIGHT + r"|effort\.(starts|residual|disturbed)"
 
 
 def limited(name: str, ball: bool) -> Json:
@@ -307,8 +307,8 @@ def limited(name: str, ball: bool) -> Json:
     step = Fraction(1, 10**7)
     limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period=step)]
     made = certify(graph, STRONG, starts=starts, limits=limits, delta="0.1", noise="0.01", simulation=False)
-    assert made.effort is not None and len(made.effort.limited) == 3 and made.effort.disturbed is not None
-    assert [entry.noise is None for entry in made.effort.limited] == [False, False, True]
+    assert made.effort is not None and len(made.effort.residual) == 3 and made.effort.disturbed is not None
+    assert [entry.noise is None for entry in made.effort.residual] == [False, False, True]
     return json.loads(made.to_json())
 
 

@@ -386,8 +386,8 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
         assert cert.effort is not None
         final = outcome(cert.structure, x.tolist()).values
         unsampled = [limits for limits in proved.limits if limits.sample_period is None]
-        assert [entry.limits for entry in cert.effort.limited][: len(unsampled)] == unsampled
-        for entry in cert.effort.limited:
+        assert [entry.limits for entry in cert.effort.residual][: len(unsampled)] == unsampled
+        for entry in cert.effort.residual:
             given = entry.limits
             actuator = Actuator(given.gain_cap, given.stop_before, given.sample_period)
             clock = float(actuator.limit(protocol.gain).clock([float(protocol.T)])[0])
@@ -537,10 +537,10 @@ def forged(effort: dict[str, Any]) -> list[tuple[tuple[str | int, ...], Any]]:
     for k, constants in enumerate(effort["constants"]):
         if constants is not None:
             lower(("constants", k))
-    for k in range(len(effort["limited"])):
+    for k in range(len(effort["residual"])):
         for key in ("norm", "agents", "largest"):
-            lower(("limited", k, key))
-        lower(("limited", k, "clock"), MORE)
+            lower(("residual", k, key))
+        lower(("residual", k, "clock"), MORE)
     return new
 
 
@@ -569,9 +569,9 @@ def test_certificates_of_the_input_are_checked(name: str):
     data = written(nominal_certificate(name))
     effort = data["effort"]
     assert effort["bounded"] and effort["starts"] and effort["peak"] and effort["energy"] and effort["disturbed"]
-    assert len(effort["limited"]) >= 3 and any(effort["constants"])
+    assert len(effort["residual"]) >= 3 and any(effort["constants"])
     tried = assert_no_forgery_passes(data)
-    assert any(path.startswith("limited.clock") for path in tried)
+    assert any(path.startswith("residual.clock") for path in tried)
 
 
 @pytest.mark.parametrize("push", [F(0), F(1, 20)])
@@ -609,7 +609,7 @@ def test_what_is_next_to_nothing_is_written(weight: int):
     graph = edges((1, 2, weight), (2, 3, -weight), (3, 1, weight))
     cert = certify(graph, NominalProtocol(1, 1, 1, 2), [1, 2, 3], limits=[Limits(F(1000))], simulation=False)
     assert cert.verdict == "certified" and cert.effort is not None
-    assert 0 < cert.effort.limited[0].norm < F(1, 10**30)
+    assert 0 < cert.effort.residual[0].norm < F(1, 10**30)
 
 
 N3 = [F(1), F(2), F(3)]
@@ -661,7 +661,7 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
     x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)
     cert = certify(graph, protocol, [Fraction(x) for x in x0], limits=[actuator], noise="1/20", simulation=False)
     assert cert.verdict == "certified" and cert.effort is not None
-    (entry,) = cert.effort.limited
+    (entry,) = cert.effort.residual
     assert entry.noisy_norm is not None and entry.noisy_largest is not None
     L = graph.dense_laplacian()
     for text in ("0.05*sin(40*t+k)", "0.05*sign(sin(7*t*k))", "0.05"):
@@ -678,7 +678,7 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
 
 def test_noise_times_an_infinite_gain_is_not_certified():
     cert = certify(load_graph("fig1a"), NominalProtocol(1, 1, 1, 2), [1] * 6, noise=1, simulation=False)
-    assert cert.effort is not None and cert.effort.limited == ()
+    assert cert.effort is not None and cert.effort.residual == ()
     assert any("noise      not certified" in line for line in certificate_lines(cert, "fig1a"))
 
 

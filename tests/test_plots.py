@@ -111,7 +111,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
     protocol, capped = EXAMPLES[2].protocol(), Actuator(gain_cap="0.5")
     cert = certify(graph, protocol, start, limits=[capped], simulation=False)
     assert cert.effort is not None and cert.effort.peak is not None
-    own = float(cert.effort.limited[0].largest or 0)
+    own = float(cert.effort.residual[0].largest or 0)
     peak = float(cert.effort.peak.largest)
     expected = [
         ({}, peak),

@@ -39,7 +39,7 @@ class EffortCheck(LyapunovCheck):
         need((said is not None) == proved, "the input is spoken of iff the decay is proved")
         if said is None:
             return
-        fields(said, (*KEYS, "limited", "disturbed"), "effort")
+        fields(said, (*KEYS, "residual", "disturbed"), "effort")
         g = self.gains
         T = g["T_r"] + g["T_s"] if self.is_sliding else g["T"]
         self.gain = PrescribedGain(T, g["rho1"], g["rho2"] * g["kappa"])
@@ -50,7 +50,7 @@ class EffortCheck(LyapunovCheck):
         if starts is None:
             for key in ("peak", "energy", "path_length", "disturbed"):
                 need(said[key] is None, f"{key} without a start, or of too large a graph")
-            need(said["limited"] == [], "limits without a start, or of too large a graph")
+            need(said["residual"] == [], "limits without a start, or of too large a graph")
             return
         try:
             self._sized(said, self._bounds(starts, constants))
@@ -82,8 +82,8 @@ class EffortCheck(LyapunovCheck):
                 least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
                 need(exact(said[key]) >= least, "the bound is not proved")
                 self.done(f"at most {shown(exact(said[key]))}")
-        for k, entry in enumerate(entries(said["limited"], "limited")):
-            self._limited(entry, f"effort.limited[{k}]", said["peak"], bounds)
+        for k, entry in enumerate(entries(said["residual"], "residual")):
+            self._limited(entry, f"effort.residual[{k}]", said["peak"], bounds)
         self._disturbed(said["disturbed"], bounds)
 
     def _member(self, k: Any) -> int:
