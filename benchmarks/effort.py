@@ -24,8 +24,6 @@ from ptcc_certify.errors import PTCCError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 
 LARGEST, STARTS, OVER = 105, 20, Fraction(3, 2)
-#: Above so many nodes, where a proof takes seconds, so many single starts.
-MANY, FEW = 50, 3
 #: Cells that grow by 7% up to ``z = ln(T/(T - t)) = 20``, ten Gauss nodes in each.
 EDGES = np.append(0.0, np.geomspace(1e-6, 20, 200))
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -84,7 +82,7 @@ def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
     points = np.column_stack([starts, worst.x0])
     seen = motion(graph, cert.protocol, points)  # type: ignore[arg-type]
     alone: Ratios = {kind: [] for kind in KINDS}
-    for i in (STARTS, *range(STARTS if graph.n_nodes <= MANY else FEW)):
+    for i in range(STARTS + 1):
         effort = replace(cert, start=tuple(Fraction(float(x)) for x in points[:, i])).effort
         assert effort is not None
         one = (seen[0][:, i : i + 1], *(x[i : i + 1] for x in seen[1:]))
