@@ -289,9 +289,7 @@ def bound_effort(
         Nominal protocol: bound of the measurement noise to be judged under each of the limits but sampling.
     """
     gain = _prescribed(protocol)
-    still = not any(len(c.nodes) > 1 or not c.balanced for c in structure.closed_components) and not len(
-        structure.followers
-    )
+    still = structure.graph.n_edges == 0
     bounded, by = _bounded(structure, gain.k, rate, limit, still)
     threshold = tuple(None if r is None else gain.k * r / 2 for r in (rate, limit))
     sliding = _sliding_part(protocol, sigma0)

@@ -183,7 +183,8 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         whom = "" if effort.starts is None else " for all these starts"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         lines.append(_line("effort", ", ".join(sizes) + whom + part))
-    worst = None if effort.peak is None or certificate.limits else certificate.worst_start
+    other = bool(certificate.limits) or not certificate.direct  # the found start is of neither
+    worst = None if effort.peak is None or other else certificate.worst_start
     if worst is not None and math.isfinite(worst.size):
         labels = certificate.graph.labels
         where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
