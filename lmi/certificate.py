@@ -25,13 +25,24 @@ class DiagonalCertificate:
     log_omega : (n,) array
         Natural logarithms of ``omega``; the largest is 0.
     rate : float
-        The decay of the objective: ``lmin(Omega A + A' Omega) / max(omega)`` if the margin was maximised, otherwise
-        :func:`diagonal_rate`. ``V = x' Omega x`` obeys ``V' <= -rate V`` along ``x' = -A x``.
+        The decay of the objective, per unit of the clock: ``lmin(Omega A + A' Omega) / max(omega)`` if the margin was
+        maximised, otherwise :func:`diagonal_rate`. ``V = x' Omega x`` obeys ``V' <= -rate V`` along ``x' = -A x``.
     upper : float
         No diagonal matrix has a larger rate of that objective, as far as floating point tells; infinite if unknown.
     witness : tuple of arrays or None
-        Closed forms: ``(log u, log v)`` with ``Omega = diag(v / u)``. Best rate: ``(Y,)`` with ``X = Y Y'`` that shows
-        ``upper``; see :func:`lmi.no_diagonal_rate_above`.
+        Closed forms: ``(log u, log v)``, both (n,), with ``Omega = diag(v / u)``. Best rate: ``(Y,)``, (n, k), with
+        ``X = Y Y'`` that shows ``upper``; see :func:`lmi.no_diagonal_rate_above`.
+
+    References
+    ----------
+    Kaszkurewicz and Bhaya, Matrix Diagonal Stability in Systems and Computation, Birkhauser 2000, section 2.
+
+    Examples
+    --------
+    >>> from lmi import m_matrix_certificate
+    >>> found = m_matrix_certificate([[2.0, -1.0], [-4.0, 5.0]])
+    >>> round(found.rate, 9), round(found.condition, 9), abs(found.gap) < 1e-9
+    (2.0, 4.0, True)
     """
 
     log_omega: np.ndarray
@@ -77,6 +88,27 @@ def normalised(omega: np.ndarray) -> np.ndarray:
 def diagonal_margin(A: Any, omega: np.ndarray) -> float:
     """Return ``lmin(Omega A + A' Omega)`` with ``Omega = diag(omega)``.
 
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+    omega : (n,) array
+        The diagonal.
+
+    Returns
+    -------
+    float
+        In floating point. Over ``max(omega)`` it is a rate, per unit of the clock; where it is positive ``Omega`` is a
+        Lyapunov matrix.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
     Examples
     --------
     >>> diagonal_margin([[1.0, 0.0], [0.0, 2.0]], [1.0, 1.0])
@@ -99,10 +131,21 @@ def diagonal_rate(A: Any, log_omega: np.ndarray, basis: np.ndarray | None = None
     basis : (n, r) array, optional
         Of an invariant subspace of ``A`` to which the motion is confined; the inequality is asked for there only.
 
+    Returns
+    -------
+    float
+        Per unit of the clock, in floating point; negative if ``x' Omega x`` may grow.
+
     Raises
     ------
     MatrixError
-        The vector has the wrong length.
+        ``A`` is not real, finite and square, or the vector has the wrong length.
+    NoCertificate
+        An entry of ``B`` overflows.
+
+    References
+    ----------
+    Kaszkurewicz and Bhaya, Matrix Diagonal Stability in Systems and Computation, Birkhauser 2000, section 2.
 
     Examples
     --------

@@ -284,6 +284,11 @@ def perron_vectors(A: Any) -> tuple[np.ndarray, np.ndarray]:
     NotAnHMatrix
         ``A`` is reducible or ``M(A)`` is not an M-matrix.
 
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6, theorem 4.16.
+    Grassmann, Taksar and Heyman, Regenerative analysis and steady state distributions, Oper. Res. 33 (1985).
+
     Examples
     --------
     >>> u, v = perron_vectors([[3.0, 3.0], [1.0, 1.0]])

@@ -39,6 +39,18 @@ class RhoInterval:
         The paper's sufficient end ``lmin / lmax(R)``.
     exact : float
         The supremum ``1 / lmax(Gamma^-1/2 R Gamma^-1/2)``.
+
+    References
+    ----------
+    Lemma 5 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> gamma = np.diag([1.0, 4.0])  # a leader that does not drive the follower does not shorten the exact interval
+    >>> Coupling(gamma, np.ones(2), np.ones(1), np.array([[0.0, -1.0]]), np.array([[1.0]])).interval()
+    RhoInterval(printed=2.0, exact=8.0)
     """
 
     printed: float
@@ -54,9 +66,30 @@ class Coupling:
     gamma : (n_L, n_L) array
         Decrease of the leaders, positive definite.
     omega_L, omega_F : (n_L,), (n_F,) arrays
+        Diagonals of the Lyapunov matrices of leaders and followers.
     A_FL, A_F : (n_F, n_L), (n_F, n_F) arrays
+        The followers' rows of the matrix, ``x_F' = -A_FL x_L - A_F x_F``.
     printed_numerator : float
         The paper's numerator of the printed interval, ``lmin(Gamma)`` by default.
+
+    Raises
+    ------
+    MatrixError
+        The blocks do not fit together.
+
+    References
+    ----------
+    Lemma 5 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> c = Coupling(np.eye(1), np.ones(1), np.ones(1), np.array([[-1.0]]), np.array([[1.0]]))
+    >>> c.schur_term()
+    array([[0.5]])
+    >>> round(c.rate(0.5), 9), c.interval().exact  # Phi(rho) > 0 below the end of the interval
+    (0.5, 2.0)
     """
 
     gamma: np.ndarray
@@ -83,12 +116,12 @@ class Coupling:
         return (R + R.T) / 2
 
     def phi(self, rho: float) -> np.ndarray:
-        """Return ``Phi(rho)``."""
+        """Return ``Phi(rho)``, (n_L + n_F, n_L + n_F), of a factor ``rho > 0``."""
         C = rho * self.omega_F[:, None] * self.A_FL
         return np.block([[self.gamma, C.T], [C, rho * self.follower_decrease()]])
 
     def rate(self, rho: float) -> float:
-        """Return the paper's rate ``lmin(Phi(rho)) / lmax(diag(Omega_L, rho Omega_F))``."""
+        """Return the paper's rate ``lmin(Phi(rho)) / lmax(diag(Omega_L, rho Omega_F))``, per unit of the clock."""
         top = max(float(self.omega_L.max(initial=0.0)), rho * float(self.omega_F.max(initial=0.0)))
         return float(np.linalg.eigvalsh(self.phi(rho))[0]) / top
 
@@ -218,7 +251,7 @@ def couple_blocks(
     log_omega : (n,) array
         Logarithms of the blocks' own diagonals.
     rate : float
-        Below the rate of every block.
+        Below the rate of every block, per unit of the clock.
     basis : (n, r) array, optional
         Of an invariant subspace, block by block, to which the inequality is restricted.
 

@@ -427,11 +427,19 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
     A : (n, n) array or sparse matrix
         Read as the dyadic rationals that its floats are.
     rate : float
+        Per unit of the clock.
+    tolerance : float
+        Relative gap asked of the solver.
 
     Returns
     -------
     n rows of k Fractions, or None
         ``Y``; None if no proof was found, as for every matrix that has a faster diagonal solution.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square or has no rows, or the rate is not finite.
 
     References
     ----------
@@ -491,6 +499,8 @@ def rate_frontier(
         See :func:`diagonal_lyapunov`.
     best : DiagonalCertificate, optional
         The best rate, if it was searched before.
+    tolerance : float
+        Relative gap asked of the solver.
 
     Returns
     -------
@@ -499,8 +509,14 @@ def rate_frontier(
 
     Raises
     ------
+    MatrixError
+        ``A`` is not real, finite and square or has no rows, or ``basis`` is no finite matrix of n rows.
     NoCertificate
         No positive rate was found at any condition.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
     --------
@@ -564,6 +580,8 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
     Parameters
     ----------
     A : (n, n) array or sparse matrix
+    tolerance : float
+        Relative gap asked of the solver.
 
     Returns
     -------
@@ -592,8 +610,25 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
 class FixedLeader:
     """A leader block whose Lyapunov matrix is known up to the scale shared by all such blocks.
 
-    ``omega`` (k,) is the diagonal; ``decrease`` (k,) the diagonal of a matrix that bounds the decrease of
-    ``x' diag(omega) x`` from below on the states that occur.
+    Attributes
+    ----------
+    omega : (k,) array
+        The diagonal of the Lyapunov matrix, positive.
+    decrease : (k,) array
+        Positive: the diagonal of a matrix that bounds the decrease of ``x' diag(omega) x`` from below on the states
+        that occur.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> two = FixedLeader(omega=np.array([1.0, 3.0]), decrease=np.full(2, 2.0))
+    >>> coupled_lyapunov([two], [[-1.0, 0.0]], [[1.0]]).leaders[0]  # kept as it is
+    array([1., 3.])
     """
 
     omega: np.ndarray
@@ -602,7 +637,25 @@ class FixedLeader:
 
 @dataclass(frozen=True)
 class FreeLeader:
-    """A leader block ``x' = -A x`` whose diagonal ``H`` is searched; its decrease counts as ``lmin(HA + A'H) I``."""
+    """A leader block ``x' = -A x`` whose diagonal ``H`` is searched; its decrease counts as ``lmin(HA + A'H) I``.
+
+    Attributes
+    ----------
+    A : (k, k) array or sparse matrix
+        With a diagonal Lyapunov matrix.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> bool(found.leaders[0][0] > 0 and found.followers[0] > 0)
+    True
+    """
 
     A: np.ndarray
 
@@ -617,6 +670,20 @@ class CoupledCertificate:
         For a fixed block its ``omega`` unchanged; for a free block relative to those.
     followers : (n_F,) array
         ``rho Omega_F``: the coupling factor is contained.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*found.leaders, found.followers])
+    >>> from lmi import diagonal_margin
+    >>> diagonal_margin(A, omega) > 0
+    True
     """
 
     leaders: tuple[np.ndarray, ...]
@@ -641,6 +708,9 @@ def coupled_lyapunov(
     A_FL : (n_F, n_L) array
         Columns in the order of the leader blocks.
     A_F : (n_F, n_F) array
+        Of the followers.
+    tolerance : float
+        Relative gap asked of the solver.
 
     Returns
     -------
@@ -654,6 +724,12 @@ def coupled_lyapunov(
         A free block or the follower block has no diagonal Lyapunov matrix that the solver can resolve.
     NotAnHMatrix
         The solver found no positive rate, and the follower block is not an H-matrix with positive diagonal.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
     --------

@@ -57,6 +57,17 @@ class ResidualWitness:
         Binary places of ``R``.
     scale : int
         A common denominator; 1 for arrays.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> S = np.full((50, 50), 0.1) + np.eye(50)
+    >>> witness = prove_positive_definite(S).witness
+    >>> witness.proves(S), witness.proves(S - np.eye(50))
+    (True, False)
     """
 
     R: np.ndarray
@@ -95,6 +106,18 @@ class DefinitenessProof:
         The factor of the residual test; None where the elimination decided.
     direction : tuple of int, or None
         A vector ``x`` with ``x' S x <= 0``, where one refuted the matrix.
+
+    References
+    ----------
+    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> prove_positive_definite([[1, 2], [2, 1]])
+    DefinitenessProof(proved=False, size=2, failed_at=1)
+    >>> "definite" if prove_positive_definite([[2, 1], [1, 2]]) else "not definite"
+    'definite'
     """
 
     proved: bool
@@ -482,6 +505,10 @@ def prove_margin(S: Rows, guess: float) -> Fraction | None:
     Fraction or None
         A proved lower bound of the smallest eigenvalue of ``S``; None if none was found above ``guess / 2``.
 
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
     Examples
     --------
     >>> m = prove_margin([[Fraction(2), Fraction(0)], [Fraction(0), Fraction(3)]], 2.0)
@@ -508,6 +535,10 @@ def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
     -------
     Fraction or None
         Of the sign of ``guess``; None if none was found above ``guess - |guess| / 2``.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
 
     Examples
     --------
@@ -539,6 +570,17 @@ LOSSES = (2e-10, 5e-9, 1e-7, 1e-5, 1e-3, 0.1, 0.5)
 def round_to_bits(value: float, bits: int) -> Fraction:
     """Round a finite float to the nearest dyadic rational with ``bits`` significant bits.
 
+    Parameters
+    ----------
+    value : float
+        Finite.
+    bits : int
+        Positive.
+
+    Returns
+    -------
+    Fraction
+
     Examples
     --------
     >>> round_to_bits(0.1, 4)
@@ -562,13 +604,20 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     Parameters
     ----------
     A : n rows of n Fractions
+        Or other real numbers; a float is the dyadic number that it is.
     Y : n rows of k Fractions
     rate : Fraction
+        Per unit of the clock.
 
     Returns
     -------
     bool
         False: this ``Y`` proves nothing.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not square or has no rows, ``Y`` has not as many, or an entry is not a finite real number.
 
     References
     ----------
@@ -617,7 +666,17 @@ class DominanceProof:
     u, v : (n,) array of positive integers
         int64, or Python integers where they are larger.
     rate : Fraction
-        Positive, dyadic.
+        Positive, dyadic; per unit of the clock.
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
+
+    Examples
+    --------
+    >>> proof = prove_dominance([[2.0, 1.0], [-1.0, 2.0]], [1, 1], [1, 1])
+    >>> bool((proof.u > 0).all() and (proof.v > 0).all()), proof.rate
+    (True, Fraction(2, 1))
     """
 
     u: np.ndarray
@@ -710,6 +769,16 @@ def dyadic_integers(values: Any) -> tuple[list[int], int]:
 
     So a matrix of floats is handed to whoever checks its proof in integers.
 
+    Parameters
+    ----------
+    values : (n,) sequence of float or int
+        Finite.
+
+    Returns
+    -------
+    integers : list of n ints
+    power : int
+
     Examples
     --------
     >>> dyadic_integers([0.75, -2.0, 3])
@@ -793,13 +862,24 @@ class SparseDefinitenessProof:
     ----------
     order : (n,) int64 array
         ``order[k]`` is the row of ``S`` eliminated as number ``k``.
-    indptr, indices, data : int64 array
+    indptr, indices, data : (n + 1,), (nnz,), (nnz,) int64 arrays
         ``R``, lower triangular, column by column with increasing rows.
     exponents : (n,) int64 array
         ``e``, for the rows of ``S`` as they are numbered there.
     bits : int
+        Binary places of ``R``.
     weights : (n,) int64 array or None
         ``d`` in the order of elimination; None: all are 1.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> proof = prove_sparse_positive_definite(sparse.diags_array([2.0, 3.0, 4.0]))
+    >>> bool(proof), proof.weights is None, sorted(proof.order.tolist())
+    (True, True, [0, 1, 2])
     """
 
     order: np.ndarray

@@ -39,9 +39,21 @@ class FullCertificate:
     matrix : (n, n) array
         Symmetric; smallest eigenvalue 1.
     rate : float
-        Smallest eigenvalue of ``(P A + A' P, P)``.
+        Smallest eigenvalue of ``(P A + A' P, P)``, per unit of the clock.
     condition : float
         ``lmax(P) / lmin(P)``, the prefactor of the squared norm.
+
+    References
+    ----------
+    Horn and Johnson, Topics in Matrix Analysis, Cambridge 1991, section 2.2.
+
+    Examples
+    --------
+    >>> A = np.array([[1.0, 9.0], [0.0, 2.0]])
+    >>> found = full_frontier(A)[-1]
+    >>> P, rate = found.matrix, found.rate
+    >>> bool(np.linalg.eigvalsh(P @ A + A.T @ P - 0.999 * rate * P)[0] > 0)
+    True
     """
 
     matrix: np.ndarray
@@ -60,7 +72,7 @@ def full_frontier(
         All eigenvalues with positive real part.
     decay : float, optional
         ``min Re lambda``, if it is known better than from the eigenvalues of ``A`` (block by block of a reducible
-        matrix, whose Jordan chains cost digits).
+        matrix, whose Jordan chains cost digits); per unit of the clock.
     losses : sequence of float
         Wanted distances ``1 - a / decay``.
 
@@ -71,8 +83,14 @@ def full_frontier(
 
     Raises
     ------
+    MatrixError
+        ``A`` is not real, finite and square, or has no rows.
     NoCertificate
         ``A`` has an eigenvalue without positive real part, or no matrix with a positive rate was found.
+
+    References
+    ----------
+    Horn and Johnson, Topics in Matrix Analysis, Cambridge 1991, section 2.2.
 
     Examples
     --------

@@ -56,6 +56,10 @@ def comparison_matrix(A: Any) -> np.ndarray:
     MatrixError
         ``A`` is not square or not finite.
 
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
+
     Examples
     --------
     >>> comparison_matrix([[-2.0, 1.0], [0.0, 3.0]])
@@ -70,6 +74,23 @@ def comparison_matrix(A: Any) -> np.ndarray:
 
 def is_z_matrix(A: Any) -> bool:
     """Tell whether no off-diagonal entry is positive.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square.
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
 
     Examples
     --------
@@ -95,6 +116,15 @@ def m_matrix_witness(A: Any) -> np.ndarray | None:
     (n,) array or None
         None when ``A`` is not a Z-matrix or no witness could be confirmed.
 
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square.
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6, theorem 2.3.
+
     Examples
     --------
     >>> m_matrix_witness([[2.0, -1.0], [-1.0, 2.0]])
@@ -118,6 +148,23 @@ def m_matrix_witness(A: Any) -> np.ndarray | None:
 def is_m_matrix(A: Any) -> bool:
     """Tell whether ``A`` is a nonsingular M-matrix, as far as a witness can be confirmed in float64.
 
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square.
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
+
     Examples
     --------
     >>> is_m_matrix([[2.0, -1.0], [-1.0, 2.0]]), is_m_matrix([[1.0, -1.0], [-1.0, 1.0]])
@@ -128,6 +175,23 @@ def is_m_matrix(A: Any) -> bool:
 
 def is_h_matrix(A: Any) -> bool:
     """Tell whether ``A`` is a nonsingular H-matrix: whether ``M(A)`` is a nonsingular M-matrix.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not real, finite and square.
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 6.
 
     Examples
     --------
@@ -149,6 +213,10 @@ def irreducible_blocks(A: Any) -> list[np.ndarray]:
     Returns
     -------
     list of int arrays
+
+    References
+    ----------
+    Berman and Plemmons, Nonnegative Matrices in the Mathematical Sciences, SIAM 1994, chapter 2.
 
     Examples
     --------

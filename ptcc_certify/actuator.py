@@ -57,14 +57,19 @@ class Actuator:
     gain_cap : int, float, str or Fraction, optional
         Positive: the gain is at most this; 1/time/weight.
     stop_before : int, float, str or Fraction, optional
-        Positive and below ``T``: the input is 0 from ``T - stop_before`` on, for ever.
+        Positive and below ``T``, in units of time: the input is 0 from ``T - stop_before`` on, for ever.
     sample_period : int, float, str or Fraction, optional
-        Positive: gain and input change at its multiples only, and at ``T - stop_before`` or ``T``.
+        Positive, in units of time: gain and input change at its multiples only, and at ``T - stop_before`` or ``T``.
 
     Raises
     ------
     ParameterError
         Names the parameter, its value and its domain.
+
+    References
+    ----------
+    These limit the gain of the protocol (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------
@@ -92,6 +97,15 @@ class Actuator:
 
     def limit(self, gain: Gain) -> LimitedGain:
         """Return what this actuator leaves of a gain.
+
+        Parameters
+        ----------
+        gain : Gain
+            Of the protocol.
+
+        Returns
+        -------
+        LimitedGain
 
         Raises
         ------

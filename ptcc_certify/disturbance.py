@@ -293,11 +293,41 @@ class Disturbance(ABC):
 
     @abstractmethod
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
-        """Return ``d_k(t)`` for instants (M,) and agents (A,) with ``sign(sigma_k)`` (A,): floats (A, M)."""
+        """Return ``d_k(t)`` at instants, for agents whose sliding variables have given signs.
+
+        Parameters
+        ----------
+        t : (M,) array_like
+            Instants, in units of time.
+        agents : (A,) array_like of int
+            Counted from 0.
+        signs : (A,) array_like
+            ``sign(sigma_k)`` of these agents; only the adversary reads it.
+
+        Returns
+        -------
+        (A, M) array
+        """
 
     @abstractmethod
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Return how ``|d_k| <= delta`` was established on [0, until] for the agents of these labels.
+
+        Parameters
+        ----------
+        delta : Fraction
+            The bound, in units of the input.
+        labels : sequence of N str
+            The agents, by which a message names them.
+        until : float
+            In units of time.
+        slack : float
+            Relative excess that is let pass, for the rounding of floats.
+
+        Returns
+        -------
+        str
+            In words: "interval arithmetic", "by definition", ...
 
         Raises
         ------
@@ -306,11 +336,35 @@ class Disturbance(ABC):
         """
 
     def breaks(self, until: float) -> np.ndarray:
-        """Return the ascending instants in (0, until) where a signal or its slope may jump; none by default."""
+        """Return the ascending instants in (0, until) where a signal or its slope may jump; none by default.
+
+        Parameters
+        ----------
+        until : float
+            In units of time.
+
+        Returns
+        -------
+        (B,) array
+        """
         return np.empty(0)
 
     def linear(self, t0: float, t1: float, agents: ArrayLike, signs: ArrayLike) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return ``a`` and ``b`` (A,) with ``d = a + b t`` between neighbouring breaks; None if it is not linear."""
+        """Return ``a`` and ``b`` (A,) with ``d = a + b t`` between neighbouring breaks; None if it is not linear.
+
+        Parameters
+        ----------
+        t0, t1 : float
+            Ends of an interval without a break inside, in units of time.
+        agents : (A,) array_like of int
+            Counted from 0.
+        signs : (A,) array_like
+            ``sign(sigma_k)`` of these agents.
+
+        Returns
+        -------
+        pair of (A,) arrays, or None
+        """
         return None
 
 
@@ -326,6 +380,13 @@ class ExpressionDisturbance(Disturbance):
     ----------
     text_or_texts : str or sequence of str
         One expression for all agents, or one for each; at most 1,000 characters and 50 levels of nesting.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        The expressions, blanks aside.
+    common : bool
+        Whether one expression is for all agents.
 
     Raises
     ------
@@ -474,14 +535,19 @@ class SampledDisturbance(Disturbance):
 
     Parameters
     ----------
-    times : array_like (M,)
-        Ascending, not negative.
-    values : array_like (M,) or (N, M)
-        Common to all agents, or one row for each.
+    times : (M,) array_like
+        Ascending, not negative; in units of time.
+    values : (M,) or (N, M) array_like
+        Common to all agents, or one row for each; in units of the input.
     hold : bool
         Keep each value until the next instant instead.
     text : str, optional
         The description.
+
+    Attributes
+    ----------
+    samples : (1, M) or (N, M) array
+        The values, one row for each signal.
 
     Raises
     ------
@@ -579,13 +645,19 @@ def telegraph_noise(amplitude: float, rate: float, n: int, until: float, seed: i
     Parameters
     ----------
     amplitude, rate : float
-        Not negative; ``rate`` is the mean number of switches of one agent per unit of time.
+        Not negative; ``amplitude`` in units of the input, ``rate`` is the mean number of switches of one agent per
+        unit of time.
     n : int
         Number of agents.
     until : float
-        Positive; the signals keep their last values from here on.
+        Positive, in units of time; the signals keep their last values from here on.
     seed : int
         Equal seeds give equal signals.
+
+    Returns
+    -------
+    SampledDisturbance
+        Constant between its switches.
 
     Raises
     ------
@@ -626,7 +698,22 @@ class Adversary(Disturbance):
     Parameters
     ----------
     delta : int, float, str or Fraction
-        Not negative.
+        Not negative; in units of the input.
+
+    Attributes
+    ----------
+    text : str
+        The description.
+
+    Raises
+    ------
+    ParameterError
+        ``delta`` is negative or not a number.
+
+    References
+    ----------
+    Equation (49) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances: of all ``|d_k| <= delta`` this one makes ``|sigma_k|'`` largest.
 
     Examples
     --------
@@ -693,7 +780,24 @@ class StateDependent(Disturbance):
         labels: Sequence[str],
         slack: float = TOLERANCE,
     ) -> np.ndarray:
-        """Return the disturbances (N,) at time ``t``, states ``x`` (N,) and sliding variables ``sigma`` (N,).
+        """Return the disturbances at one instant.
+
+        Parameters
+        ----------
+        t : float
+            In units of time.
+        x, sigma : (N,) arrays
+            States and sliding variables.
+        delta : Fraction
+            The bound, in units of the input.
+        labels : sequence of N str
+            The agents, by which a message names them.
+        slack : float
+            Relative excess that is let pass, for the rounding of floats.
+
+        Returns
+        -------
+        (N,) array
 
         Raises
         ------
@@ -714,7 +818,13 @@ class StateDependent(Disturbance):
         return values
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
-        """Refuse: without the state there is no value; use :meth:`at`."""
+        """Refuse: without the state there is no value; use :meth:`at`.
+
+        Raises
+        ------
+        ParameterError
+            Always.
+        """
         raise ParameterError(f"{self.text}: a disturbance that depends on the state has no values without it; use at")
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:

@@ -137,14 +137,35 @@ class Effort:
     energy, path_length : Witness or None
         Bounds of ``int ||u||^2 dt`` and ``int ||u|| dt`` (of the nominal part).
     sliding : SlidingPart or None
+        Bounds of the sliding part of the input; None under the nominal protocol, or if ``sigma(0)`` is not known.
     residual : tuple of Limited
         Of those limits under which something is certified.
     longest_period : Fraction or None
         Where sampling is not certified: a period, with the same largest gain, up to which it would be.
     disturbed : Disturbed or None
+        What disturbances within ``delta`` add under the nominal protocol; None if none was given.
     first : Fraction or None
         Nominal protocol: ``sup max_k |u_k(0)|`` over the starts, exactly, which no peak falls below; None for an
         ellipsoid.
+
+    Notes
+    -----
+    ``u(t) = -gain(t) L e^(-L s(t)) X(0)`` before the deadline, and ``gain e^(-lambda s)`` stays bounded iff
+    ``rho2 kappa Re lambda >= 1``: hence the threshold, where eigenvalues on that line must be semisimple. The bounds
+    follow from ``V <= e^(-rate s) V(0)`` and ``e_k^2 <= c_k V``.
+
+    References
+    ----------
+    The protocols (4) and (48) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> effort = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False).effort
+    >>> effort.bounded, [float(bound) >= 1 for bound in effort.threshold], float(effort.first)
+    (True, [True, True], 8.0)
     """
 
     bounded: bool | None
@@ -192,6 +213,18 @@ class Effort:
 def starts_within(structure: Structure, bound: Any) -> Starts:
     """Return all starts with ``||X(0)||_inf <= bound``.
 
+    Parameters
+    ----------
+    structure : Structure
+        Of N agents.
+    bound : int, float, str or Fraction
+        Positive, at most 1e300.
+
+    Returns
+    -------
+    Starts
+        A box about 0.
+
     Raises
     ------
     ParameterError
@@ -217,6 +250,22 @@ def starts_within(structure: Structure, bound: Any) -> Starts:
 def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     """Return all starts with ``low_k <= x_k(0) <= high_k``.
 
+    Parameters
+    ----------
+    low, high : sequences of N numbers
+        Ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+
+    Returns
+    -------
+    Starts
+
+    Raises
+    ------
+    ParameterError
+        The lengths differ, or a lower end exceeds its upper end.
+    NumberError
+        An end is not a number of the exact grammar.
+
     Examples
     --------
     >>> box([0, 1], [2, 1])
@@ -232,6 +281,23 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
 
 def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
     """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
+
+    Parameters
+    ----------
+    center : sequence of N numbers
+    axes : sequence of sequences of N numbers
+        One semi-axis or more; they need not be orthogonal.
+
+    Returns
+    -------
+    Starts
+
+    Raises
+    ------
+    ParameterError
+        There is no axis, or one of another length than ``center``.
+    NumberError
+        A number is not of the exact grammar.
 
     Examples
     --------
@@ -588,9 +654,23 @@ class WorstStart:
     agent : int
         Whose input is largest.
     t : float
-        When.
+        When, in units of time.
     size : float
-        ``|u_agent(t)|``.
+        ``|u_agent(t)|``, in units of the input.
+
+    References
+    ----------
+    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> follower = analyse(SignedDigraph.from_edges([(1, 2, -2)]))
+    >>> worst_start(follower, NominalProtocol(1, 1, 1, 1), box([0, 0], [1, 1]))
+    WorstStart(x0=array([1., 1.]), agent=1, t=0.0, size=8.0)
     """
 
     x0: np.ndarray
@@ -606,6 +686,27 @@ def worst_start(
 
     ``u(t) = -gain L e^(-L s) X(0)`` is linear in the start: at each of ``samples`` instants, evenly spaced in
     ``z = ln(T/(T - t))`` up to ``latest``, the maximum over the set is exact.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of N agents.
+    protocol : NominalProtocol or SlidingModeProtocol
+    starts : Starts
+        Of N numbers.
+    samples : int
+        Number of instants.
+    latest : float
+        ``ln(T/(T - t))`` of the last one, dimensionless.
+
+    Returns
+    -------
+    WorstStart
+
+    References
+    ----------
+    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------

@@ -6,28 +6,89 @@ A message is one line: what is wrong, where, and how to mend it.
 
 
 class PTCCError(Exception):
-    """Root of all errors raised by ``ptcc_certify``."""
+    """Root of all errors raised by ``ptcc_certify``.
+
+    Examples
+    --------
+    >>> import ptcc_certify as ptcc
+    >>> try:
+    ...     ptcc.NominalProtocol(T=0, rho1=1, rho2=1, kappa=1)
+    ... except ptcc.PTCCError as error:
+    ...     print(type(error).__name__)
+    ParameterError
+    """
 
 
 class NumberError(PTCCError, ValueError):
-    """A text is not a number of the exact grammar (see :mod:`ptcc_certify.rationals`)."""
+    """A text is not a number of the exact grammar (see :mod:`ptcc_certify.rationals`).
+
+    Examples
+    --------
+    >>> from ptcc_certify.rationals import parse_exact
+    >>> parse_exact("1/0")
+    Traceback (most recent call last):
+    ptcc_certify.errors.NumberError: "1/0" divides by zero
+    """
 
 
 class GraphError(PTCCError, ValueError):
-    """The data do not describe a signed digraph."""
+    """The data do not describe a signed digraph.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph
+    >>> SignedDigraph.from_edges([("a", "b", 0)])
+    Traceback (most recent call last):
+    ptcc_certify.errors.GraphError: weight 0 of edge a -> b: an unknown sign is not an edge; remove it or give a weight
+    """
 
 
 class FormatError(GraphError):
-    """A file cannot be read as a graph, a start or a certificate; the message names file and line."""
+    """A file cannot be read as a graph, a start or a certificate; the message names file and line.
+
+    Examples
+    --------
+    >>> from io import StringIO
+    >>> from ptcc_certify import read_graph
+    >>> read_graph(StringIO("a,a,1"))
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: input, line 1: self-loop at node a; remove it, or drop all with --drop-self-loops
+    """
 
 
 class ParameterError(PTCCError, ValueError):
-    """A protocol parameter, a start or an option is outside its domain."""
+    """A protocol parameter, a start or an option is outside its domain.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol
+    >>> NominalProtocol(T=-1, rho1=1, rho2=1, kappa=1)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: T = -1 is outside its domain; T must be > 0
+    """
 
 
 class HypothesisError(PTCCError, ValueError):
-    """A theorem or lemma is asked about a graph or matrix that does not meet its hypotheses."""
+    """A theorem or lemma is asked about a graph or matrix that does not meet its hypotheses.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, unbalanced_lyapunov
+    >>> unbalanced_lyapunov(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]))
+    Traceback (most recent call last):
+    ptcc_certify.errors.HypothesisError: Lemma 3.2 asks for a structurally unbalanced graph; this one is balanced
+    """
 
 
 class SimulationError(PTCCError, RuntimeError):
-    """The integrator failed; the message names the cause."""
+    """The integrator failed; the message names the cause.
+
+    Examples
+    --------
+    >>> from ptcc_certify import Actuator, NominalProtocol, SignedDigraph, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> held = Actuator(sample_period="0.001", gain_cap=2_000_000)  # far too long for such a gain
+    >>> simulate(foes, NominalProtocol(T=1, rho1=1_000_000, rho2=1, kappa=1), [3, 1], actuator=held)
+    Traceback (most recent call last):
+    ptcc_certify.errors.SimulationError: the sampled run grows beyond the range of floats; take a shorter sample_period
+    """

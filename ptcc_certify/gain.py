@@ -48,6 +48,11 @@ class Gain:
     ParameterError
         Names the parameter, its value and its domain.
 
+    References
+    ----------
+    Lemma 6 and equation (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
     Examples
     --------
     >>> gain = Gain(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
@@ -155,7 +160,22 @@ class Gain:
     ) -> str:
         r"""Return the LaTeX of the expression itself, with the parameters as numbers or as letters.
 
-        ``letters`` names ``T``, ``rho1``, ``rho2`` and ``kappa``, for a gain whose parameters are called otherwise.
+        Parameters
+        ----------
+        of : {"gain", "phi", "clock"}
+        numbers : bool
+            Print the values of the parameters; otherwise their letters.
+        letters : four str
+            What to call ``T``, ``rho1``, ``rho2`` and ``kappa``, for a gain whose parameters are called otherwise.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ParameterError
+            ``of`` is another word.
 
         Examples
         --------
@@ -210,12 +230,17 @@ def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Ex
 
     Parameters
     ----------
-    V0, t : float or array
-        Broadcast against each other; ``t >= 0``.
+    V0, t : float or array of any shapes
+        Broadcast against each other; ``t >= 0`` in units of time.
     a, b : float
         Positive; 1/time and 1.
     T, kappa : int, float, str or Fraction
-        Positive.
+        Positive; ``T`` in units of time.
+
+    Returns
+    -------
+    array
+        Of the shape to which ``V0`` and ``t`` broadcast, in units of ``V0``.
 
     Raises
     ------

@@ -266,6 +266,7 @@ class Starts:
     Attributes
     ----------
     center : N numbers
+        In units of the states, like all others.
     radius : N numbers
         ``|x_k - center_k| <= radius_k``; empty for a point or an ellipsoid.
     axes : vectors of N numbers
@@ -288,7 +289,18 @@ class Starts:
         return not any(self.radius) and not self.axes
 
     def largest(self, row: Linear) -> Fraction:
-        """Bound the size of a linear function over the set."""
+        """Bound the size of a linear function over the set.
+
+        Parameters
+        ----------
+        row : mapping of int to Fraction
+            The coefficients ``a_j`` of ``sum_j a_j x_j`` that are not 0.
+
+        Returns
+        -------
+        Fraction
+            Exact for a point or a box, rounded up for an ellipsoid.
+        """
         size = abs(sum((x * self.center[j] for j, x in row.items()), Fraction(0)))
         if self.radius:
             size += sum((abs(x) * self.radius[j] for j, x in row.items()), Fraction(0))

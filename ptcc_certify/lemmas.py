@@ -300,6 +300,16 @@ def dyadic_left_vector(graph: SignedDigraph, p: np.ndarray | None = None) -> lis
 def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
     """Lemma 2.3 in exact rationals (see :func:`left_vector`); for graphs of at most ``EXACT_NODES`` nodes.
 
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Strongly connected.
+
+    Returns
+    -------
+    list of N Fraction
+        Positive, of sum 1.
+
     Raises
     ------
     HypothesisError
@@ -358,6 +368,16 @@ def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) ->
 def unbalanced_lyapunov(graph: SignedDigraph) -> lmi.DiagonalCertificate:
     """Lemma 3.2: a diagonal ``Omega > 0`` with ``Omega L + L' Omega > 0`` of an unbalanced strong graph.
 
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Strongly connected and structurally unbalanced.
+
+    Returns
+    -------
+    lmi.DiagonalCertificate
+        Of the best margin; its ``rate`` is per unit of the clock, in floating point.
+
     Raises
     ------
     HypothesisError
@@ -397,6 +417,16 @@ def unbalanced_diagonal(graph: SignedDigraph) -> np.ndarray:
 
 def follower_lyapunov(structure: Structure) -> lmi.DiagonalCertificate:
     """Lemmas 7, 9.1: ``L_F`` is a nonsingular H-matrix; some diagonal ``Xi_F > 0`` has ``Xi_F L_F + L_F' Xi_F > 0``.
+
+    Parameters
+    ----------
+    structure : Structure
+        With followers.
+
+    Returns
+    -------
+    lmi.DiagonalCertificate
+        Of the best margin; its ``rate`` is per unit of the clock, in floating point.
 
     Raises
     ------
@@ -448,6 +478,20 @@ def containment_weights(structure: Structure) -> np.ndarray:
 
 def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
     """Lemmas 8 and 9.2 in exact rationals (see :func:`containment_weights`), as rows.
+
+    Parameters
+    ----------
+    structure : Structure
+
+    Returns
+    -------
+    list of N_F lists of Fraction
+        One entry for each balanced closed component.
+
+    Raises
+    ------
+    HypothesisError
+        The followers' block is singular, which Lemma 9 excludes.
 
     Examples
     --------

@@ -52,6 +52,20 @@ class Influence:
         followers times components are more than ``MANY_PULLS``.
     exact : bool
         Whether the numbers are rationals.
+
+    References
+    ----------
+    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+    Altafini, Consensus problems on networks with antagonistic interactions, IEEE Trans. Automat. Control 58 (2013).
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> who = influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])))
+    >>> who.pulls, who.apply([Fraction(1), Fraction(0), Fraction(2)])[0][1]  # of a and b on c, whose x is forgotten
+    (((Fraction(1, 4), Fraction(-3, 4)),), Fraction(-5, 4))
     """
 
     structure: Structure
@@ -66,6 +80,16 @@ class Influence:
 
     def row(self, node: int) -> dict[int, Number]:
         """Return the row of ``Q`` of one node as ``{leader index: weight}``.
+
+        Parameters
+        ----------
+        node : int
+            Its index.
+
+        Returns
+        -------
+        dict of int to Fraction or float
+            Empty for a node that ends at 0 from every start.
 
         Examples
         --------
@@ -89,7 +113,18 @@ class Influence:
         return result
 
     def apply(self, x0: Sequence[Number]) -> tuple[list[Number], list[Number]]:
-        """Return ``Q x0`` and the consensus values ``c_k`` of the balanced closed components."""
+        """Return ``Q x0`` and the consensus values ``c_k`` of the balanced closed components.
+
+        Parameters
+        ----------
+        x0 : sequence of N numbers
+            Rational if ``exact``.
+
+        Returns
+        -------
+        final_state : list of N numbers
+        consensus_values : list of numbers
+        """
         zero: Number = Fraction(0) if self.exact else 0.0
         values = [
             sum((w * x0[v] for v, w in zip(component.nodes, voice, strict=True)), zero)
@@ -139,6 +174,23 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
     structure : Structure
     exact : bool, optional
         Rationals or floats; by default rationals for graphs of at most ``EXACT_NODES`` nodes.
+
+    Returns
+    -------
+    Influence
+
+    References
+    ----------
+    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> foes = analyse(SignedDigraph.from_edges([(1, 2, -3), (2, 1, -1)]))
+    >>> influence(foes).voices  # they meet at (3 x_1 - x_2)/4 and its opposite
+    ((Fraction(3, 4), Fraction(-1, 4)),)
     """
     graph = structure.graph
     exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
@@ -179,6 +231,7 @@ class Outcome:
     Attributes
     ----------
     labels : tuple of str
+        The N agents.
     final_state : tuple of Fraction or float
         ``Q X(0)``, exact for small graphs.
     consensus_values : tuple
@@ -187,6 +240,22 @@ class Outcome:
         1-based numbers of the closed components that meet at 0 although they are balanced: the special starts with
         ``eta' G X(0) = 0``, for which the consensus value of Definitions 3 to 5 is not positive.
     influence : Influence
+        ``Q``, factored.
+
+    References
+    ----------
+    Definitions 2 to 5; Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> end = outcome(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
+    >>> end
+    Outcome(1=1, 2=-1, 3=-1)
+    >>> end.consensus_values, end.degenerate
+    ((Fraction(1, 1),), ())
     """
 
     labels: tuple[str, ...]
@@ -233,6 +302,11 @@ def outcome(
     ------
     ParameterError
         Wrong length, or an entry that is not a finite number.
+
+    References
+    ----------
+    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------
@@ -298,10 +372,28 @@ def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -
     tolerance : float
         Relative to the largest ``|E|`` of the run.
 
+    Returns
+    -------
+    bool
+        False refutes prescribed-time stability; True does not prove it.
+
     Raises
     ------
     HypothesisError
         The deadline is not among the samples.
+
+    References
+    ----------
+    Definition 1 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1])
+    >>> is_prescribed_time_stable(run)
+    True
     """
     if trajectory.deadline_index is None:
         raise HypothesisError("the trajectory has no sample at a deadline, so the definition does not apply")
@@ -320,6 +412,15 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     tolerance : float
         0 asks for equality, which makes sense for exact outcomes.
 
+    Returns
+    -------
+    bool
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
     Examples
     --------
     >>> from ptcc_certify.graph import SignedDigraph
@@ -334,6 +435,23 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
 def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     """Definition 3: ``|x_k| = x*`` for all agents, with ``x* > 0`` (see :func:`is_stability` for parameters).
 
+    Parameters
+    ----------
+    x : sequence of N numbers, Outcome or Trajectory
+        See :func:`is_stability`.
+    structure : Structure
+    tolerance : float
+        0 asks for equality, which makes sense for exact outcomes.
+
+    Returns
+    -------
+    bool
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
     Examples
     --------
     >>> from ptcc_certify.graph import SignedDigraph
@@ -347,6 +465,23 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
 
 def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     """Definition 4: ``|x_k| = x_f > 0`` for all leaders, ``|x_l| <= x_f`` for all followers; one closed component.
+
+    Parameters
+    ----------
+    x : sequence of N numbers, Outcome or Trajectory
+        See :func:`is_stability`.
+    structure : Structure
+    tolerance : float
+        0 asks for equality, which makes sense for exact outcomes.
+
+    Returns
+    -------
+    bool
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------
@@ -368,6 +503,23 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
 
 def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     """Definition 5: balanced closed components in bipartite consensus, unbalanced at 0, followers within the leaders.
+
+    Parameters
+    ----------
+    x : sequence of N numbers, Outcome or Trajectory
+        See :func:`is_stability`.
+    structure : Structure
+    tolerance : float
+        0 asks for equality, which makes sense for exact outcomes.
+
+    Returns
+    -------
+    bool
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------

@@ -36,9 +36,10 @@ class NominalProtocol:
     Parameters
     ----------
     T, rho1, kappa : int, float, str or Fraction
-        Positive; kept as exact rationals, a text obeys the exact grammar.
+        Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
+        1/time/weight.
     rho2 : int, float, str or Fraction
-        Not negative.
+        Not negative, 1/weight.
 
     Raises
     ------
@@ -184,13 +185,13 @@ class SlidingModeProtocol:
     Parameters
     ----------
     T_r, T_s : int, float, str or Fraction
-        Time to reach the sliding manifold, and time to settle on it; positive.
+        Time to reach the sliding manifold, and time to settle on it; positive, in units of time.
     rho1, rho2, kappa : int, float, str or Fraction
-        Of the nominal gain; positive.
+        Of the nominal gain; positive. ``rho1`` in 1/time/weight, ``rho2`` in 1/weight.
     mu1, mu2, mu3 : int, float, str or Fraction
         Positive; ``mu1 > delta``. ``mu1`` in units of the input, ``mu2`` in 1/time.
     delta : int, float, str or Fraction
-        Bound of every disturbance, not negative.
+        Bound of every disturbance, not negative, in units of the input.
 
     Raises
     ------
@@ -329,6 +330,20 @@ class SlidingModeProtocol:
 
     def latex(self, graph: SignedDigraph | None = None) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions; see :meth:`NominalProtocol.latex`.
+
+        Parameters
+        ----------
+        graph : SignedDigraph, optional
+            At most 20 nodes: the rows of every agent, with numbers. Without a graph the row of an agent k, in letters.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ParameterError
+            The graph has more than 20 nodes.
 
         Examples
         --------

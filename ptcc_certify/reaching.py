@@ -48,9 +48,22 @@ class ReachingTime:
     Attributes
     ----------
     deadline : Fraction
-        ``T_r``.
+        ``T_r``, in units of time.
     z : Fraction or None
         ``ln(T_r/(T_r - t))`` of the instant; None where only ``T_r`` itself is certain.
+
+    References
+    ----------
+    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances, bounds the norm of all sliding variables; each by itself follows from their equation (49).
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols import SlidingModeProtocol
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3="1/2", delta=1)
+    >>> small, large = certified_reaching_times(p, [Fraction(1), Fraction(100)])
+    >>> small.time < 1, large.time, large.z is None  # the adversary keeps the large one away from 0 until T_r
+    (True, 1.0, True)
     """
 
     deadline: Fraction
@@ -95,6 +108,11 @@ def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fra
     -------
     tuple of N ReachingTime
         Above the least provable instant by a part in 10^12, as a rule.
+
+    References
+    ----------
+    Equation (49) and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------

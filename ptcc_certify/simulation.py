@@ -85,17 +85,17 @@ def simulate(
     actuator : Actuator, optional
         Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
     delta : int, float, str or Fraction, optional
-        Nominal protocol: the bound of the disturbance, needed with it.
+        Nominal protocol: the bound of the disturbance, needed with it; in units of the input.
     noise, noise_bound : optional
         Nominal protocol: what is added to every measurement, and its bound, like ``disturbance`` and ``delta``; with
         an actuator that bounds the gain.
     times : increasing numbers >= 0, optional
-        The instants wanted. One that a float cannot tell from ``T`` counts as ``T``.
+        The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
     remaining, samples : float, int
         Without ``times``: ``samples`` instants uniform in ``tau`` from ``1 - t/T = 1`` to ``remaining`` and half as
         many uniform in t (with ``rho2 = 0``: ``samples`` uniform in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
     past : float
-        Without ``times``: go on to ``T (1 + past)``.
+        Without ``times``: go on to ``T (1 + past)``; dimensionless.
     rtol, atol : float
         Tolerances of CVODES; ``atol`` is relative to the largest entry of each column of ``x0``, or to ``delta T`` or
         ``noise_bound`` of the nominal protocol if that is larger.
@@ -111,6 +111,11 @@ def simulate(
         ``x0`` has a wrong shape or an entry that is not finite, or an option is outside its domain.
     SimulationError
         The integrator failed, or a sampled run outgrew floats; the message names the cause.
+
+    References
+    ----------
+    The networks (2) and (3) under the protocols (4) and (47)-(48) of Zhu et al., Robust prescribed-time coordination
+    control of cooperative-antagonistic networks with disturbances.
 
     Examples
     --------

@@ -46,6 +46,21 @@ class SymbolicLyapunov:
         What the proof says ``V_dot`` is: ``-gain z'(Omega A + A' Omega)z``.
     bounding_form : casadi.SX
         What the proof bounds it by: ``-gain z'Sz`` with ``S`` the matrix whose smallest eigenvalue gives the rate.
+
+    References
+    ----------
+    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
+    >>> form = symbolic_lyapunov(st, theorem_for(st).lyapunov(st), NominalProtocol(T=1, rho1=1, rho2=0, kappa=1))
+    >>> import casadi as ca
+    >>> [float(ca.substitute(V, form.x, ca.DM([1, 3]))) for V in (form.V, form.V_dot)]  # V' = -8 V, gain 1
+    [64.0, -512.0]
     """
 
     protocol: NominalProtocol
@@ -102,6 +117,11 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
     Returns
     -------
     SymbolicLyapunov
+
+    References
+    ----------
+    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
 
     Examples
     --------
@@ -169,6 +189,20 @@ class SymbolicSliding:
         By CasADi's differentiation of ``V`` along the closed loop.
     bounding_form : casadi.SX
         ``-(mu1 - delta) sum |sigma_k| - (reaching gain) sigma'sigma``, above ``V_dot`` for every ``|d_k| <= delta``.
+
+    References
+    ----------
+    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
+    >>> import casadi as ca
+    >>> float(ca.substitute(form.V, ca.vertcat(form.x, form.varsigma), ca.DM([1, 2, 0, -4])))  # sigma = (1, -2)
+    2.5
     """
 
     protocol: SlidingModeProtocol
@@ -187,6 +221,16 @@ class SymbolicSliding:
 
 def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> SymbolicSliding:
     """Write ``sigma``, ``V`` and ``V'`` of Proposition 1 as CasADi expressions.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        N agents.
+    protocol : SlidingModeProtocol
+
+    Returns
+    -------
+    SymbolicSliding
 
     Examples
     --------

@@ -51,11 +51,16 @@ def check(
 
     Parameters
     ----------
-    source : path, or the parsed JSON object
+    source : str, Path or mapping
+        A path, or the parsed JSON object.
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
-    files : mapping from name to bytes, optional
-        The side files, in place of those in the folder of the certificate.
+    files : mapping of str to bytes, optional
+        The side files by name, in place of those in the folder of the certificate.
+
+    Returns
+    -------
+    CheckReport
 
     Raises
     ------

@@ -88,10 +88,19 @@ class CheckReport:
     rejected : str or None
         The obligation, or the part of the document, that was not.
     reason : str or None
+        Why it was not.
     arithmetic : str
         What the numbers were computed with.
     sha256 : str
         Of the graph.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, check
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> document = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
+    >>> check(document).accepted, check(document | {"verdict": "undecided"}).rejected
+    (True, 'verdict')
     """
 
     accepted: bool

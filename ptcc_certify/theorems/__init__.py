@@ -18,6 +18,7 @@ _NOMINAL: tuple[Theorem, ...] = (
     UnbalancedWeak(),
 )
 _SLIDING: tuple[Theorem, ...] = tuple(map(SlidingMode, _NOMINAL))
+#: All twelve rows, 1.1 to 3.2 for the nominal and 4.1 to 6.2 for the sliding-mode protocol; see :class:`Theorem`.
 THEOREMS: tuple[Theorem, ...] = (*_NOMINAL, *_SLIDING)
 
 __all__ = [
@@ -39,6 +40,11 @@ def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
     ----------
     structure : Structure
     protocol : {"nominal", "sliding-mode"}
+
+    Returns
+    -------
+    Theorem
+        One of :data:`THEOREMS`.
 
     Examples
     --------
