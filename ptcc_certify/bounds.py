@@ -202,6 +202,21 @@ class Comparison:
         the integrator's floor of the largest state; None without constants.
     reaching_kept : bool or None
         Sliding mode: whether every sliding variable was 0 at its certified reaching time.
+
+    References
+    ----------
+    Theorems 1 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+
+    >>> comparison = certify(pair, protocol, [3, 1]).comparison
+    >>> comparison.violated, comparison.worst_ratio <= 1, comparison.deadline_resolved
+    (False, True, True)
     """
 
     worst_ratio: float
@@ -240,6 +255,23 @@ class Envelope:
     structure : Structure
     gain : Gain
     members : tuple of Member
+
+    References
+    ----------
+    Theorems 1 to 3 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+
+    >>> envelope = certify(pair, protocol, [3, 1], simulation=False).envelope
+    >>> 0 < envelope.residual(0.01) < 0.01  # what may be left at 0.99 T
+    True
+    >>> bool(envelope.distance(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)
+    True
     """
 
     structure: Structure
@@ -264,13 +296,13 @@ class Envelope:
 
         Parameters
         ----------
-        clock : float or array
+        clock : float or (M,) array
             Values of the stretched clock, infinite from the deadline on.
 
         Returns
         -------
         array
-            Infinite where nothing was proved: an envelope without members bounds nothing.
+            Of the shape of ``clock``; infinite where nothing was proved: an envelope without members bounds nothing.
         """
         clock = np.asarray(clock, dtype=float)
         factors = [_grown(math.sqrt(m.prefactor), m.rate, clock) for m in self._in_norm]
@@ -281,10 +313,27 @@ class Envelope:
         return float(self.norm_factor(self.gain.clock_at_remaining(remaining)))
 
     def bound(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
-        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``."""
+        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``.
+
+        Parameters
+        ----------
+        clock : (M,) array or float
+            Values of the stretched clock, infinite from the deadline on.
+        x0 : sequence of N numbers
+            Rationals are taken exactly, floats as the dyadic numbers they are.
+
+        Returns
+        -------
+        (M,) array or float
+            Infinite where nothing was proved.
+        """
         clock = np.asarray(clock, dtype=float)
         bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest), m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
+
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+        """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,)."""
+        return self.bound(np.array([float(self.gain.clock_at_remaining(q)) for q in remaining]), x0)
 
     def distance(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
@@ -352,6 +401,15 @@ class Envelope:
         holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
         in units of the start, so that no square overflows or vanishes. A run that begins later than 0 is judged from
         its first sample on.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of the same graph and protocol.
+
+        Returns
+        -------
+        Comparison
 
         Raises
         ------
@@ -431,7 +489,20 @@ class Envelope:
         return bounds, start
 
     def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
-        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start."""
+        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start.
+
+        Parameters
+        ----------
+        member : Member
+            Of this envelope.
+        trajectory : Trajectory
+            Of the same graph and protocol.
+
+        Returns
+        -------
+        list of History
+            One for each column of the states.
+        """
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         states = states / _sizes(states)
         z = member.coordinates_of(states, self._laplacian)

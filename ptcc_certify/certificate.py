@@ -7,7 +7,6 @@ again by the independent check; a simulation corroborates and never proves.
 
 from __future__ import annotations
 
-import html
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -46,7 +45,6 @@ from ptcc_certify.simulation import PAST, simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.sliding_simulation import rounding_slack
 from ptcc_certify.structure import Claim, Structure, analyse
-from ptcc_certify.summary import certificate_lines
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
 from ptcc_certify.trajectory import Trajectory
 
@@ -87,9 +85,9 @@ class Certificate:
     proof : RateProof
         The proved rate (None if not proved) and the statements proved for it.
     numerical_rate : float or None
-        The paper's rate in floating point; nothing is claimed about it.
+        The paper's rate in floating point, per unit of the clock; nothing is claimed about it.
     spectral_rate : float or None
-        ``2 min Re lambda`` in floating point: no certificate can reach further.
+        ``2 min Re lambda`` in floating point, per unit of the clock: no certificate can reach further.
     start : tuple of Fraction or None
     sigma0 : tuple of Fraction or None
         ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
@@ -109,17 +107,32 @@ class Certificate:
         A proved bound that no rate exceeds.
     method : str
     at : Fraction or None
-        Instant for which the bound was optimised.
+        Instant for which the bound was optimised, in units of time.
     starts : Starts or None
         The set of starts for which the input is bounded; None: that of ``start`` alone.
     limits : tuple of Limits
         Limits of the gain that are judged besides.
     delta : Fraction or None
-        Nominal protocol: bound of the disturbances that are judged besides.
+        Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
+
+    References
+    ----------
+    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+    >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
+    ('certified', 'bipartite consensus', '1.1')
+    >>> cert.outcome, bool(cert.rate <= cert.rate_limit), cert.checked.accepted
+    (Outcome(1=1, 2=-1), True, True)
     """
 
     structure: Structure
@@ -375,10 +388,7 @@ class Certificate:
         ParameterError
             The certificate has no start.
         """
-        envelope, start = self.envelope, self._known_start()
-        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
-            return envelope.state_bound(np.asarray(remaining, dtype=float), start)
-        return envelope.bound(self._clocks(remaining), start)
+        return self.envelope.norm_bound(remaining, self._known_start())
 
     def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the start, (N, M), at the instants where ``1 - t/T`` is ``remaining``.
@@ -422,6 +432,15 @@ class Certificate:
         """Write the certificate to ``path``; the file appears whole or not at all.
 
         Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Raises
+        ------
+        FormatError
+            The file cannot be written.
         """
         document, written = self._document(self.verdict)
         for name, content in written.files.items():
@@ -430,8 +449,9 @@ class Certificate:
         write_atomically(path, _json(document).encode("utf-8", "backslashreplace"))
 
     def _repr_html_(self) -> str:
-        """Show the screen of ``ptcc certify`` in a notebook."""
-        return f"<pre>{html.escape(chr(10).join(certificate_lines(self, 'graph')))}</pre>"
+        from ptcc_certify.display import certificate_html
+
+        return certificate_html(self)
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
@@ -474,14 +494,14 @@ def certify(
     method : {"best", "paper", "perron", "lmi", "full"}
         Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.sharpen`.
     at : number, optional
-        An instant before the deadline at which the bound should be smallest.
+        An instant before the deadline, in units of time, at which the bound should be smallest.
     starts : Starts or positive number, optional
         The set of starts for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
         ``||X(0)||_inf <= R``.
     limits : sequence of Actuator
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
     delta : number, optional
-        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded.
+        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.

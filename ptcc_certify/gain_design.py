@@ -92,13 +92,15 @@ class Design:
     binding : str
         The limit that binds, and how far off it is.
     max_input : Fraction
-        ``U``, of ``max_k |u_k|``, or of ``||u||_2``.
+        ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input, like ``peak``.
     input_norm : {2, None}
+        None: of every agent's input.
     starts : Starts
         For all of which it holds.
     asked_deadline, asked_residual : Fraction or None
+        What was asked for, in units of time and of the states.
     deadline : Fraction or None
-        ``T``; None if none was asked for and none is certified.
+        ``T``, in units of time; None if none was asked for and none is certified.
     protocol : NominalProtocol or None
         The gains; None unless the verdict is ``met``.
     limits : Limits or None
@@ -115,6 +117,19 @@ class Design:
         Below which ``U T`` is too small for all gains of the protocol, proved.
     lower_by : str
         Why.
+
+    References
+    ----------
+    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks
+    with disturbances. With ``rho1 T`` and ``rho2 kappa`` kept, the gain, and with it the input, scales as ``1/T``.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> found = design(pair, max_input=10, initial_bound=1, deadline=1)
+    >>> found.verdict, bool(found.shortest_possible <= found.shortest_certified <= 1)
+    ('met', True)
     """
 
     verdict: str
@@ -169,6 +184,15 @@ class Design:
 
         The gains for a deadline ``T`` are those of ``protocol`` with ``rho1 T`` kept.
 
+        Parameters
+        ----------
+        deadlines : iterable of float
+            In units of time.
+
+        Returns
+        -------
+        TradeOff
+
         Examples
         --------
         >>> from ptcc_certify.graph import SignedDigraph
@@ -184,7 +208,18 @@ class Design:
         return TradeOff(T, certified, lower)
 
     def deadlines(self, count: int = 61) -> np.ndarray:
-        """Return deadlines about the one that was found or asked for, evenly spaced in their logarithms."""
+        """Return deadlines about the one that was found or asked for, evenly spaced in their logarithms.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+
+        Returns
+        -------
+        (count,) array
+            In units of time.
+        """
         known = (self.deadline, self.shortest_certified, self.shortest_possible, Fraction(1))
         middle = nearest_float(next(T for T in known if T))
         return np.geomspace(middle / 5, middle * 5, count)
@@ -246,9 +281,9 @@ class Design:
         }
 
     def _repr_html_(self) -> str:
-        import html
+        from ptcc_certify.display import design_html
 
-        return f"<pre>{html.escape(chr(10).join(self.lines()))}</pre>"
+        return design_html(self)
 
     def __repr__(self) -> str:
         if self.protocol is None or self.peak is None:
@@ -299,7 +334,7 @@ def design(
     initial_bound : int, float, str, Fraction or Starts
         All starts with ``||X(0)||_inf`` up to this; or another set.
     deadline : int, float, str or Fraction, optional
-        ``T``: the gains with the smallest peak are sought. Without it the shortest one is.
+        ``T``, in units of time: the gains with the smallest peak are sought. Without it the shortest one is.
     residual : int, float, str or Fraction, optional
         Positive: how far every agent may be from its outcome at the deadline. Then the gain may be capped.
     input_norm : {2}, optional
@@ -314,6 +349,11 @@ def design(
     ------
     ParameterError
         A number that is not positive, another norm, or starts of the wrong length.
+
+    References
+    ----------
+    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks
+    with disturbances. With ``rho1 T`` and ``rho2 kappa`` kept, the gain, and with it the input, scales as ``1/T``.
 
     Examples
     --------

@@ -102,10 +102,23 @@ class SignedDigraph:
         Node labels in index order: by value when all are integers, otherwise by first appearance.
     source, target : (n_edges,) int array
         Information flows from ``source`` to ``target``: the target listens.
+    weights : (n_edges,) float64 array
+        The weights, each rounded once; the constructor takes them exactly.
     sign : (n_edges,) int8 array
         +1 ally, -1 opponent.
     read : mapping
         How the data were read: ``orientation``, ``duplicates``, ``self_loops``, ``undirected``, ``notes``.
+
+    Raises
+    ------
+    GraphError
+        There is no node, two nodes bear one label, a weight is zero, an edge occurs twice or is a loop.
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+    Altafini, Consensus problems on networks with antagonistic interactions, IEEE Trans. Automat. Control 58 (2013).
 
     Examples
     --------
@@ -251,6 +264,12 @@ class SignedDigraph:
             object array may be Fractions.
         labels : iterable of N labels, optional
             ``1 .. N`` by default.
+
+        Raises
+        ------
+        GraphError
+            The matrix is not square, a diagonal entry is not zero, an entry is not a finite number, or there are not N
+            different labels.
 
         Examples
         --------
@@ -406,7 +425,17 @@ class SignedDigraph:
         return rows
 
     def exact_rows(self, nodes: Iterable[int]) -> list[dict[int, Fraction]]:
-        """Return rows of the signed Laplacian as ``{column: rational}``, without zeros."""
+        """Return rows of the signed Laplacian as ``{column: rational}``, without zeros.
+
+        Parameters
+        ----------
+        nodes : iterable of int
+            Indices of the rows.
+
+        Returns
+        -------
+        list of dict of int to Fraction
+        """
         start = np.searchsorted(self.target, np.arange(self.n_nodes + 1))
         rows = []
         for node in nodes:
@@ -457,6 +486,11 @@ class SignedDigraph:
 
     def __hash__(self) -> int:
         return hash(self.sha256)
+
+    def _repr_html_(self) -> str:
+        from ptcc_certify.display import graph_html
+
+        return graph_html(self)
 
     def __repr__(self) -> str:
         negative = int((self.sign < 0).sum())

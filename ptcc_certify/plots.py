@@ -1,31 +1,46 @@
-"""Figures: Axes in, Axes out. Nothing is shown or saved here."""
+"""Figures: Axes in, Axes out, and how they are saved.
+
+Without ``ax`` a figure of one column is made in the style of ``ptcc.mplstyle``; for figures of your own
+``plt.style.use("ptcc_certify.ptcc")``, with ``figsize=ptcc.SINGLE_COLUMN`` or ``ptcc.DOUBLE_COLUMN``.
+"""
 
 from __future__ import annotations
 
+import functools
+import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.bounds import FLOOR_FACTOR
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.rationals import shorten
-from ptcc_certify.sharpen import Sharpening
 from ptcc_certify.structure import Structure
 from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
     from ptcc_certify.certificate import Certificate
+    from ptcc_certify.effort import Effort
     from ptcc_certify.gain_design import Design
     from ptcc_certify.graph import SignedDigraph
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.reaching import ReachingTime
 
+#: Matplotlib's name of the style of all figures.
+STYLE = "ptcc_certify.ptcc"
+#: Width and height in inches of figures as wide as a column, or two, of a journal.
+SINGLE_COLUMN, DOUBLE_COLUMN = (3.5, 2.7), (7.16, 2.9)
+#: What figures are saved as; PDF and SVG are vectors.
+FIGURES = (".png", ".pdf", ".svg")
 #: Colour-blind safe (Okabe and Ito): first camp, second camp, unbalanced leaders, followers.
 CAMP_COLOURS = {
     "first camp": "#0072B2",
@@ -44,10 +59,65 @@ CLASS_MARKERS = {
 }
 #: Largest graph that is drawn, whose nodes are labelled, and whose layout is that of Kamada and Kawai.
 DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
+#: Horizontal axes of the decay, and their labels.
+_DECAY_AXES = {"left": "time left, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
+#: Colour and width, in points, of what marks the closed components of a graph.
+HALO = ("#DDDDDD", 22)
 #: Decades of the input that are drawn below its size at the start; changes of sign go further down.
 INPUT_DECADES = 3
 
 
+def _styled(plot: Callable[..., Any]) -> Callable[..., Any]:
+    """Draw in the style of :data:`STYLE`, unless the axes are given: these have a style of their own."""
+
+    @functools.wraps(plot)
+    def drawn(*args: Any, **options: Any) -> Any:
+        from matplotlib import style
+        from matplotlib.axes import Axes
+
+        if any(isinstance(value, Axes) for value in (*args, *options.values())):
+            return plot(*args, **options)
+        with style.context(STYLE):
+            return plot(*args, **options)
+
+    return drawn
+
+
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure to a file; it appears whole or not at all, and equal figures make equal files.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        ``.png`` (200 dots per inch), ``.pdf`` or ``.svg``.
+
+    Raises
+    ------
+    ParameterError
+        Another suffix.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, analyse
+    >>> ax = plot_graph(analyse(SignedDigraph.from_edges([(1, 2, -1)])))
+    >>> save_figure(ax.figure, "graph.jpg")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: graph.jpg: figures are written to .png, .pdf, .svg; choose one of these
+    """
+    from matplotlib import style
+
+    suffix = Path(path).suffix.lower()
+    if suffix not in FIGURES:
+        raise ParameterError(f"{path}: figures are written to {', '.join(FIGURES)}; choose one of these")
+    undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
+    buffer = io.BytesIO()
+    with style.context(STYLE):
+        figure.savefig(buffer, format=suffix[1:], metadata=undated)
+    write_atomically(path, buffer.getvalue())
+
+
+@_styled
 def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | None = None) -> Axes:
     """Draw ``x_k(t)`` with camps coloured, leaders thick, followers thin, and the deadline as a vertical line.
 
@@ -62,6 +132,14 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
     Returns
     -------
     Axes
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> [line.get_label() for line in plot_trajectory(run, analyse(pair)).lines]
+    ['first camp', 'second camp', 'deadline']
     """
     ax = _axes(ax)
     _draw_agents(trajectory, trajectory.states, structure, ax)
@@ -71,7 +149,14 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
     return ax
 
 
-def plot_run(trajectory: Trajectory, structure: Structure, reaching: Sequence[ReachingTime] | None = None) -> Figure:
+@_styled
+def plot_run(
+    trajectory: Trajectory,
+    structure: Structure,
+    reaching: Sequence[ReachingTime] | None = None,
+    *,
+    wide: bool = False,
+) -> Figure:
     """Draw the states; under the sliding-mode protocol with a reaching phase the sliding variables below them.
 
     Parameters
@@ -82,25 +167,38 @@ def plot_run(trajectory: Trajectory, structure: Structure, reaching: Sequence[Re
         Of the same graph.
     reaching : sequence of N ReachingTime, optional
         Proved reaching times.
+    wide : bool
+        As wide as two columns of a journal, instead of one.
 
     Returns
     -------
     Figure
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, analyse, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> len(plot_run(simulate(pair, p, [3, 5], sigma0=[1, 0]), analyse(pair)).axes)
+    2
     """
     from matplotlib.figure import Figure
 
+    width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
     if not isinstance(trajectory, SlidingTrajectory) or not trajectory.sigma0.any():
-        return plot_trajectory(trajectory, structure).figure  # type: ignore[return-value]
-    upper, lower = Figure(figsize=(6, 6.4), layout="constrained").subplots(2, 1)
+        return plot_trajectory(trajectory, structure, _axes(None, (width, height))).figure  # type: ignore[return-value]
+    figure = Figure((width, 2 * height), layout="constrained")
+    upper, lower = (new_axes(figure, (2, 1, row)) for row in (1, 2))
     plot_trajectory(trajectory, structure, upper)
     plot_sliding(trajectory, reaching, lower)
-    return upper.figure
+    return figure
 
 
+@_styled
 def plot_sliding(
     trajectory: SlidingTrajectory, reaching: Sequence[ReachingTime] | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw ``sigma_k(t)`` up to a little beyond ``T_r``, dots where each reaches 0, ticks where that is proved.
+    r"""Draw ``sigma_k(t)`` up to a little beyond ``T_r``, dots where each reaches 0, ticks where that is proved.
 
     Parameters
     ----------
@@ -112,6 +210,16 @@ def plot_sliding(
     Returns
     -------
     Axes
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, certified_reaching_times, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> run = simulate(pair, p, [3, 5], sigma0=[1, -4])
+    >>> ax = plot_sliding(run, certified_reaching_times(p, [1, -4]))
+    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    ['$\\sigma_k$ reaches 0', 'proved at the latest', '$T_r$']
     """
     ax, T_r = _axes(ax), float(trajectory.protocol.T_r)
     shown = trajectory.t <= 1.1 * T_r
@@ -130,17 +238,22 @@ def plot_sliding(
     return ax
 
 
-def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
-    """Draw ``||E(t)||`` of the simulated run under its proved bounds, on the axis ``1 - t/T``.
+@_styled
+def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = "left") -> Axes:
+    """Draw ``||E(t)|| / ||E(0)||`` of the simulated run under its proved bounds; the vertical axis is logarithmic.
 
-    Both axes are logarithmic; time runs to the right, towards the deadline. Dashed: the paper's certificate alone.
-    Grey: the integrator's floor. If only Theorem 1.1's own coordinates were proved, ``||eps(t)||`` instead.
+    Thick: the bound, the best of all proved Lyapunov functions at every instant. Thin: each of them. Dashed: the
+    paper's. Dotted: the integrator's floor, below which the run says nothing. If only Theorem 1.1's own coordinates
+    were proved, ``||eps(t)||`` instead.
 
     Parameters
     ----------
-    certificate : Certificate
+    certificate : Certificate or SavedCertificate
         With a trajectory and a proved rate.
     ax : Axes, optional
+    axis : {"left", "time", "clock"}
+        Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or ``t/T``; or the stretched
+        clock ``s(t)``, on which each bound is a straight line where nothing but a rate is at work.
 
     Returns
     -------
@@ -149,35 +262,54 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ValueError
-        There is nothing to draw.
+        There is nothing to draw, or an unknown axis.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]
+    ['time left, $1 - t/T$', 'time, $t/T$', 'stretched clock $s(t)$']
     """
-    run, envelope = certificate.trajectory, certificate.envelope
-    if run is None or certificate.comparison is None or not envelope.members:
+    if axis not in _DECAY_AXES:
+        raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
+    if run is None or start is None or certificate.comparison is None or not envelope.members:
         raise ValueError("the certificate holds no simulated run with a proved bound")
     ax, before = _axes(ax), run.remaining > 0
     remaining, states = run.remaining[before], run.states[:, before]
-    member = next(m for m in envelope.members if m.coordinates == envelope.coordinates)
-    norm = np.linalg.norm(member.coordinates_of(states, certificate.graph.laplacian()), axis=0)
-    bound = certificate.norm_bound(remaining)
+    place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
+    shown = [m for m in envelope.members if m.coordinates == envelope.coordinates]
+    norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
+    bound = envelope.norm_bound(remaining, start)
     scale = float(norm[0]) or float(bound[0]) or 1.0
-    ax.loglog(remaining, bound / scale, color="#D55E00", label="proved bound")
-    paper = replace(envelope, members=tuple(m for m in envelope.members if m.kind == "paper"))
-    if len(envelope.members) > 1 and paper.members and paper.coordinates == envelope.coordinates:
-        alone = replace(certificate, sharpening=Sharpening()).norm_bound(remaining)
-        ax.loglog(remaining, alone / scale, color="#D55E00", linewidth=0.9, linestyle="--", label="the paper's alone")
+    for number, member in enumerate(shown if len(shown) > 1 else ()):
+        alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / scale
+        if member.kind == "paper":
+            ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
+        else:
+            label = "each Lyapunov function" if all(m.kind == "paper" for m in shown[:number]) else None
+            ax.plot(place, alone, color="#D55E00", linewidth=0.7, alpha=0.55, label=label)
+    ax.plot(place, bound / scale, color="#D55E00", linewidth=1.6, label="proved bound")
     if norm[0] > 0:
-        ax.loglog(remaining, np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
+        ax.plot(place, np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
         floor = FLOOR_FACTOR * run.rtol * float(np.abs(states).max()) * _row_sum(certificate)
-        ax.axhline(floor / scale, color="#7F7F7F", linewidth=0.8, linestyle=":", label="integrator's floor")
-        ax.set_ylim(bottom=max(float((norm / scale).min()), 1e-18) / 3)
-    ax.invert_xaxis()
-    ax.set_xlabel("time left, $1 - t/T$")
+        ax.axhline(floor / scale, color="#7F7F7F", linewidth=0.9, linestyle=":", label="integrator's floor")
+        least = min(float((norm / scale).min()), floor / scale)
+        ax.set_ylim(max(least, 1e-18) / 3, 3 * max(float((norm / scale).max()), float((bound / scale).max())))
+    ax.set_yscale("log")
+    if axis == "left":
+        ax.set_xscale("log")
+        ax.invert_xaxis()
+    ax.set_xlabel(_DECAY_AXES[axis])
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    ax.set_ylabel(rf"$\|{name}(t)\| / \|{name}(0)\|$")
+    ax.set_ylabel(rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$")
     _legend_above(ax)
     return ax
 
 
+@_styled
 def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     """Draw the peak input that is certified against the deadline, and below which no gains can stay.
 
@@ -191,6 +323,14 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     Returns
     -------
     Axes
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, design
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> ax = plot_trade_off(design(pair, max_input=10, initial_bound=1))
+    >>> [line.get_label() for line in ax.lines]
+    ['certified with these gains', 'no gains stay below', 'asked for', 'this design']
     """
     ax, curve = _axes(ax), found.trade_off(found.deadlines())
     if np.isfinite(curve.certified).any():
@@ -203,11 +343,12 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     if found.protocol is not None and found.peak:
         ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color="#0072B2", label="this design")
     ax.set_xlabel("deadline $T$")
-    ax.set_ylabel(r"peak input $\|u\|_2$" if found.input_norm == 2 else r"peak input $\max_k |u_k|$")
+    ax.set_ylabel(r"peak input $\|u\|_2$" if found.input_norm == 2 else "peak input, largest $|u_k|$")
     _legend_above(ax)
     return ax
 
 
+@_styled
 def plot_input(
     trajectory: Trajectory, structure: Structure, certificate: Certificate | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -245,8 +386,7 @@ def plot_input(
     >>> len(ax.lines), ax.get_ylabel()
     (3, 'input $|u_k|$')
     """
-    if trajectory.states.ndim != 2:
-        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
+    _need_one_start(trajectory)
     peak = None if certificate is None else _certified_peak(trajectory, certificate)
     ax, size = _axes(ax), np.abs(trajectory.input)
     top = max(float(size.max(initial=0)), peak or 0.0)
@@ -263,11 +403,65 @@ def plot_input(
     return ax
 
 
+@_styled
+def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate of the same start proves.
+
+    The integral is numerical, by trapezoids between the samples. No bound is drawn where none holds: as in
+    :func:`plot_input`, and under the sliding-mode protocol, whose switching part no certificate integrates.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of one start.
+    certificate : Certificate, optional
+        Of the same graph, protocol and start.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        The trajectory holds several starts, or the certificate is of another graph, protocol or start.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> ax = plot_effort(cert.trajectory, cert)
+    >>> [line.get_label() for line in ax.lines]
+    ['simulated (CVODES)', 'certified bound', 'deadline']
+    """
+    from scipy.integrate import cumulative_trapezoid
+
+    _need_one_start(trajectory)
+    proved = None if certificate is None else _certified_effort(trajectory, certificate)
+    bound = None
+    if proved is not None and proved.energy is not None and trajectory.actuator is None:
+        bound = None if isinstance(trajectory, SlidingTrajectory) else float(proved.energy.value)
+    ax, power = _axes(ax), (trajectory.input**2).sum(axis=0)
+    spent = cumulative_trapezoid(power, trajectory.t, initial=0)
+    ax.plot(trajectory.t, spent, color="#0072B2", label="simulated (CVODES)")
+    if bound is not None:
+        ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
+    ax.set_ylim(0, 1.1 * max(bound or 0.0, float(spent.max(initial=0))) or 1)
+    _draw_deadlines(trajectory, ax)
+    ax.set_xlabel("time $t$")
+    ax.set_ylabel(r"energy spent, $\int \|u\|^2\, dt$")
+    _legend_above(ax)
+    return ax
+
+
+@_styled
 def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     """Draw the signed digraph: arrows in the direction of information, solid from allies, dashed from opponents.
 
-    Nodes have the colours of their camps; leaders are larger and outlined. Up to 40 nodes are labelled. The layout is
-    the same in every run.
+    Nodes have the colours of their camps; leaders are larger and outlined, and a grey ground joins each of
+    their groups, the closed strong components. Up to 40 nodes are labelled. The layout is the same in every run.
 
     Parameters
     ----------
@@ -297,9 +491,13 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     n = graph.n_nodes
     if n > DRAWN_NODES:
         raise ValueError(f"graphs are drawn up to {DRAWN_NODES} nodes; this one has {n}")
-    ax, place, group = _axes(ax, (6, 5)), _layout(graph), _camp_groups(structure)
+    ax, place, group = _axes(ax, (SINGLE_COLUMN[0], 3.4)), _layout(graph), _camp_groups(structure)
+    for component in structure.closed_components if structure.followers.size else ():
+        _draw_ground(ax, graph, place, component.nodes)
+    if structure.followers.size:
+        ax.plot([], [], color=HALO[0], linewidth=6, label="leader group")
     leads = group != "followers"
-    area = np.where(leads, 1.7, 1.0) * min(max(6000 / n, 20), 170)  # points squared, as scatter takes them
+    area = np.where(leads, 1.7, 1.0) * min(max(4000 / n, 14), 130)  # points squared, as scatter takes them
     for name, colour in CAMP_COLOURS.items():
         own = group == name
         if own.any():
@@ -349,6 +547,7 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@_styled
 def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Axes | None = None) -> Axes:
     """Draw the eigenvalues of ``L`` (numerical), and the line from which on the input stays bounded.
 
@@ -399,6 +598,7 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
     return ax
 
 
+@_styled
 def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
     """Draw rate against prefactor of all proved Lyapunov functions by class, and what no rate exceeds.
 
@@ -454,6 +654,18 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int]) -> None:
+    """Draw a grey ground under the nodes of a strong component and along its edges."""
+    inside, (colour, width) = np.zeros(graph.n_nodes, dtype=bool), HALO
+    inside[list(nodes)] = True
+    own = inside[graph.source] & inside[graph.target]
+    lines = [(v, v) for v in nodes] + list(zip(graph.source[own].tolist(), graph.target[own].tolist(), strict=True))
+    narrow = width if graph.n_nodes <= LABELLED_NODES else width / 2
+    for source, target in lines:
+        x, y = place[[source, target]].T
+        ax.plot(x, y, color=colour, linewidth=narrow, solid_capstyle="round", zorder=0)
+
+
 def _row_sum(certificate: Certificate) -> float:
     """Bound ``||dz||`` for an error of 1 in every state."""
     if certificate.envelope.coordinates == "eps":
@@ -488,6 +700,15 @@ def _draw_agents(
             label=None if name in seen else name,
         )
         seen.add(name)
+    _draw_deadlines(trajectory, ax)
+
+
+def _need_one_start(trajectory: Trajectory) -> None:
+    if trajectory.states.ndim != 2:
+        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
+
+
+def _draw_deadlines(trajectory: Trajectory, ax: Axes) -> None:
     if trajectory.protocol.prescribed:
         ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
     if isinstance(trajectory, SlidingTrajectory):
@@ -496,6 +717,29 @@ def _draw_agents(
 
 def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float | None:
     """Return the proved bound of ``|u_k|`` that holds for a run; None if there is none.
+
+    Raises
+    ------
+    ValueError
+        The certificate is of another graph, protocol or start.
+    """
+    effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
+    if effort is None:
+        return None
+    if actuator is None:
+        return None if effort.peak is None else float(effort.peak.largest)
+    if actuator.sample_period is not None:
+        return None
+    for entry in effort.residual:
+        same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
+        if same and entry.limits.sample_period is None and entry.largest is not None:
+            return float(entry.largest)
+    # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
+    return None if effort.peak is None else float(effort.peak.largest)
+
+
+def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effort | None:
+    """Return what is proved about the input of a run; None if that is of other starts, or the run is disturbed.
 
     Raises
     ------
@@ -511,21 +755,14 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
         starts.append(("sigma(0)", certificate.sigma0, trajectory.sigma0))
         unproved = trajectory.boundary_layer is not None
     for name, proved, run in starts:
-        if proved is not None and not np.array_equal([float(x) for x in proved], run):
+        at = None if proved is None else np.array([float(x) for x in proved])
+        # The states of the sliding mode are sums of two parts, whose rounding the run shows.
+        if at is not None and np.abs(at - run).max(initial=0) > 1e-12 * np.abs(trajectory.states).max(initial=0):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
-    effort, actuator = certificate.effort, trajectory.actuator
+    effort = certificate.effort
     if effort is None or effort.starts is not None or certificate.start is None or unproved:
         return None
-    if actuator is None:
-        return None if effort.peak is None else float(effort.peak.largest)
-    if actuator.sample_period is not None:
-        return None
-    for entry in effort.residual:
-        same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
-        if same and entry.limits.sample_period is None and entry.largest is not None:
-            return float(entry.largest)
-    # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
-    return None if effort.peak is None else float(effort.peak.largest)
+    return effort
 
 
 def _layout(graph: SignedDigraph) -> np.ndarray:
@@ -544,13 +781,28 @@ def _layout(graph: SignedDigraph) -> np.ndarray:
 
 
 def _legend_above(ax: Axes) -> None:
-    """Put the legend above the axes, where it covers no data."""
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small", frameon=False)
+    """Put the legend above the axes, where it covers no data, in as many columns as its width takes."""
+    width = ax.get_window_extent().width / ax.figure.dpi
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2 if width < 4 else 3, frameon=False)
 
 
-def _axes(ax: Axes | None, size: tuple[float, float] = (6, 3.6)) -> Axes:
-    if ax is not None:
-        return ax
+def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
+    """Add axes to a figure in the style that is in force; ``place`` is rows, columns and number, from 1."""
+    from matplotlib import rcParams
+
+    ax = figure.add_subplot(*place)
+    style: Any = rcParams  # whose stubs know literal names only
+    # Ticks and grid are made when they are drawn, after the style has gone: fix them now.
+    for which in ("x", "y"):
+        ax.tick_params(axis=which, labelsize=style[f"{which}tick.labelsize"])
+        for kind in ("major", "minor"):
+            ax.tick_params(axis=which, which=kind, width=style[f"{which}tick.{kind}.width"])
+    if style["axes.grid"]:
+        ax.grid(True, color=style["grid.color"], linewidth=style["grid.linewidth"])
+    return ax
+
+
+def _axes(ax: Axes | None, size: tuple[float, float] = SINGLE_COLUMN) -> Axes:
     from matplotlib.figure import Figure
 
-    return Figure(figsize=size, layout="constrained").add_subplot()
+    return new_axes(Figure(size, layout="constrained")) if ax is None else ax

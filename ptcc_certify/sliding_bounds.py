@@ -44,8 +44,25 @@ class SlidingEnvelope(Envelope):
     ----------
     protocol : SlidingModeProtocol
     sigma0 : tuple of Fraction
+        ``sigma(0)``, N numbers.
     reaching : tuple of ReachingTime
-        Proved reaching times.
+        Proved reaching times, one for each agent.
+
+    References
+    ----------
+    Theorems 4 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> envelope = certify(pair, robust, [3, 1], sigma0=[1, 0], simulation=False).envelope
+    >>> bool(envelope.outcome_distance(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
+    True
+    >>> bool(envelope.sliding_norm(0.0) >= 1)  # ||sigma(0)|| = 1
+    True
     """
 
     protocol: SlidingModeProtocol
@@ -107,8 +124,24 @@ class SlidingEnvelope(Envelope):
                     bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit * (1 + 1e-12))
         return bound if np.ndim(remaining) else bound[0]
 
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+        """Bound of ``||z||`` from ``x0``, (M,), whatever the disturbance; see :meth:`Envelope.norm_bound`."""
+        if self.direct:
+            return super().norm_bound(remaining, x0)
+        return self.state_bound(np.asarray(remaining, dtype=float), x0)
+
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
-        """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``."""
+        """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``.
+
+        Parameters
+        ----------
+        z : (M,) array
+            ``ln(T_r/(T_r - t))`` of the instants, dimensionless.
+
+        Returns
+        -------
+        (M,) array
+        """
         size = math.hypot(*(float(x) for x in self.sigma0))
         return size * np.exp(-self.protocol.reaching_gain.clock_at_tau(z))
 

@@ -50,10 +50,23 @@ class ClosedComponent:
     nodes : tuple of int
         Node indices, ascending.
     balanced : bool
+        Whether it splits into two camps, allies within and opponents across.
     gauge : tuple of +1/-1, or None
         Camps in the order of ``nodes`` (Lemma 1), the first node +1; None if unbalanced.
     negative_cycle : tuple of (source, target), or None
         A closed walk of the underlying undirected multigraph whose signs multiply to -1; None if balanced.
+
+    References
+    ----------
+    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 1)])).closed_components[0]
+    ClosedComponent(nodes=(0, 1), balanced=True, gauge=(1, -1), negative_cycle=None)
     """
 
     nodes: tuple[int, ...]
@@ -76,6 +89,19 @@ class Claim:
         Those whose hypotheses hold, e.g. ``("1.1", "2")``.
     special : tuple of str
         Sharper behaviours that the corollaries give, e.g. ``("consensus",)``.
+
+    References
+    ----------
+    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> claim = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])).claim
+    >>> claim.theorem, claim.behaviour, claim.special
+    ('1.1', 'bipartite consensus', ('signed-average consensus', 'consensus'))
     """
 
     theorem: str
@@ -85,6 +111,20 @@ class Claim:
 
     def holds(self, behaviour: str) -> bool:
         """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.
+
+        Parameters
+        ----------
+        behaviour : str
+            ``stability``, ``bipartite-consensus``, ... or a special case such as ``consensus``.
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        ValueError
+            No behaviour is called so.
 
         Examples
         --------
@@ -121,7 +161,30 @@ def behaviour_name(text: str) -> str:
 
 @dataclass(frozen=True)
 class WeakComponent:
-    """One weakly connected component: its nodes, how it is connected, which CSCs it holds, what it will do."""
+    """One weakly connected component: its nodes, how it is connected, which CSCs it holds, what it will do.
+
+    Attributes
+    ----------
+    nodes : tuple of int
+        Node indices, ascending.
+    connectivity : {"strong", "quasi-strong", "weak"}
+    closed : tuple of int
+        Indices of its closed strong components among ``closed_components`` of the graph.
+    claim : Claim
+
+    References
+    ----------
+    Section II and Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> two = analyse(SignedDigraph.from_edges([(1, 2, 1), (3, 4, 1), (4, 3, -1)]))
+    >>> [(c.nodes, c.connectivity, c.claim.behaviour) for c in two.components]
+    [((0, 1), 'quasi-strong', 'interval bipartite consensus'), ((2, 3), 'strong', 'stability')]
+    """
 
     nodes: tuple[int, ...]
     connectivity: str
@@ -155,6 +218,21 @@ class Structure:
         ``w_kl = w_lk`` for all pairs, exactly.
     all_positive : bool
         No edge is negative.
+
+    References
+    ----------
+    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)]))
+    >>> structure.connectivity, structure.leaders.tolist(), structure.followers.tolist()
+    ('quasi-strong', [0, 1], [2])
+    >>> structure.balanced, structure.negative_cycle, structure.claim.theorem
+    (False, ((0, 1), (1, 0)), '2.2')
     """
 
     graph: SignedDigraph
@@ -186,6 +264,20 @@ class Structure:
 
         Theorems and corollaries decide, but for the signed average: a strongly connected balanced component meets at
         it iff every node listens as much as it is listened to, undirected or not.
+
+        Parameters
+        ----------
+        behaviour : str
+            As in :meth:`Claim.holds`.
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        ValueError
+            No behaviour is called so.
         """
         wanted = behaviour_name(behaviour)
         return all(
@@ -203,6 +295,11 @@ class Structure:
             surplus[int(self.graph.target[edge])] += weight
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
+
+    def _repr_html_(self) -> str:
+        from ptcc_certify.display import structure_html
+
+        return structure_html(self)
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)

@@ -51,8 +51,23 @@ class Trajectory:
         What limits the nominal protocol's input; None if nothing does.
     forcing : str or None
         Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
-    held_input : array or None
-        The input held at the instants, of the shape of ``states``, if the actuator samples.
+    held_input : (N, M) or (N, S, M) array or None
+        The input held at the instants, if the actuator samples.
+
+    References
+    ----------
+    The network (3) under the protocol (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], times=[0, 0.5, 1, 2])
+    >>> run.states.shape, run.deadline_index, run.deadline_resolved
+    ((2, 4), 2, True)
+    >>> run.final_state.round(9), run.input[:, 0]
+    (array([ 1., -1.]), array([-8., -8.]))
     """
 
     graph: SignedDigraph
@@ -125,6 +140,15 @@ class Trajectory:
     def at(self, fraction: float) -> np.ndarray:
         """Return the state at the sampled instant ``t = fraction T``.
 
+        Parameters
+        ----------
+        fraction : float
+            ``t/T`` of one of the instants.
+
+        Returns
+        -------
+        (N,) or (N, S) array
+
         Raises
         ------
         ParameterError
@@ -168,6 +192,11 @@ class Trajectory:
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
         return []
 
+    def _repr_html_(self) -> str:
+        from ptcc_certify.display import trajectory_html
+
+        return trajectory_html(self)
+
     def __repr__(self) -> str:
         runs = f" x {self.states.shape[1]} columns" if self.states.ndim == 3 else ""
         span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g}" if self.t.size else "none"
@@ -206,6 +235,24 @@ class SlidingTrajectory(Trajectory):
     reads_states : bool
         Whether the disturbance depends on the states: then reaching times are as accurate as the integrator, otherwise
         roots of scalar equations to near machine precision.
+
+    References
+    ----------
+    The network (2) under the protocol (47)-(48) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+    Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*t)", times=[0, 1, 2])
+    >>> run.sigma  # exactly 0 from the reaching time on
+    array([[1., 0., 0.],
+           [0., 0., 0.]])
+    >>> bool(0 < run.reaching_times[0] < 1), float(run.reaching_times[1])
+    (True, 0.0)
     """
 
     protocol: SlidingModeProtocol

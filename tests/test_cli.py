@@ -684,7 +684,8 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
     assert run.code == 0, run
     header, *rows = run.out.splitlines()
     assert header.split() == [
-        *("example", "theorem", "behaviour", "rate", "tightness", "worst", "reached", "proved", "by", "T_r", "verdict")
+        *("example", "theorem", "behaviour", "rate", "tightness", "worst", "reached", "proved", "by", "T_r"),
+        *("final", "state", "verdict"),
     ]
     reported = [
         (str(example.number), graph, behaviour)
@@ -694,10 +695,12 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
     assert len(rows) == len(reported) == 12
     for row, (number, graph, behaviour) in zip(rows, reported, strict=True):
         match = re.fullmatch(
-            r"(\d) (\w+) +([\d.]+) +(\D+?) +([\d.]+) +([\d.]+) +([\d.]+) +(\S+) +(\S+) +(\S+)  (\w+)", row
+            r"(\d) (\w+) +([\d.]+) +(\D+?) +([\d.]+) +([\d.]+) +([\d.]+) +(\S+) +(\S+) +(\S+)  (\S.*?) +(\w+)", row
         )
         assert match is not None, row
-        assert match.group(1, 2, 4, 11) == (number, graph, behaviour, "certified")
+        assert match.group(1, 2, 4, 12) == (number, graph, behaviour, "certified")
+        assert (match[11] == "0") == (behaviour == "stability")
+        assert match[11].startswith("+-") == (behaviour == "bipartite consensus")
         if number in "456":
             assert 0 < float(match[8]) < float(match[9]) < float(match[10])
             graph += "_sliding"
@@ -708,10 +711,28 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
         data = read(f"new/results/{graph}.json")
         assert data["claim"]["theorem"] == match[3]
         assert data["claim"]["behaviour"] == behaviour
-        assert float(Fraction(data["rates"]["certified"])) == pytest.approx(rate, abs=1e-4)
-        for figure in ("states", "decay"):
-            assert Path(f"new/results/{graph}_{figure}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
-    assert len(listing(folder / "new" / "results")) == 36
+        assert rate <= Fraction(data["rates"]["certified"]) < rate + 1e-4
+    table = list(csv.DictReader(Path("new/results/examples.csv").read_text().splitlines()))
+    assert [(row["example"], row["graph"], row["claim"]) for row in table] == reported
+    assert {row["verdict"] for row in table} == {"certified"}
+    assert [bool(row["reached"]) for row in table] == [row["example"] in "456" for row in table]
+    figures = {path.name for path in (folder / "new" / "results").glob("*.png")}
+    drawn = {1: "graphs", 3: "graphs", 5: "graphs", 7: "sliding_variables", 9: "sliding_variables"}
+    drawn |= {11: "sliding_variables"} | dict.fromkeys((2, 4, 6, 8, 10, 12), "states")
+    assert figures == {f"figure_{number:02d}_{what}.png" for number, what in drawn.items()} | {
+        f"example_{number}_{what}.png" for number in range(1, 7) for what in ("decay", "input")
+    }
+    for name in figures:
+        assert Path(f"new/results/{name}").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+    assert len(listing(folder / "new" / "results")) == 12 + 24 + 1
+
+
+def test_examples_are_drawn_as_vectors_too_and_the_same_again(folder: Path):
+    for again in ("one", "two"):
+        assert ptcc("examples", "fig1b", "-o", again, "--format", "svg").code == 0
+    first, second = ({p.name: p.read_bytes() for p in (folder / name).glob("*.svg")} for name in ("one", "two"))
+    assert len(first) == 2 + 2 + 4 and first == second
+    assert all(b"<svg" in content for content in first.values())
 
 
 def test_examples_can_be_chosen():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,24 +13,35 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import same_color, to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
+from scipy.integrate import trapezoid
 
+import ptcc_certify
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graph import SignedDigraph, Weights
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.plots import (
     CAMP_COLOURS,
     CLASS_MARKERS,
+    DOUBLE_COLUMN,
     DRAWN_NODES,
     EDGE_STYLES,
+    HALO,
     KAMADA_NODES,
     LABELLED_NODES,
+    SINGLE_COLUMN,
+    STYLE,
+    plot_decay,
+    plot_effort,
     plot_frontier,
     plot_graph,
     plot_input,
+    plot_run,
     plot_spectrum,
     plot_trajectory,
+    save_figure,
 )
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.simulation import simulate
@@ -37,6 +49,7 @@ from ptcc_certify.structure import Structure, analyse
 
 pytestmark = pytest.mark.filterwarnings("error")
 
+STYLE_FILE = Path(ptcc_certify.__file__).with_name("ptcc.mplstyle")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 NAMES = ("fig1a", "fig3b", "fig5b", "apart", "single")
 
@@ -210,7 +223,8 @@ def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: st
         colour, line, _ = EDGE_STYLES[int(sign)]
         assert same_color(arrow.get_edgecolor(), colour) and arrow.get_linestyle() == line
     signs = {EDGE_STYLES[int(sign)][2] for sign in graph.sign}
-    assert set(labelled(ax)) == {*group} | signs
+    ground = {"leader group"} if "followers" in group else set()
+    assert set(labelled(ax)) == {*group} | signs | ground
 
 
 def test_the_layout_is_the_same_in_every_run_and_separates_the_nodes() -> None:
@@ -307,3 +321,133 @@ def test_figures_are_drawn_into_given_axes() -> None:
     ]
     assert all(a is b for a, b in zip(given, axes, strict=True))
     drawn(axes[0])
+
+
+# ---------------------------------------------------------------------- decay, runs, style
+
+
+@pytest.mark.parametrize("axis", ["left", "time", "clock"])
+def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: str) -> None:
+    cert = certified("fig3b")
+    run = cert.trajectory
+    assert run is not None
+    ax = drawn(plot_decay(cert, axis=axis))
+    shown = labelled(ax)
+    before = run.remaining > 0
+    place = {"left": run.remaining, "time": 1 - run.remaining, "clock": run.clock}[axis][before]
+    bound, seen = shown["proved bound"], shown["simulated (CVODES)"]
+    floor = shown["integrator's floor"].get_ydata()[0]  # type: ignore[attr-defined]
+    assert np.array_equal(bound.get_xdata(), place)  # type: ignore[attr-defined]
+    height, size = bound.get_ydata(), seen.get_ydata()  # type: ignore[attr-defined]
+    assert size[0] == 1 and (size <= height * (1 + 1e-9) + floor).all()
+    members = [line.get_ydata() for line in ax.lines if line.get_xdata() is not None and len(line.get_ydata()) > 2]
+    members = [y for y in members if y is not height and y is not size]
+    assert len(members) == len(cert.envelope.members) > 1
+    assert np.array_equal(height, np.minimum.reduce(members))
+    if axis == "clock":  # straight lines: the slope is half the rate
+        for member, y in zip(cert.envelope.members, members, strict=True):
+            assert y == pytest.approx(y[0] * np.exp(-member.rate * place / 2), rel=1e-9)
+
+
+def test_the_decay_needs_a_run_and_a_known_axis() -> None:
+    cert = certified("fig3b")
+    with pytest.raises(ValueError, match='axis "days" is unknown; one of left, time, clock'):
+        plot_decay(cert, axis="days")
+    with pytest.raises(ValueError, match="holds no simulated run"):
+        plot_decay(certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
+
+
+def test_closed_components_have_a_ground_where_there_are_followers() -> None:
+    def grounds(name: str) -> int:
+        return sum(same_color(line.get_color(), HALO[0]) and len(line.get_xdata()) > 0 for line in ax_of(name).lines)
+
+    def ax_of(name: str) -> Axes:
+        return drawn(plot_graph(analyse(graph_of(name))))
+
+    structure = analyse(graph_of("fig5b"))
+    leaders = set(structure.leaders.tolist())
+    pairs = zip(structure.graph.source.tolist(), structure.graph.target.tolist(), strict=True)
+    assert grounds("fig5b") == len(leaders) + sum(s in leaders and t in leaders for s, t in pairs)
+    assert grounds("fig1a") == 0
+    assert "leader group" in labelled(ax_of("fig5b"))
+
+
+def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Path) -> None:
+    import matplotlib.pyplot as plt
+    from matplotlib import rc_params_from_file
+
+    run = certified("fig1a").trajectory
+    assert run is not None
+    ax = drawn(plot_trajectory(run, certified("fig1a").structure))
+    assert tuple(ax.figure.get_size_inches()) == SINGLE_COLUMN
+    assert plot_run(run, certified("fig1a").structure, wide=True).get_figwidth() == DOUBLE_COLUMN[0]
+    styled = rc_params_from_file(STYLE_FILE, use_default_template=False)
+    assert ax.xaxis.label.get_size() == styled["axes.labelsize"]
+    assert {tick.get_size() for tick in ax.get_xticklabels()} == {styled["xtick.labelsize"]}
+    assert {text.get_size() for text in ax.get_legend().get_texts()} == {styled["legend.fontsize"]}
+    with plt.style.context(STYLE):
+        assert plt.rcParams["font.size"] == styled["font.size"]
+    own = Figure().add_subplot()
+    plot_trajectory(run, certified("fig1a").structure, own)
+    assert own.xaxis.label.get_size() == plt.rcParams["font.size"]
+
+
+def test_saved_figures_appear_whole_and_are_vectors_where_asked(tmp_path: Path) -> None:
+    figure = plot_graph(analyse(graph_of("fig1b"))).figure
+    for name, head in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("a.svg", b"<?xml"), ("B.SVG", b"<?xml")):
+        save_figure(figure, tmp_path / name)  # type: ignore[arg-type]
+        assert (tmp_path / name).read_bytes().startswith(head)
+    with pytest.raises(ParameterError, match=r"a\.gif: figures are written to \.png, \.pdf, \.svg"):
+        save_figure(figure, tmp_path / "a.gif")  # type: ignore[arg-type]
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+@pytest.mark.parametrize("name", ["fig1a", "fig3b", "fig5b"])
+def test_no_text_of_a_figure_is_clipped_or_covers_the_data(name: str) -> None:
+    """The legend lies above the axes, and every text inside the figure."""
+    cert = certified(name)
+    run = cert.trajectory
+    assert run is not None
+    axes = [
+        plot_trajectory(run, cert.structure),
+        plot_decay(cert),
+        plot_input(run, cert.structure, cert),
+        plot_graph(cert.structure),
+        plot_spectrum(cert.structure, cert.protocol),
+        plot_frontier(cert),
+    ]
+    for ax in axes:
+        figure = ax.figure
+        assert isinstance(figure, Figure)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        legend = ax.get_legend().get_window_extent(renderer)
+        assert legend.y0 >= ax.get_window_extent(renderer).y1 - 1
+        width, height = canvas.get_width_height()
+        texts = [*ax.get_legend().get_texts(), ax.xaxis.label, ax.yaxis.label]
+        for text in texts if ax.axison else texts[:-2]:
+            box = text.get_window_extent(renderer)
+            assert box.x0 >= -1 and box.x1 <= width + 1 and box.y0 >= -1 and box.y1 <= height + 1, text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_energy_grows_and_stays_under_its_bound(name: str) -> None:
+    cert = certified(name)
+    run = cert.trajectory
+    assert run is not None
+    ax = drawn(plot_effort(run, cert))
+    shown = labelled(ax)
+    spent = shown["simulated (CVODES)"].get_ydata()  # type: ignore[attr-defined]
+    assert spent[0] == 0 and (np.diff(spent) >= 0).all()
+    power = (run.input**2).sum(axis=0)
+    assert spent[-1] == pytest.approx(trapezoid(power, run.t))
+    assert cert.effort is not None
+    assert ("certified bound" in shown) == (cert.effort.energy is not None)
+    if cert.effort.energy is not None:
+        bound = shown["certified bound"].get_ydata()[0]  # type: ignore[attr-defined]
+        assert bound == float(cert.effort.energy.value)
+        assert spent[-1] <= bound * (1 + 1e-3)  # trapezoids lie above a convex integrand
+    columns = simulate(cert.graph, cert.protocol, np.ones((cert.graph.n_nodes, 2)), times=[0])
+    with pytest.raises(ValueError, match="holds 2 starts"):
+        plot_effort(columns)

@@ -27,6 +27,7 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.reaching import inverse_decay_integral
 from ptcc_certify.simulation import simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
+from ptcc_certify.summary import certificate_lines
 from ptcc_certify.trajectory import SlidingTrajectory
 
 RUNS = [(number, name) for number in "456" for _, name, _ in select(number)]
@@ -363,7 +364,7 @@ def check(cert: Certificate, power: Fraction) -> None:
     if power >= 1:
         assert not any(late)
         assert np.isfinite(run.reaching_z).all()
-    shown = cert._repr_html_()
+    shown = "\n".join(certificate_lines(cert, "graph"))
     assert ("only at T_r for" in shown) == any(late)
     # sigma is certain to be 0 at T_r in any case.
     assert (run.sigma[:, run.reaching_remaining == 0] == 0).all()

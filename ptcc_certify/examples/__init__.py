@@ -32,6 +32,8 @@ class Example:
         In node order.
     behaviours : tuple of str
         What the paper reports for each graph.
+    figures : mapping of str to int
+        What is drawn of it, and the numbers of the paper's figures.
     sigma0, disturbance : str or None
         Of the sliding-mode protocol.
     """
@@ -41,6 +43,7 @@ class Example:
     parameters: Mapping[str, str]
     x0: str
     behaviours: tuple[str, str]
+    figures: Mapping[str, int]
     sigma0: str | None = None
     disturbance: str | None = None
 
@@ -60,14 +63,29 @@ _FIG3 = (("fig3a", "fig3b"), ("interval bipartite consensus", "stability"))
 _FIG5 = (("fig5a", "fig5b"), ("bipartite containment", "stability"))
 
 EXAMPLES: dict[int, Example] = {
-    1: Example(1, _FIG1[0], {"T": "0.6", "rho1": "0.1", "rho2": "0.3", "kappa": "1"}, "5,2,-4,3,-2,1", _FIG1[1]),
-    2: Example(2, _FIG3[0], {"T": "0.6", "rho1": "0.2", "rho2": "0.5", "kappa": "1"}, "-4,3,-1,2,-2,5", _FIG3[1]),
+    1: Example(
+        1,
+        _FIG1[0],
+        {"T": "0.6", "rho1": "0.1", "rho2": "0.3", "kappa": "1"},
+        "5,2,-4,3,-2,1",
+        _FIG1[1],
+        {"graphs": 1, "states": 2},
+    ),
+    2: Example(
+        2,
+        _FIG3[0],
+        {"T": "0.6", "rho1": "0.2", "rho2": "0.5", "kappa": "1"},
+        "-4,3,-1,2,-2,5",
+        _FIG3[1],
+        {"graphs": 3, "states": 4},
+    ),
     3: Example(
         3,
         _FIG5[0],
         {"T": "0.2", "rho1": "0.1", "rho2": "0.3", "kappa": "1"},
         "-6,4,5,-7,8,-5,-3,7,-5,6,4,2,-5,3,-8,1",
         _FIG5[1],
+        {"graphs": 5, "states": 6},
     ),
     4: Example(
         4,
@@ -85,6 +103,7 @@ EXAMPLES: dict[int, Example] = {
         },
         "-4,3,-1,2,-2,5",
         _FIG1[1],
+        {"sliding_variables": 7, "states": 8},
         sigma0="-9,1,-5,8,-4,6",
         disturbance="sin(2*k*t + pi/3)",
     ),
@@ -104,6 +123,7 @@ EXAMPLES: dict[int, Example] = {
         },
         "-4,4,5,-7,8,1",
         _FIG3[1],
+        {"sliding_variables": 9, "states": 10},
         sigma0="-10,10,9,-5,5,4",
         disturbance="sin(2*k*t + pi/2)",
     ),
@@ -123,6 +143,7 @@ EXAMPLES: dict[int, Example] = {
         },
         "2.6,-1.2,-1.2,-1,-0.2,0.9,-2.9,2,0.3,2.1,-1,-0.3,-2.7,-2,1,-1",
         _FIG5[1],
+        {"sliding_variables": 11, "states": 12},
         sigma0="2.9,-3,0.5,0,0.75,-0.8,-1.5,3.8,2.3,3.6,0.2,-0.27,-4,-2.3,-0.5,-2.9",
         disturbance="cos(k*t - pi/3)",
     ),
