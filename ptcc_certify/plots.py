@@ -527,7 +527,7 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
         if (graph.sign == sign).any():
             ax.plot([], [], color=colour, linestyle=line, linewidth=width, label=name)
     if n <= LABELLED_NODES:
-        inside = max(map(len, graph.labels)) <= 3
+        inside = max(map(len, graph.labels)) <= 2
         for v, label in enumerate(graph.labels):
             ax.annotate(
                 shorten(label, 12),
@@ -541,7 +541,11 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
                 parse_math=False,
             )
     ax.set_aspect("equal")
-    ax.margins(0.12)
+    low, high = place.min(axis=0), place.max(axis=0)
+    span = max(high - low) or 1.0
+    for limit, middle, own in zip((ax.set_xlim, ax.set_ylim), (low + high) / 2, high - low, strict=True):
+        half = 0.62 * max(own, 0.6 * span)  # a path is drawn as a line, in axes that are none
+        limit(middle - half, middle + half)
     ax.set_axis_off()
     _legend_above(ax)
     return ax
@@ -777,7 +781,9 @@ def _layout(graph: SignedDigraph) -> np.ndarray:
         hops = dict(nx.all_pairs_shortest_path_length(plain))
         apart = 2 + max(max(row.values()) for row in hops.values())  # between components
         place = nx.kamada_kawai_layout(plain, {u: {v: hops[u].get(v, apart) for v in plain} for u in plain})
-    return np.array([place[v] for v in range(graph.n_nodes)])
+    points = np.array([place[v] for v in range(graph.n_nodes)])
+    width, height = np.ptp(points, axis=0)
+    return points if width >= height else points[:, ::-1]  # lying, as axes are wider than high
 
 
 def _legend_above(ax: Axes) -> None:
