@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -84,6 +85,8 @@ _limit_options = _options(
     click.option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
 )
 _SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
+#: How many threads linear algebra uses, which NumPy reads when it is loaded.
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
@@ -102,7 +105,14 @@ def _progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
         yield lambda step: bar.update(task, completed=steps.index(step), description=step)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _InOrder(click.Group):
+    """Commands in the order of their use, as they are written below."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)
+
+
+@click.group(cls=_InOrder, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="ptcc-certify", prog_name="ptcc")
 def cli() -> None:
     """Certify prescribed-time coordination control on signed digraphs.
@@ -243,6 +253,33 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
 
 
 @cli.command()
+@click.argument("certificate")
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False), required=True, help="A page, .html, or a statement, .tex"
+)
+@click.option(
+    "--simulation/--no-simulation", default=None, help="Repeat the CVODES run.  [default: up to 1,000 agents]"
+)
+def report(certificate: str, output: str, simulation: bool | None) -> int:
+    """Check CERTIFICATE and write a report to send to somebody: a page of HTML, or a statement in LaTeX.
+
+    The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
+    certificate the page tells the reason and no claim.
+    """
+    from ptcc_certify.report import write_report
+    from ptcc_certify.saved import RejectedCertificate
+
+    try:
+        with _progress(("independent check", "simulation", "report")) as begin:
+            verdict = write_report(certificate, output, simulation=simulation, progress=begin)
+    except RejectedCertificate as error:
+        click.echo(f"rejected: {error}", err=True)
+        return REJECTED
+    click.echo(f"{verdict:<10} {output}")
+    return {"certified": OK, "undecided": UNDECIDED}.get(verdict, REJECTED)
+
+
+@cli.command()
 @_graph_options
 @_protocol_options
 @_limit_options
@@ -251,6 +288,7 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
 )
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
 @click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
+@click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
 def simulate(
     graph: str,
@@ -260,6 +298,7 @@ def simulate(
     dimension: int,
     samples: int,
     boundary_layer: float | None,
+    wide: bool,
     output: str | None,
     **options: Any,
 ) -> int:
@@ -293,10 +332,10 @@ def simulate(
         **more,
     )
     if output and suffix in FIGURES:
-        from ptcc_certify.plots import plot_run
+        from ptcc_certify.plots import plot_run, save_figure
         from ptcc_certify.structure import analyse
 
-        _save_figure(plot_run(trajectory, analyse(signed)), output)
+        save_figure(plot_run(trajectory, analyse(signed), wide=wide), output)
     elif output:
         write_atomically(output, trajectory.to_csv())
     else:
@@ -370,18 +409,25 @@ def design(
 @cli.command()
 @click.argument("name", default="all")
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
-def examples(name: str, output: str | None) -> int:
-    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each."""
+@click.option(
+    "--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", show_default=True, help="Of figures."
+)
+def examples(name: str, output: str | None, suffix: str) -> int:
+    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each.
+
+    With -o also every certificate, the figures of the paper's Section 4 (and decay and input besides), and the table
+    in full as examples.csv.
+    """
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.plots import plot_decay, plot_run
+    from ptcc_certify.paper_figures import Run, paper_figures, results_csv
 
-    chosen, code = select(name), OK
+    chosen, code, runs = select(name), OK, []
     if output:
         _make_folder(output)
     click.echo(
         f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}"
-        f"{'reached':>10}{'proved by':>11}{'T_r':>5}  verdict"
+        f"{'reached':>10}{'proved by':>11}{'T_r':>5}  {'final state':<14}verdict"
     )
     for example, graph_name, reported in chosen:
         certificate = run(
@@ -395,19 +441,125 @@ def examples(name: str, output: str | None) -> int:
         assert claim is not None
         click.echo(
             f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-            f"{float(rate or 0):>9.4f}{certificate.tightness or 0:>11.3f}"
-            f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  {certificate.verdict}"
+            f"{int((rate or 0) * 10_000) / 10_000:>9.4f}{certificate.tightness or 0:>11.3f}"
+            f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  "
+            f"{_ends(certificate):<14}{certificate.verdict}"
         )
         code = max(code, _exit_code(certificate, reported, None))
         if output:
             stem = Path(output) / (graph_name if example.sigma0 is None else f"{graph_name}_sliding")
             certificate.save(f"{stem}.json")
-            if certificate.trajectory is not None:
-                figure = plot_run(certificate.trajectory, certificate.structure, certificate.reaching)
-                _save_figure(figure, f"{stem}_states.png")
-            if seen is not None:
-                _save_figure(plot_decay(certificate).figure, f"{stem}_decay.png")
+            runs.append(Run(example, graph_name, certificate))
+    if output:
+        from ptcc_certify.io import write_atomically
+        from ptcc_certify.plots import save_figure
+
+        for title, figure in paper_figures(runs).items():
+            save_figure(figure, Path(output) / f"{title}.{suffix}")
+        write_atomically(Path(output) / "examples.csv", results_csv(runs))
     return code
+
+
+@cli.command()
+@click.argument("pattern", nargs=-1, required=True)
+@_reading_options
+@_protocol_options
+@click.option("--expect", metavar="BEHAVIOUR", help="E.g. stability; exit code 3 if it does not follow for some graph.")
+@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
+@click.option(
+    "--method",
+    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
+    default="best",
+    show_default=True,
+    help="Lyapunov functions searched beside the paper's.",
+)
+@click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
+@click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
+@click.option("--restart", is_flag=True, help="Begin again, and replace the table.")
+@click.option("--write-graphs", metavar="DIR", help="Only write the graphs of SPEC.toml to this folder, as CSV.")
+def batch(
+    pattern: tuple[str, ...],
+    kind: str,
+    expect: str | None,
+    min_rate: str | None,
+    initial_bound: str | None,
+    workers: int | None,
+    scheduler: str | None,
+    output: str | None,
+    restart: bool,
+    write_graphs: str | None,
+    **options: Any,
+) -> int:
+    """Certify many graphs: a table with one row for each.
+
+    PATTERN is a file, a quoted pattern such as 'graphs/*.csv', a packaged graph, or SPEC.toml, which describes an
+    ensemble of random graphs (keys: count, nodes, seed, connectivity, balanced, mean_degree, negative, weight_range,
+    weight_decades, undirected); several may be given. Every graph has a random start of its own, unless --x0 is given.
+
+    Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
+    missing, and with files that have changed. Whatever goes wrong with one graph becomes the column error of its row.
+    Without -o the table is printed as CSV when it is complete.
+
+    Exit code 0: every graph certified, and what was asked of them holds. Otherwise the table is there too, and the
+    code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
+    undecided or have an error. 2: nothing was written.
+    """
+    os.environ.update({name: os.environ.get(name, "1") for name in _THREADS})  # processes are better than threads
+    from ptcc_certify import batch as many
+
+    expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
+    bound = _number(initial_bound, "--initial-bound")
+    if write_graphs is not None:
+        click.echo(f"written    {many.write_graphs(pattern, write_graphs)} graphs to {write_graphs}")
+        return OK
+    if scheduler is not None and workers is not None:
+        raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
+    if restart and output is None:
+        raise ParameterError("--restart replaces a table; name it with -o")
+    if output == "-":
+        raise ParameterError("-o names a file; for standard output leave it out")
+    protocol = _protocol(kind, {**dict.fromkeys(_LIMITS), **options}, ())
+    done = total = 0
+    with _counting() as show:
+
+        def progress(*counts: int) -> None:
+            nonlocal done, total
+            if output and total == 0 and counts[0]:
+                click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
+            done, total, _ = counts
+            show(*counts)
+
+        try:
+            rows = many.certify_many(
+                pattern,
+                protocol,
+                **{name: options[name] for name in ("x0", "seed", "sigma0", "disturbance", "method", "simulation")},
+                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected")},
+                orientation=options["edges"],
+                initial_bound=bound,
+                expect=expected,
+                min_rate=wanted,
+                workers=workers or many.default_workers(),
+                scheduler=scheduler,
+                output=output,
+                restart=restart,
+                progress=progress,
+            )
+        except KeyboardInterrupt:
+            kept = f"{done} of {total} rows are kept, the same command{' without --restart' * restart} goes on"
+            click.echo(f"ptcc: interrupted; {kept if output and total else 'nothing is kept'}", err=True)
+            return INTERRUPTED
+    if output is None:
+        click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
+    else:
+        counts = [f"{sum(row['verdict'] == v for row in rows)} {v}" for v in ("certified", "undecided")]
+        failed = sum(row["error"] is not None for row in rows)
+        click.echo(f"rows       {len(rows)}: {', '.join(counts)}, {failed} with an error")
+        click.echo(f"written    {output}")
+    return _batch_code(rows)
 
 
 @cli.command()
@@ -521,13 +673,21 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 
 def _reached(certificate: Certificate) -> str:
     """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
-    from ptcc_certify.protocols import SlidingModeProtocol
-    from ptcc_certify.trajectory import SlidingTrajectory
+    from ptcc_certify.paper_figures import reaching_times
 
-    run, reaching, protocol = certificate.trajectory, certificate.reaching, certificate.protocol
-    if reaching is None or not isinstance(run, SlidingTrajectory) or not isinstance(protocol, SlidingModeProtocol):
+    last, proved, deadline = reaching_times(certificate)
+    if isinstance(last, str):
         return f"{'-':>10}{'-':>11}{'-':>5}"
-    return f"{run.reaching_times.max():>10.5f}{max(r.time for r in reaching):>11.5f}{float(protocol.T_r):>5.2g}"
+    return f"{last:>10.5f}{proved:>11.5f}{deadline:>5.2g}"
+
+
+def _ends(certificate: Certificate) -> str:
+    """Return the outcome in a few letters: 0, a common size, or the largest."""
+    if certificate.outcome is None:
+        return "-"
+    sizes = {abs(float(x)) for x in certificate.outcome.final_state}
+    largest = f"{max(sizes):.5g}"
+    return largest if sizes == {0} else f"+-{largest}" if len(sizes) == 1 else f"|x| <= {largest}"
 
 
 def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
@@ -643,6 +803,46 @@ def _input_code(certificate: Certificate, most: Fraction | None) -> int:
     return UNDECIDED
 
 
+@contextmanager
+def _counting() -> Iterator[Callable[[int, int, int], None]]:
+    """Show on a terminal how many of many rows are done, how many have an error, and how long the rest will take."""
+    if not sys.stderr.isatty():
+        yield lambda done, total, errors: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left {task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = None
+
+        def show(done: int, total: int, errors: int) -> None:
+            nonlocal task
+            if task is None:  # rows that were there already do not count for the speed
+                task = bar.add_task("", total=total, completed=done)
+            bar.update(task, completed=done, description=f"({errors} with an error)" if errors else "")
+
+        yield show
+
+
+def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
+    """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
+    failed = [row for row in rows if row["error"] is not None]
+    violated = sum(row["bound_kept"] is False for row in rows)
+    refuted = sum(row["asked"] == "refuted" for row in rows)
+    undecided = sum(row["verdict"] == "undecided" or row["asked"] == "undecided" for row in rows)
+    said = (
+        (violated, "violated: the simulated run exceeds the proved bound; please report", VIOLATED),
+        (refuted, "refuted: what was asked does not hold", REFUTED_EXPECTATION),
+        (undecided, "undecided", UNDECIDED),
+        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}", UNDECIDED),
+    )
+    for count, text, _ in said:
+        if count:
+            click.echo(f"note: {count} of {len(rows)} graphs: {text}", err=True)
+    return next((code for count, _, code in said if count), OK)
+
+
 def _refuse_output(output: str | None, graph: str) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
     if not output:
@@ -655,14 +855,6 @@ def _refuse_output(output: str | None, graph: str) -> None:
         raise ParameterError(f"{output}: is the graph itself; name another file")
 
 
-def _save_figure(figure: Any, path: str | Path) -> None:
-    from ptcc_certify.io import write_atomically
-
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=Path(path).suffix.lower().lstrip("."), dpi=150)
-    write_atomically(path, buffer.getvalue())
-
-
 def _save_curve(found: Design, path: str) -> None:
     """Write peak input against deadline: CSV, or a figure."""
     from ptcc_certify.io import write_atomically
@@ -673,9 +865,9 @@ def _save_curve(found: Design, path: str) -> None:
         lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
         write_atomically(path, "\n".join(lines) + "\n")
     else:
-        from ptcc_certify.plots import plot_trade_off
+        from ptcc_certify.plots import plot_trade_off, save_figure
 
-        _save_figure(plot_trade_off(found).figure, path)
+        save_figure(plot_trade_off(found).figure, path)
 
 
 def _make_folder(path: str) -> None:

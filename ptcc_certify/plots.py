@@ -300,7 +300,7 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
         ax.set_ylim(max(least, 1e-18) / 3, 3 * max(float((norm / scale).max()), float((bound / scale).max())))
     ax.set_yscale("log")
     if axis == "left":
-        ax.set_xscale("log")
+        ax.set_xscale("log", subs=[])  # ticks at decades only
         ax.invert_xaxis()
     ax.set_xlabel(_DECAY_AXES[axis])
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
@@ -543,9 +543,10 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     ax.set_aspect("equal")
     low, high = place.min(axis=0), place.max(axis=0)
     span = max(high - low) or 1.0
-    for limit, middle, own in zip((ax.set_xlim, ax.set_ylim), (low + high) / 2, high - low, strict=True):
-        half = 0.62 * max(own, 0.6 * span)  # a path is drawn as a line, in axes that are none
-        limit(middle - half, middle + half)
+    half = 0.62 * np.maximum(high - low, 0.6 * span)  # a path is drawn as a line, in axes that are none
+    (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
+    ax.set_xlim(left, right)
+    ax.set_ylim(bottom, top)
     ax.set_axis_off()
     _legend_above(ax)
     return ax

@@ -34,9 +34,9 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
     negative = int((graph.sign < 0).sum())
     lines = [
         _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
-        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
+        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])),
         _line("nodes", _listed(graph.labels)),
-        _line("structure", _structure_text(structure)),
+        _line("structure", structure_text(structure)),
     ]
     for number, component in list(enumerate(structure.closed_components, start=1))[:4]:
         nodes = [graph.labels[v] for v in component.nodes]
@@ -67,8 +67,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     parameters = ", ".join(f"{name} {float(getattr(p, name)):.12g}" for name in names)
     lines = [
         _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
-        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *_remarks(structure)])),
-        _line("structure", _structure_text(structure)),
+        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])),
+        _line("structure", structure_text(structure)),
         *_claim_lines(structure, certificate.claims, _deadline(certificate)),
         _line("protocol", f"{p.kind}: {parameters}"),
     ]
@@ -79,7 +79,7 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         kind = "exact" if certificate.outcome.exact else "floating point"
         if certificate.enclosed is not None and certificate.enclosed.radius is not None:
             widest = Fraction(float(certificate.enclosed.radius.max())) * certificate.enclosed.unit
-            kind = f"to within {_up(widest, 2)}, proved" if widest else "exact"
+            kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
         lines.append(_line("ends at", f"{_pairs(graph.labels, certificate.outcome.final_state)} ({kind})"))
         if certificate.outcome.degenerate:
             groups = ", ".join(map(str, certificate.outcome.degenerate))
@@ -96,7 +96,7 @@ def _rate_lines(certificate: Certificate) -> list[str]:
     rate, spectral, limit = certificate.rate, certificate.spectral_rate, certificate.limit
     best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
     if limit is not None:
-        best = f"; none exceeds {_up(limit.value, 8)}, proved"
+        best = f"; none exceeds {up(limit.value, 8)}, proved"
     if certificate.constant:
         kept = "its state" if certificate.direct else "x - sigma"
         return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
@@ -105,8 +105,8 @@ def _rate_lines(certificate: Certificate) -> list[str]:
         return [_line("rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}")]
     near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
     if limit is not None:
-        near = f", tightness at least {_down(rate / limit.value, 4)}"
-    lines = [_line("rate", f"{_down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}")]
+        near = f", tightness at least {down(rate / limit.value, 4)}"
+    lines = [_line("rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}")]
     lines += _class_lines(certificate)
     lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     lines += _distance_lines(certificate)
@@ -125,14 +125,14 @@ def _class_lines(certificate: Certificate) -> list[str]:
     V, lines = certificate.lyapunov, []
     if V is not None and certificate.proof.rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
-        prefactor = f"||{V.coordinates}||^2 prefactor {_up(V.prefactor, 4)}"
-        lines.append(_line("", f"paper {_down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"))
+        prefactor = f"||{V.coordinates}||^2 prefactor {up(V.prefactor, 4)}"
+        lines.append(_line("", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"))
     found = certificate.sharpening
     if found.tried:
         tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
         limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
         lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit})"))
-        taken = [f"{m.kind} {_signed(m.rate, 4)} (prefactor {_up(m.prefactor, 2)})" for m in found.members]
+        taken = [f"{m.kind} {_signed(m.rate, 4)} (prefactor {up(m.prefactor, 2)})" for m in found.members]
         lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
     return lines
 
@@ -144,12 +144,12 @@ def _distance_lines(certificate: Certificate) -> list[str]:
     labels = certificate.graph.labels
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
     worst = certificate.outcome_distance([q for q, _ in instants]).max(axis=0, initial=0.0)
-    said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, instants, strict=True))
+    said = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, instants, strict=True))
     lines = [_line("distance", f"of every agent to its outcome at most {said}")] if instants else []
     if certificate.at is not None:
         q = float(1 - certificate.at / certificate.protocol.T)
         each = certificate.outcome_distance([q])[:, 0]
-        listed = _listed([f"{label} {_up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
+        listed = _listed([f"{label} {up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
         lines.append(_line("", f"at t = {float(certificate.at):.12g}: {listed}"))
     return lines
 
@@ -160,12 +160,12 @@ def _effort_lines(certificate: Certificate) -> list[str]:
     if effort is None or certificate.constant:
         return []
     lower, upper = effort.threshold
-    product = f"rho2 kappa min Re lambda >= {_down(lower, 5)}" if lower is not None else "nothing else is proved"
+    product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
     if effort.bounded:
         how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
         lines = [_line("input", f"bounded up to the deadline for every start: {how}")]
     elif effort.bounded is False:
-        below = f" <= {_up(upper, 5)}" if upper is not None and effort.by == "limit" else " = 1 or less"
+        below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "limit" else " = 1 or less"
         lines = [
             _line("INPUT", "NOT BOUNDED: the state converges, but from some starts the input grows without limit"),
             _line("", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"),
@@ -176,9 +176,9 @@ def _effort_lines(certificate: Certificate) -> list[str]:
     if effort.peak is not None:
         most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
         label = certificate.graph.labels[most]
-        sizes = [f"|u_k| <= {_up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {_up(effort.peak.norm, 4)}"]
-    sizes += [f"int ||u||^2 dt <= {_up(effort.energy.value, 4)}"] if effort.energy is not None else []
-    sizes += [f"int ||u|| dt <= {_up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
+        sizes = [f"|u_k| <= {up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {up(effort.peak.norm, 4)}"]
+    sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
+    sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
     if sizes:
         whom = "" if effort.starts is None else " for all these starts"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
@@ -194,24 +194,24 @@ def _effort_lines(certificate: Certificate) -> list[str]:
     for entry in effort.residual:
         named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
         said = [f"{what}{float(x):.6g}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
-        agents = "" if entry.agents is None else f", every agent within {_up(max(entry.agents), 3)} of its outcome"
-        largest = "" if entry.largest is None else f", |u_k| <= {_up(entry.largest, 4)}"
-        lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {_up(entry.norm, 3)}{agents}{largest}"))
+        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its outcome"
+        largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
+        lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"))
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-            noise = f"noise |n_k| <= {float(entry.noise):.6g} leaves ||E|| <= {_up(entry.noisy_norm, 3)} at T"
-            lines.append(_line("", f"{noise}, |u_k| <= {_up(entry.noisy_largest, 4)}"))
+            noise = f"noise |n_k| <= {float(entry.noise):.6g} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
+            lines.append(_line("", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"))
     if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
         lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
     if effort.longest_period is not None:
-        lines.append(_line("limited", f"not certified with this period; up to {_down(effort.longest_period, 4)} it is"))
+        lines.append(_line("limited", f"not certified with this period; up to {down(effort.longest_period, 4)} it is"))
     elif len(effort.residual) < len(certificate.limits):
         lines.append(_line("limited", "nothing is certified under these limits"))
     if effort.disturbed is not None:
         d, drift = effort.disturbed, effort.disturbed.drift
         ends = "" if drift is None else ", and all end where they would without"
         if drift is not None and any(drift):
-            ends = f", every agent ends within {_up(max(drift), 4)} of its outcome"
-        more = f"|d_k| <= {float(d.delta):.6g} adds at most {_up(max(d.inputs), 4)} to |u_k|"
+            ends = f", every agent ends within {up(max(drift), 4)} of its outcome"
+        more = f"|d_k| <= {float(d.delta):.6g} adds at most {up(max(d.inputs), 4)} to |u_k|"
         lines.append(_line("disturbed", f"{more}{ends}"))
     elif certificate.delta is not None:
         lines.append(_line("disturbed", "nothing is certified: the rate proves no bounded input"))
@@ -222,7 +222,7 @@ def _remedy(certificate: Certificate) -> str:
     """Say what makes the input bounded."""
     if certificate.rate is None:
         return "raise rho2 * kappa"
-    return f"raise rho2 * kappa to {_up(2 / certificate.rate, 5)} or more"
+    return f"raise rho2 * kappa to {up(2 / certificate.rate, 5)} or more"
 
 
 def _sliding_share(certificate: Certificate) -> float:
@@ -233,10 +233,10 @@ def _sliding_share(certificate: Certificate) -> float:
 
 def _residual_lines(certificate: Certificate) -> list[str]:
     coordinates, at = certificate.envelope.coordinates, certificate.at
-    proved = [f"{_up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
+    proved = [f"{up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
     if at is not None:
         own = certificate.envelope.residual(float(1 - at / certificate.protocol.T))
-        proved.insert(0, f"{_up(own, 3)} at t = {float(at):.12g}")
+        proved.insert(0, f"{up(own, 3)} at t = {float(at):.12g}")
     lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
@@ -258,7 +258,7 @@ def _reaching_lines(certificate: Certificate) -> list[str]:
     share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
     bounds = envelope.state_bound(np.array([q for q, _ in chosen]), certificate.start)
-    said = ", ".join(f"{_up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
+    said = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
     return [_line("left", f"||{coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)")]
 
 
@@ -328,8 +328,8 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
         said = []
         if last is not None and last.z:
             agent = labels[reaching.index(last)]
-            left = f"{_down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
-            said.append(f"{'others' if late else 'all'} by t = {_up(last.time, 6)}, {left} (agent {agent})")
+            left = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
+            said.append(f"{'others' if late else 'all'} by t = {up(last.time, 6)}, {left} (agent {agent})")
         if late:
             p = certificate.protocol
             pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r  # type: ignore[union-attr]
@@ -353,7 +353,8 @@ def _claim_text(claim: Claim, when: str) -> str:
     return f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})"
 
 
-def _structure_text(structure: Structure) -> str:
+def structure_text(structure: Structure) -> str:
+    """Return connectivity, closed components, leaders and followers, and balance in one line."""
     words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
     connectivity = words.get(structure.connectivity, f"disconnected, {len(structure.components)} components")
     closed = structure.closed_components
@@ -363,7 +364,8 @@ def _structure_text(structure: Structure) -> str:
     return f"{connectivity}; {groups}; {followers}; whole graph {'balanced' if structure.balanced else 'unbalanced'}"
 
 
-def _remarks(structure: Structure) -> list[str]:
+def remarks_on(structure: Structure) -> list[str]:
+    """Return what is particular about a graph and about how it was read."""
     read = structure.graph.read
     remarks = [
         text
@@ -381,16 +383,18 @@ def _remarks(structure: Structure) -> list[str]:
     return [*remarks, *read["notes"]]
 
 
-def _down(x: Fraction | float, digits: int = 6) -> str:
+def down(x: Fraction | float, digits: int = 6) -> str:
+    """Write a positive number with few digits that is not above it."""
     return _rounded(x, digits, ROUND_FLOOR)
 
 
 def _signed(x: Fraction | float, digits: int) -> str:
     """Write a proved rate, rounded down; a negative one bounds the growth."""
-    return _down(x, digits) if x > 0 else f"-{_up(-x, digits)}" if x < 0 else "0"
+    return down(x, digits) if x > 0 else f"-{up(-x, digits)}" if x < 0 else "0"
 
 
-def _up(x: Fraction | float, digits: int) -> str:
+def up(x: Fraction | float, digits: int) -> str:
+    """Write a positive number with few digits that is not below it."""
     return _rounded(x, digits, ROUND_CEILING)
 
 

@@ -1,0 +1,518 @@
+"""Certificates read back from their files: what was proved, as the objects it was proved with.
+
+Nothing is taken from a file that the independent check does not accept, and nothing from its key ``unverified``. Bounds
+are rebuilt from the exact numbers of the file and rounded to the safe side, as those of a fresh certificate are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.bounds import Comparison, Envelope, Member, float_above, float_below
+from ptcc_certify.checker import CheckReport, check, read
+from ptcc_certify.checker.reading import exact, interval, triangle
+from ptcc_certify.checker.vectors import Numbers, SideFiles, beside
+from ptcc_certify.distance import DistanceBound
+from ptcc_certify.effort import Disturbed, Effort, Limited, Limits, Peak, SlidingPart, Starts, Witness
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.graph import SignedDigraph, Weights
+from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.rationals import shorten
+from ptcc_certify.reaching import ReachingTime
+from ptcc_certify.simulation import simulate
+from ptcc_certify.sliding_bounds import SlidingEnvelope
+from ptcc_certify.structure import Claim, Structure, analyse
+from ptcc_certify.theorems import LyapunovBlock, LyapunovFunction, sliding_claim
+from ptcc_certify.trajectory import Trajectory
+
+Interval = tuple[Fraction, Fraction]
+Document = Mapping[str, Any]
+
+#: What a simulated run meets under the sliding-mode protocol unless the file states an expression.
+ADVERSARY = "adversary"
+
+
+class RejectedCertificate(PTCCError, ValueError):
+    """The independent check does not accept a certificate; ``path`` names it, ``report`` tells what it found."""
+
+    def __init__(self, path: Path, report: CheckReport):
+        self.path, self.report = path, report
+        reason = f"the independent check rejects {report.rejected}: {report.reason}"
+        super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SavedCertificate:
+    """A certificate as its file states it, accepted by the independent check; made by :func:`read_certificate`.
+
+    Attributes
+    ----------
+    path : Path
+    sha256 : str
+        Of the file.
+    document : mapping
+        The JSON of the file. What stands under ``unverified`` is the file's own word.
+    report : CheckReport
+        Of the independent check, accepted.
+    structure : Structure
+        Computed anew from the edges.
+    protocol : NominalProtocol or SlidingModeProtocol
+    start, sigma0 : tuple of N Fraction, or None
+        ``X(0)``; ``sigma(0)`` of the sliding-mode protocol.
+    final_state : tuple of N pairs of Fraction, or None
+        Middle and radius of a proved interval for each agent's state at the deadline; radius 0 where it is exact.
+    degenerate : tuple of int
+        1-based numbers of the balanced closed components that meet at 0.
+    reaching : tuple of N ReachingTime, or None
+        Proved reaching times of the sliding-mode protocol.
+    lyapunov : LyapunovFunction or None
+        The paper's own, of a proved rate.
+    envelope : Envelope or SlidingEnvelope
+        The proved bounds over time.
+    effort : Effort or None
+        What is proved about the input. Bounds in ``peak.how`` include the sliding part.
+    trajectory : Trajectory or None
+        A run repeated by :meth:`with_simulation`; a file holds none.
+    comparison : Comparison or None
+        That run against the bounds.
+    """
+
+    path: Path
+    sha256: str
+    document: Document
+    report: CheckReport
+    structure: Structure
+    protocol: Protocol
+    start: tuple[Fraction, ...] | None
+    sigma0: tuple[Fraction, ...] | None
+    final_state: tuple[Interval, ...] | None
+    degenerate: tuple[int, ...]
+    reaching: tuple[ReachingTime, ...] | None
+    lyapunov: LyapunovFunction | None
+    envelope: Envelope
+    effort: Effort | None
+    trajectory: Trajectory | None = None
+    comparison: Comparison | None = None
+
+    @property
+    def graph(self) -> SignedDigraph:
+        """The graph."""
+        return self.structure.graph
+
+    @property
+    def verdict(self) -> str:
+        """``certified`` or ``undecided``, as the independent check confirms."""
+        return self.report.verdict
+
+    @cached_property
+    def claims(self) -> tuple[Claim, ...]:
+        """What the theorems say of each of ``structure.components``."""
+        claims = tuple(component.claim for component in self.structure.components)
+        return tuple(map(sliding_claim, claims)) if isinstance(self.protocol, SlidingModeProtocol) else claims
+
+    @property
+    def claim(self) -> Claim | None:
+        """What is claimed of a weakly connected graph; None if disconnected (see ``claims``)."""
+        return self.claims[0] if len(self.claims) == 1 else None
+
+    @property
+    def constant(self) -> bool:
+        """Whether every agent keeps its state, so that there is no decay to certify."""
+        return self.graph.n_edges == 0
+
+    @property
+    def direct(self) -> bool:
+        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
+        return not any(self.sigma0 or ())
+
+    @property
+    def rate(self) -> Fraction | None:
+        """The largest proved rate, per unit of the stretched clock."""
+        return _maybe(self.document["rates"]["certified"])
+
+    @property
+    def paper_rate(self) -> Fraction | None:
+        """The rate of the paper's own certificate."""
+        return _maybe(self.document["rates"]["paper"])
+
+    @property
+    def rate_limit(self) -> Fraction | None:
+        """A proved bound that no rate of any Lyapunov function exceeds."""
+        return _maybe(self.document["rates"]["limit"])
+
+    @property
+    def prefactor(self) -> Fraction | None:
+        """What multiplies the squared norm at the largest proved rate."""
+        said = self.document["prefactor"]
+        return None if said is None else exact(said["value"])
+
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start, (M,).
+
+        At the instants where ``1 - t/T`` is ``remaining``; under the sliding-mode protocol whatever the disturbance.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        """
+        return self.envelope.norm_bound(remaining, self._known_start())
+
+    def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k(t) - x_k(T)|`` from the start, (N, M), at the instants where ``1 - t/T`` is ``remaining``.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        """
+        start = self._known_start()
+        if isinstance(self.envelope, SlidingEnvelope) and not self.direct:
+            return self.envelope.outcome_distance(np.asarray(remaining, dtype=float), start)
+        clocks = np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
+        return self.envelope.distance(clocks, start)
+
+    @property
+    def disturbance(self) -> str | None:
+        """The disturbance of a repeated run: the file's, if it is an expression, otherwise ``adversary``.
+
+        None for the nominal protocol. No part of the claim, which holds for every disturbance within ``delta``.
+        """
+        if not isinstance(self.protocol, SlidingModeProtocol):
+            return None
+        from ptcc_certify.disturbance import ExpressionDisturbance
+
+        said = self.document["protocol"]["disturbance"]
+        if said is None or said == "none":
+            return said or ADVERSARY
+        try:
+            ExpressionDisturbance(said)
+        except PTCCError:
+            return ADVERSARY
+        return said
+
+    def simulate(self, **options: Any) -> Trajectory:
+        """Run the protocol again from the start with CVODES, without whatever limits of the gain were judged.
+
+        Under the sliding-mode protocol with :attr:`disturbance`; with the adversary where that exceeds ``delta``.
+
+        Parameters
+        ----------
+        **options
+            ``samples`` and others of :func:`ptcc_certify.simulation.simulate`.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        SimulationError
+            The integrator failed.
+        """
+        start = [float(x) for x in self._known_start()]
+        if self.sigma0 is None:
+            return simulate(self.graph, self.protocol, start, **options)
+        options["sigma0"] = [float(x) for x in self.sigma0]
+        try:
+            return simulate(self.graph, self.protocol, start, disturbance=self.disturbance, **options)
+        except ParameterError:
+            if self.disturbance == ADVERSARY:
+                raise
+            return simulate(self.graph, self.protocol, start, disturbance=ADVERSARY, **options)
+
+    def with_simulation(self, **options: Any) -> SavedCertificate:
+        """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``; see :meth:`simulate`."""
+        run = self.simulate(**options)
+        bounded = bool(self.envelope.members) or isinstance(self.envelope, SlidingEnvelope)
+        return replace(self, trajectory=run, comparison=self.envelope.compare(run) if bounded else None)
+
+    def _known_start(self) -> tuple[Fraction, ...]:
+        if self.start is None:
+            raise ParameterError("the certificate has no start; certify the graph with x0")
+        return self.start
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook what the independent check verified."""
+        return f"<pre>{html.escape(chr(10).join([repr(self), *self.report.lines()]))}</pre>"
+
+    def __repr__(self) -> str:
+        rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
+        said = self.claim.behaviour if self.claim else f"{len(self.claims)} components"
+        return f"SavedCertificate({said}, rate {rate}, {self.verdict}, {self.graph.n_nodes} nodes)"
+
+
+def read_certificate(path: str | Path, *, stdlib: bool = False) -> SavedCertificate:
+    """Check a certificate's file with the independent check, and read it back.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of schema ``ptcc-certificate/1``; its side files are in the same folder.
+    stdlib : bool
+        Let the check use the standard library alone.
+
+    Returns
+    -------
+    SavedCertificate
+        Its verdict is ``certified`` or ``undecided``.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read as a certificate.
+    RejectedCertificate
+        The check does not accept it; nothing in it may be taken for proved.
+    PTCCError
+        A weight or parameter is exact in the file, but beyond the range of float64.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from ptcc_certify import NominalProtocol, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> with TemporaryDirectory() as folder:
+    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
+    ...     saved = read_certificate(f"{folder}/c.json")
+    >>> saved, saved.report.accepted
+    (SavedCertificate(bipartite consensus, rate 4, certified, 2 nodes), True)
+    >>> [str(x) for x, radius in saved.final_state]
+    ['-1', '1']
+    """
+    path = Path(path)
+    document = read(path)
+    sha256 = _file_hash(path)
+    report = check(path, stdlib=stdlib)
+    if _file_hash(path) != sha256:
+        raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
+    if not report.accepted:
+        raise RejectedCertificate(path, report)
+    return _Reader(path, document).certificate(sha256, report)
+
+
+def _file_hash(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
+
+
+def _maybe(text: str | None) -> Fraction | None:
+    return None if text is None else exact(text)
+
+
+class _Reader:
+    """Turns the JSON of an accepted certificate into objects; the check has verified that every part is there."""
+
+    def __init__(self, path: Path, document: Document):
+        self.path, self.document = path, document
+        self.files = SideFiles(path.parent, None)
+        self.graph = self._graph()
+        self.structure = analyse(self.graph)
+        self.steps = {(step["kind"], step["of"]): step for step in document["proof"]}
+
+    def certificate(self, sha256: str, report: CheckReport) -> SavedCertificate:
+        """Return the whole."""
+        data, protocol = self.document, self._protocol()
+        sigma0, lyapunov, reaching = self._state("sigma0"), self._paper(), None
+        members = tuple(self._member(k, said, lyapunov) for k, said in enumerate(data["lyapunov"]["members"]))
+        envelope = Envelope(self.structure, protocol.gain, members)
+        if isinstance(protocol, SlidingModeProtocol):
+            reaching = tuple(ReachingTime(protocol.T_r, _maybe(z)) for z in data["reaching_time"]["z"].values())
+            envelope = SlidingEnvelope(self.structure, protocol.gain, members, protocol, sigma0 or (), reaching)
+        outcome = data["outcome"]
+        return SavedCertificate(
+            path=self.path,
+            sha256=sha256,
+            document=data,
+            report=report,
+            structure=self.structure,
+            protocol=protocol,
+            start=self._state("initial_state"),
+            sigma0=sigma0,
+            final_state=None if outcome is None else self._final_state(outcome["final_state"]),
+            degenerate=() if outcome is None else tuple(outcome["degenerate"] or ()),
+            reaching=reaching,
+            lyapunov=lyapunov,
+            envelope=envelope,
+            effort=self._effort(),
+        )
+
+    # ------------------------------------------------------------------ graph, protocol, states
+
+    def _graph(self) -> SignedDigraph:
+        said = self.document["graph"]
+        labels, edges = said["nodes"], said["edges"]
+        if isinstance(edges, dict):
+            source, target, weight = (
+                np.array(self.files.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
+            )
+            scale = exact(edges["scale"])
+            values, codes = np.unique(weight, return_inverse=True)
+            weights = Weights([Fraction(x) / scale for x in values.tolist()], codes)
+        else:
+            index = {label: i for i, label in enumerate(labels)}
+            source = np.array([index[s] for s, _, _ in edges], dtype=np.int64)
+            target = np.array([index[t] for _, t, _ in edges], dtype=np.int64)
+            weights = Weights([exact(w) for _, _, w in edges])
+        return SignedDigraph(labels, source, target, weights, said["read"])
+
+    def _protocol(self) -> Protocol:
+        said = {key: value for key, value in self.document["protocol"].items() if key not in ("kind", "disturbance")}
+        kind = NominalProtocol if self.document["protocol"]["kind"] == "nominal" else SlidingModeProtocol
+        return kind(**{key: exact(value) for key, value in said.items()})
+
+    def _by_agent(self, said: Any) -> tuple[Fraction, ...]:
+        """Read numbers by agent: an object in the order of the nodes, or a side vector."""
+        if beside(said):
+            return tuple(self.files.numbers(said, "a vector", self.graph.n_nodes))
+        return tuple(map(exact, said.values()))
+
+    def _state(self, key: str) -> tuple[Fraction, ...] | None:
+        said = self.document[key]
+        return None if said is None else self._by_agent(said)
+
+    def _final_state(self, said: Any) -> tuple[Interval, ...] | None:
+        if said is None:
+            return None
+        if list(said) == ["mid", "radius"] and beside(said["mid"]):
+            return tuple(zip(self._by_agent(said["mid"]), self._by_agent(said["radius"]), strict=True))
+        return tuple(map(interval, said.values()))
+
+    def _nodes(self, said: Any) -> tuple[int, ...]:
+        if beside(said):
+            return tuple(self.files.integers(said, "nodes", said["count"]))
+        return tuple(self.graph.index[label] for label in said)
+
+    # ------------------------------------------------------------------ Lyapunov functions
+
+    def _paper(self) -> LyapunovFunction | None:
+        """Return the Lyapunov function of the theorem's row, if a rate of it was proved."""
+        said = self.document["paper"]
+        if said is None or said["rate"] is None:
+            return None
+        blocks = tuple(
+            LyapunovBlock(b["name"], self._nodes(b["nodes"]), tuple(map(exact, b["diagonal"])), b["times_rho"])
+            for b in said["blocks"]
+        )
+        return LyapunovFunction(said["theorem"], said["objective"], said["coordinates"], blocks, _maybe(said["rho"]))
+
+    def _member(self, k: int, said: Document, paper: LyapunovFunction | None) -> Member:
+        """Return one bound, rounded to the safe side as :meth:`Member.of` and :meth:`Member.of_sharp` round it."""
+        rate, given = exact(said["rate"]), said["distance"]
+        distance = None if given is None else DistanceBound(self._by_agent(given["agents"]), exact(given["norm"]))
+        if said["class"] == "paper":
+            assert paper is not None
+            return Member.of(self.structure, paper, rate, distance=distance)
+        (block,) = said["blocks"]
+        nodes = self._nodes(block["nodes"])
+        if "diagonal" in block:
+            numbers = self.files.numbers(block["diagonal"], "diagonal", len(nodes))
+            weights = _floats(numbers)
+            lowest = Fraction(min(numbers.values)) / (numbers.scale or 1)
+        else:
+            lower = triangle(block["lower_triangle"], len(nodes))
+            weights = np.array([[float(x) for x in row] for row in lower])
+            lowest = exact(self.steps["prefactor", f"lyapunov.members[{k}]"]["numbers"]["lowest"])
+        return Member(
+            said["class"],
+            "E",
+            np.array(nodes, dtype=np.int64),
+            weights,
+            None,
+            float_below(rate),
+            float_above(exact(said["prefactor"])),
+            float_below(lowest),
+            distance,
+        )
+
+    # ------------------------------------------------------------------ input
+
+    def _effort(self) -> Effort | None:
+        said = self.document["effort"]
+        if said is None:
+            return None
+        by_agent = self._maybe_by_agent
+        sliding = said["sliding"]
+        threshold = said["threshold"]
+        return Effort(
+            bounded=said["bounded"],
+            by=None if said["bounded"] is None else self.steps["input-threshold", "effort"]["witness"],
+            threshold=(_maybe(threshold["lower"]), _maybe(threshold["upper"])),
+            starts=self._starts(said["starts"]),
+            constants=tuple(map(by_agent, said["constants"])),
+            peak=self._peak(said["peak"]),
+            energy=self._witness(said["energy"], "input-energy"),
+            path_length=self._witness(said["path_length"], "input-length"),
+            sliding=None if sliding is None else SlidingPart(sliding["bounded"], by_agent(sliding["agents"])),
+            residual=tuple(self._limited(k, entry) for k, entry in enumerate(said["residual"])),
+            disturbed=self._disturbed(said["disturbed"]),
+        )
+
+    def _maybe_by_agent(self, said: Any) -> tuple[Fraction, ...] | None:
+        return None if said is None else self._by_agent(said)
+
+    def _starts(self, said: Document | None) -> Starts | None:
+        if said is None:
+            return None
+        axes = tuple(map(self._by_agent, said.get("axes", ())))
+        return Starts(self._by_agent(said["center"]), () if axes else self._by_agent(said["radius"]), axes)
+
+    def _witness(self, said: str | None, kind: str) -> Witness | None:
+        if said is None:
+            return None
+        step = self.steps[kind, "effort"]
+        return Witness(exact(said), step["witness"], exact(step["numbers"]["z"]))
+
+    def _peak(self, said: Document | None) -> Peak | None:
+        if said is None:
+            return None
+        step = self.steps["input-peak", "effort"]
+        agents, norm = self._by_agent(said["agents"]), exact(said["norm"])
+        how = step["witness"]["agents"].values()
+        return Peak(
+            agents,
+            tuple(Witness(bound, k, exact(z)) for bound, (k, z) in zip(agents, how, strict=True)),
+            norm,
+            Witness(norm, step["witness"]["norm"], exact(step["numbers"]["z"])),
+        )
+
+    def _limited(self, k: int, said: Document) -> Limited:
+        step, noise = self.steps["limited-gain", f"effort.residual[{k}]"], said["noise"] or {}
+        first, second = (*step["witness"], None)[:2] if isinstance(step["witness"], list) else (step["witness"], None)
+        return Limited(
+            limits=Limits(*(_maybe(said[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
+            clock=exact(said["clock"]),
+            member=first,
+            growth=exact(step["numbers"]["growth"]),
+            norm=exact(said["norm"]),
+            agents=self._maybe_by_agent(said["agents"]),
+            largest=_maybe(said["largest"]),
+            noise=_maybe(noise.get("bound")),
+            noise_member=second,
+            noisy_norm=_maybe(noise.get("norm")),
+            noisy_largest=_maybe(noise.get("largest")),
+        )
+
+    def _disturbed(self, said: Document | None) -> Disturbed | None:
+        if said is None:
+            return None
+        member = self.steps["nominal-disturbed", "effort"]["witness"]
+        return Disturbed(
+            exact(said["delta"]), member, self._by_agent(said["inputs"]), self._maybe_by_agent(said["drift"])
+        )
+
+
+def _floats(numbers: Numbers) -> np.ndarray:
+    """Return the floats nearest to exact numbers, each rounded once."""
+    if numbers.scale is None:
+        return np.array([float(x) for x in numbers.values])
+    return np.array([x / numbers.scale for x in numbers.values])

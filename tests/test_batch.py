@@ -1,0 +1,697 @@
+"""Many graphs, one table: random graphs are of their class, rows say what certificates say, and nothing gets lost."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import json
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+import pytest
+from bad_inputs import ptcc
+
+from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, certify, certify_many
+from ptcc_certify import batch as module
+from ptcc_certify.batch import COLUMNS, Row, table_bytes
+from ptcc_certify.ensembles import CONNECTIVITIES
+from ptcc_certify.examples import load_graph
+from ptcc_certify.io import read_graph, write_graph
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+TRIANGLE = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 1, 2)])
+#: Small graphs of all classes, which take about a tenth of a second each, and tiny ones, which take less.
+SPEC = "count = 8\nseed = 5\nnodes = { from = 5, to = 6 }\n"
+TINY = 'count = 8\nseed = 5\nnodes = 3\nconnectivity = "strong"\nbalanced = false\n'
+QUICK = ("--method", "perron", "--workers", "1")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("spec.toml").write_text(TINY)
+    return tmp_path
+
+
+def quickly(sources: Any, **more: Any) -> list[Row]:
+    return certify_many(sources, PROTOCOL, **{"method": "perron", **more})
+
+
+def facts(rows: list[Row]) -> list[Row]:
+    """Rows without what the clock says."""
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in rows]
+
+
+def texts(rows: list[Row]) -> list[dict[str, str]]:
+    """Rows as :func:`read_csv` reads them."""
+    table = table_bytes([dict.fromkeys(COLUMNS) | row for row in facts(rows)], ".csv").decode()
+    return facts(list(csv.DictReader(io.StringIO(table))))
+
+
+def names(folder: str = ".") -> list[str]:
+    return sorted(path.name for path in Path(folder).iterdir())
+
+
+def read_csv(path: str) -> list[dict[str, str]]:
+    with Path(path).open(newline="", encoding="utf-8") as file:
+        return facts(list(csv.DictReader(file)))
+
+
+# ---------------------------------------------------------------------- ensembles
+
+
+def balanced_by_trial(graph: nx.DiGraph) -> bool:
+    """Whether some assignment of camps agrees with every edge, by trying all."""
+    nodes = list(graph)
+    for camps in itertools.product((1, -1), repeat=len(nodes) - 1):
+        side = dict(zip(nodes, (1, *camps), strict=True))
+        if all(w * side[a] * side[b] > 0 for a, b, w in graph.edges(data="weight")):
+            return True
+    return False
+
+
+CLASSES = [
+    (c, b, u) for c in CONNECTIVITIES for b in (True, False) for u in (False, True) if not u or c in CONNECTIVITIES[::3]
+]
+
+
+@pytest.mark.parametrize(("connectivity", "balanced", "undirected"), CLASSES)
+def test_graphs_are_of_their_class(connectivity: str, balanced: bool, undirected: bool):
+    for degree in (0, 2.5, 1000):
+        ensemble = Ensemble(
+            count=12,
+            nodes=range(6, 9),
+            seed=int(degree),
+            connectivity=connectivity,
+            balanced=balanced,
+            mean_degree=degree,
+            undirected=undirected,
+        )
+        for i in range(ensemble.count):
+            graph = ensemble.graph(i)
+            structure = analyse(graph)
+            assert ensemble.kind(i) == (connectivity, balanced)
+            assert structure.connectivity == connectivity
+            assert {c.balanced for c in structure.closed_components} == {balanced}
+            assert structure.undirected or not undirected
+            # The same without this package.
+            picture = nx.DiGraph()
+            picture.add_nodes_from(graph.labels)
+            picture.add_weighted_edges_from((a, b, float(w)) for a, b, w in graph.edges)
+            condensed = nx.condensation(picture)
+            closed = [condensed.nodes[v]["members"] for v, k in condensed.in_degree() if k == 0]
+            assert nx.is_strongly_connected(picture) == (connectivity == "strong")
+            assert nx.is_weakly_connected(picture) == (connectivity != "disconnected")
+            if connectivity in ("quasi-strong", "weak"):
+                assert (len(closed) == 1) == (connectivity == "quasi-strong")
+            assert all(balanced_by_trial(picture.subgraph(members)) == balanced for members in closed)
+            if undirected:
+                assert all(picture[b][a]["weight"] == w for a, b, w in picture.edges(data="weight"))
+
+
+def test_a_graph_depends_on_the_seed_and_its_number_alone():
+    few, many = (Ensemble(count=n, nodes=(5, 9), seed=3) for n in (4, 400))
+    assert [few.graph(i) for i in range(4)] == [many.graph(i) for i in (3, 2, 1, 0)][::-1]
+    again = pickle.loads(pickle.dumps(many))  # noqa: S301 - as workers get it
+    assert again.graph(399) == many.graph(399)
+    assert len({many.graph(i).sha256 for i in range(400)}) == 400
+    assert Ensemble(count=4, nodes=(5, 9), seed=4).graph(0) != few.graph(0)
+
+
+def test_sizes_degrees_and_weights_are_what_was_asked_for():
+    for i, (n, degree) in enumerate([(6, 2), (9, 2.5), (30, 4), (300, 7)]):
+        graph = Ensemble(count=9, nodes=n, connectivity="strong", mean_degree=degree, seed=i).graph(i)
+        assert (graph.n_nodes, graph.n_edges) == (n, round(degree * n))
+    complete = Ensemble(count=1, nodes=7, connectivity="strong", mean_degree=1000).graph(0)
+    assert complete.n_edges == 7 * 6
+    drawn = Ensemble(count=60, nodes=[5, 11], seed=2)
+    assert {drawn.graph(i).n_nodes for i in range(60)} == {5, 11}
+    low, high = Fraction(1, 3), Fraction("0.5004")
+    narrow = Ensemble(count=4, nodes=12, weight_range=(low, high), mean_degree=6)
+    sizes = {abs(w) for i in range(4) for _, _, w in narrow.graph(i).edges}
+    assert low <= min(sizes) and max(sizes) <= high and len(sizes) > 20
+    wide = Ensemble(count=4, nodes=40, weight_decades=8, mean_degree=6)
+    logs = [math.log10(abs(w)) for i in range(4) for _, _, w in wide.graph(i).edges]
+    assert -4 <= min(logs) < -3 and 3 < max(logs) <= 4
+    friendly = Ensemble(count=8, nodes=6, balanced=True, negative=0)
+    assert all(analyse(friendly.graph(i)).all_positive for i in range(8))
+
+
+def test_classes_take_turns():
+    ensemble = Ensemble(count=16, nodes=6)
+    kinds = [ensemble.kind(i) for i in range(16)]
+    assert kinds[:8] == kinds[8:] == list(zip(CONNECTIVITIES * 2, [True] * 4 + [False] * 4, strict=True))
+    for i in (-1, 16):
+        with pytest.raises(ParameterError, match="0 to 15"):
+            ensemble.graph(i)
+
+
+def test_written_graphs_are_those_of_the_ensemble():
+    assert ptcc("batch", "spec.toml", "--write-graphs", "made").code == 0
+    ensemble = Ensemble.read("spec.toml")
+    assert names("made") == [f"spec-{i}.csv" for i in range(8)]
+    for i in range(8):
+        assert read_graph(f"made/spec-{i}.csv") == ensemble.graph(i)
+    mine, theirs = quickly("spec.toml"), quickly("made/*.csv")
+    named = [dict(row, graph=f"spec.toml#{i}") for i, row in enumerate(facts(theirs))]
+    assert facts(mine) == named
+
+
+BAD_SPECS = [
+    ("count = 3\nnodes = 6\nedges = 4", 'unknown key "edges"'),
+    ("nodes = 6", '"count" is missing'),
+    ("count = 3", '"nodes" is missing'),
+    ("count = 0\nnodes = 6", "count = 0"),
+    ("count = true\nnodes = 6", "count = true"),
+    ("count = 3\nnodes = 6.5", "nodes = "),
+    ("count = 3\nnodes = []", "nodes is empty"),
+    ("count = 3\nnodes = { from = 9, to = 5 }", "nodes.to = 5"),
+    ("count = 3\nnodes = { from = 9 }", "nodes: a range"),
+    ("count = 3\nnodes = 6\nseed = -1", "seed = -1"),
+    ('count = 3\nnodes = 6\nconnectivity = "ring"', "connectivity = ring"),
+    ('count = 3\nnodes = 6\nconnectivity = ["weak", "weak"]', "names a class twice"),
+    ('count = 3\nnodes = 6\nbalanced = "yes"', "balanced = yes"),
+    ("count = 3\nnodes = 4", "a weak graph with unbalanced leaders has 5 nodes or more"),
+    ('count = 3\nnodes = 5\nundirected = true\nconnectivity = "disconnected"', "has 6 nodes or more"),
+    ("count = 3\nnodes = 6\nundirected = true", "an undirected graph is not quasi-strong"),
+    ("count = 3\nnodes = 6\nmean_degree = nan", "cannot be read|not a finite number"),
+    ("count = 3\nnodes = 6\nnegative = 2", "negative = 2"),
+    ("count = 3\nnodes = 6\nweight_range = [1, 0.5]", "weight_range"),
+    ("count = 3\nnodes = 6\nweight_range = [0, 1]", "weight_range"),
+    ("count = 3\nnodes = 6\nweight_range = 2", "weight_range"),
+    ("count = 3\nnodes = 6\nweight_decades = 1000", "weight_decades = 1000"),
+    ("count = ", "no TOML"),
+]
+
+
+@pytest.mark.parametrize(("spec", "says"), BAD_SPECS)
+def test_bad_specs_are_refused_in_one_line(spec: str, says: str):
+    Path("bad.toml").write_text(spec)
+    run = ptcc("batch", "bad.toml", "-o", "t.csv", *QUICK)
+    assert (run.code, run.out) == (2, "")
+    (line,) = run.err.splitlines()
+    assert line.startswith("ptcc: bad.toml: ")
+    with pytest.raises(ValueError, match=says):
+        Ensemble.read("bad.toml")
+    assert names() == ["bad.toml", "spec.toml"]
+
+
+# ---------------------------------------------------------------------- rows
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--T", "0.6", "--rho2", "0.3", "--simulation"),
+        (
+            "--protocol",
+            "sliding-mode",
+            "--kappa",
+            "3",
+            "--sigma0",
+            "random",
+            "--disturbance",
+            "telegraph",
+            "--simulation",
+        ),
+    ],
+)
+def test_a_row_is_what_certify_says(options: tuple[str, ...]):
+    assert ptcc("batch", "fig1b", "fig5a", "-o", "t.parquet", "--workers", "1", *options).code == 0
+    from pyarrow import parquet
+
+    for row in parquet.read_table("t.parquet").to_pylist():
+        said = json.loads(ptcc("certify", row["graph"], "--seed", str(row["seed"]), "--json", *options).out)
+        assert row["sha256"] == said["graph"]["sha256"]
+        assert (row["theorem"], row["behaviour"]) == (said["claim"]["theorem"], said["claim"]["behaviour"])
+        assert row["verdict"] == said["verdict"] == "certified"
+        rate, limit = Fraction(said["rates"]["certified"]), Fraction(said["rates"]["limit"])
+        assert Fraction(row["rate"]) <= rate <= Fraction(math.nextafter(row["rate"], math.inf))
+        assert Fraction(row["rate_limit"]) >= limit or row["rate_limit"] >= row["rate"]
+        assert Fraction(row["tightness"]) <= rate / Fraction(row["rate_limit"]) * (1 + Fraction(1, 10**15))
+        assert Fraction(row["paper_rate"]) <= Fraction(said["rates"]["paper"])
+        assert row["obligations"] == len(said["proof"])
+        assert row["worst_ratio"] == said["unverified"]["simulation"]["worst_ratio"]
+        assert row["bound_kept"] is True
+        assert (row["reaching_time"] is not None) == ("sliding-mode" in options)
+
+
+def test_columns_are_documented_and_of_their_types():
+    rows = quickly(["fig1a", TRIANGLE, Ensemble(count=8, nodes=5)], simulation=True, expect="stability")
+    assert all(list(row) == list(COLUMNS) for row in rows)
+    for row in rows:
+        for name, kind in COLUMNS.items():
+            assert row[name] is None or type(row[name]) is kind, name
+    lines = (module.__doc__ or "").splitlines()
+    documented = [line.split()[:2] for line in lines[lines.index("") :] if line[:1].isalpha() and line[20:25].strip()]
+    kinds = {"text": str, "int": int, "float": float, "bool": bool}
+    assert {name: kinds[kind] for name, kind in documented if kind in kinds} == COLUMNS
+
+
+def test_a_row_depends_on_its_graph_alone():
+    Path("spec.toml").write_text(SPEC)
+    ensemble = Ensemble.read("spec.toml")
+    rows = {row["sha256"]: row for row in quickly([ensemble.graph(i) for i in range(8)])}
+    for row in facts(quickly([ensemble.graph(i) for i in (6, 1)])):
+        assert dict(row, graph="") == dict(facts([rows[row["sha256"]]])[0], graph="")
+    assert len({row["seed"] for row in rows.values()}) == 8  # each has a start of its own
+    assert {row["seed"] for row in quickly(ensemble, seed=1)}.isdisjoint(row["seed"] for row in rows.values())
+
+
+def test_the_peak_of_the_input_is_for_the_start_or_for_all_starts():
+    for bound in (None, "1/3"):
+        (row,) = quickly("fig1b", initial_bound=bound)
+        start = None if bound else module._start("random", row["seed"], load_graph("fig1b"))
+        starts = Fraction(1, 3) if bound else None
+        effort = certify(load_graph("fig1b"), PROTOCOL, start, method="perron", simulation=False, starts=starts).effort
+        assert effort is not None and effort.peak is not None and row["input_bounded"] is effort.bounded
+        assert Fraction(row["peak_input"]) >= effort.peak.largest > Fraction(math.nextafter(row["peak_input"], 0))
+
+
+def test_components_of_a_disconnected_graph_are_joined():
+    edges = [("a", "b", 1), ("b", "a", -1), ("c", "d", 1), ("d", "c", 1), ("d", "e", 1)]
+    (row,) = quickly(SignedDigraph.from_edges([*edges, ("f", "g", 1)]))
+    assert (row["connectivity"], row["components"]) == ("disconnected", 3)
+    assert row["theorem"] == "1.2; 2.1" and row["behaviour"] == "stability; interval bipartite consensus"
+
+
+def test_bad_graphs_are_rows_and_stop_nothing():
+    write_graph(TRIANGLE, "a.csv")
+    write_graph(TRIANGLE, "d.csv")
+    Path("b.csv").write_text("source,target,weight\n1,2,nan\n")
+    Path("c.csv").write_bytes(b"\x93\x00\x01")
+    Path("e.mtx").write_text("no matrix")
+    run = ptcc("batch", "[a-e].*", "fig1a", "-o", "t.csv", *QUICK)
+    assert run.code == 4
+    assert "3 with an error" in run.out and "3 of 6 graphs: no certificate, such as b.csv, line 2" in run.err
+    rows = read_csv("t.csv")
+    assert [row["graph"] for row in rows] == ["a.csv", "b.csv", "c.csv", "d.csv", "e.mtx", "fig1a"]
+    for row in rows:
+        refusal = ptcc("classify", row["graph"])
+        assert row["error"] == refusal.err.removeprefix("ptcc: ").strip()
+        assert (row["verdict"] == "certified") == (refusal.code == 0) == bool(row["rate"])
+
+
+def test_a_start_that_does_not_fit_is_an_error_of_its_row():
+    fits, other = quickly([TRIANGLE, "fig1a"], x0="5,-2,1")
+    assert fits["verdict"] == "certified" and fits["error"] is None
+    assert "3 values for 6 nodes" in other["error"]
+    assert other["nodes"] == 6 and other["rate"] is None
+
+
+def test_a_defect_is_an_error_of_its_row(monkeypatch: pytest.MonkeyPatch):
+    def broken(graph: SignedDigraph, *args: Any, **more: Any) -> Any:
+        return {}["no such key"] if graph.n_nodes == 3 else certify(graph, *args, **more)
+
+    monkeypatch.setattr(module, "certify", broken)
+    before, bad, after = quickly(["fig1a", TRIANGLE, "fig1b"])
+    assert bad["error"].startswith("a defect of this program (KeyError in test_batch.py, line ")
+    assert before["verdict"] == after["verdict"] == "certified"
+
+
+class Deadly(SignedDigraph):
+    """A graph that kills the process that it is sent to."""
+
+    def __reduce__(self) -> Any:
+        return os._exit, (1,)
+
+
+def test_a_process_that_dies_is_an_error_of_one_row():
+    deadly = Deadly(TRIANGLE.labels, TRIANGLE.source, TRIANGLE.target, TRIANGLE._weights)
+    graphs = [Ensemble.read("spec.toml").graph(i) for i in range(5)]
+    rows = quickly([*graphs[:2], deadly, *graphs[2:]], workers=2)
+    assert [row["error"] is None for row in rows] == [True, True, False, True, True, True]
+    assert "died" in rows[2]["error"]
+    assert [dict(row, graph="") for row in facts(rows[:2] + rows[3:])] == [
+        dict(row, graph="") for row in facts(quickly(graphs))
+    ]
+
+
+def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.MonkeyPatch):
+    from distributed import LocalCluster
+
+    write_graph(TRIANGLE, "a.csv")
+    Path("bad.csv").write_text("1,2,0\n")
+    Path("spec.toml").write_text(SPEC)
+    sources = ["a.csv", "bad.csv", "fig5a", "spec.toml"]
+    here = facts(quickly(sources))
+    assert [row["error"] is None for row in here] == [True, False] + [True] * 9
+    assert facts(quickly(sources, workers=2)) == here
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
+        cluster.scale(0)
+        monkeypatch.setattr(module, "PATIENCE", 3)
+        with pytest.raises(ParameterError, match="no workers"):
+            quickly(sources, scheduler=cluster.scheduler_address)
+    assert names() == ["a.csv", "bad.csv", "dask.csv", "spec.toml"]  # no worker writes anything
+    assert read_csv("dask.csv") == texts(here)
+
+
+def test_csv_and_parquet_hold_the_same():
+    from pyarrow import parquet
+
+    Path("bad,\n\udcff.csv").write_text("1,2,0\n")
+    sources = ["fig1a", "bad*.csv", Ensemble(count=8, nodes=5)]
+    rows = quickly(sources, output="t.parquet", simulation=True)
+    table = parquet.read_table("t.parquet")
+    assert table.column_names == list(COLUMNS)
+    assert table.to_pylist() == rows
+    quickly(sources, output="t.csv", simulation=True)
+    read = {str: str, int: int, float: float, bool: {"true": True, "false": False}.__getitem__}
+    again = [
+        {name: read[COLUMNS[name]](text) if text else None for name, text in row.items()} for row in read_csv("t.csv")
+    ]
+    assert again == facts(rows)
+
+
+def test_a_graph_that_is_named_twice_has_one_row():
+    write_graph(TRIANGLE, "a.csv")
+    rows = quickly(["a.csv", "*.csv", "./a.csv", "fig1a", "fig1a", "spec.toml", "spec.*"])
+    assert [row["graph"] for row in rows] == ["a.csv", "fig1a", *(f"spec.toml#{i}" for i in range(8))]
+
+
+# ---------------------------------------------------------------------- exit codes and refusals
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "column"),
+    [
+        ((), 0, ["", ""]),
+        (("--expect", "stability"), 3, ["holds", "refuted"]),
+        (("--expect", "bipartite-containment"), 3, ["refuted", "holds"]),
+        (("--min-rate", "1e-6"), 0, ["holds", "holds"]),
+        (("--min-rate", "1000"), 3, ["refuted", "refuted"]),
+    ],
+)
+def test_the_exit_code_is_that_of_the_worst_row(options: tuple[str, ...], code: int, column: list[str]):
+    run = ptcc("batch", "fig1a", "fig1b", "-o", "t.csv", *QUICK, *options)
+    assert run.code == code
+    assert [row["asked"] for row in read_csv("t.csv")] == column
+    assert bool(run.err) == bool(code)
+
+
+def test_a_rate_that_is_neither_proved_nor_excluded_is_undecided():
+    (row,) = quickly("fig1b")
+    between = (row["rate"] + row["rate_limit"]) / 2
+    run = ptcc("batch", "fig1b", "-o", "t.csv", "--min-rate", str(between), *QUICK)
+    assert run.code == 4 and "1 of 1 graphs: undecided" in run.err
+    assert [row["asked"] for row in read_csv("t.csv")] == ["undecided"]
+
+
+def test_without_a_file_the_table_is_printed():
+    run = ptcc("batch", "fig1a", *QUICK)
+    assert run.code == 0 and run.err == ""
+    (row,) = csv.DictReader(io.StringIO(run.out))
+    assert row["behaviour"] == "stability"
+
+
+@pytest.mark.parametrize(
+    ("args", "says"),
+    [
+        (("nothing.csv",), "no such file"),
+        (("*.none",), "no file matches"),
+        (("made",), "is a folder"),
+        (("fig1a", "-o", "t.txt"), ".parquet"),
+        (("fig1a", "-o", "none/t.csv"), "folder does not exist"),
+        (("fig1a", "g.csv", "-o", "g.csv"), "one of the graphs"),
+        (("fig1a", "-o", "notes.csv"), "no table of ptcc batch"),
+        (("fig1a", "-o", "notes.csv", "--restart"), "no table of ptcc batch"),
+        (("fig1a", "-o", "other.csv"), "no journal"),
+        (("fig1a", "-o", "other.csv", "--restart"), "no journal"),
+        (("fig1a", "--restart"), "name it with -o"),
+        (("fig1a", "--rho2", "0"), "no deadline"),
+        (("fig1a", "--delta", "1"), "--protocol sliding-mode"),
+        (("fig1a", "--x0", "g.csv"), "is a file"),
+        (("fig1a", "--initial-bound", "0"), "initial_bound"),
+        (("fig1a", "--expect", "peace"), "--expect"),
+        (("fig1a", "--scheduler", "tcp://h:1", "--workers", "2"), "leave one out"),
+        (("fig1a", "--scheduler", "no://h:1"), "no Dask scheduler"),
+        (("fig1a", "--protocol", "sliding-mode", "--disturbance", "sin("), "sin("),
+        (("fig1a", "--write-graphs", "d"), "is a graph already"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_the_work(args: tuple[str, ...], says: str, folder: Path):
+    write_graph(TRIANGLE, "g.csv")
+    Path("made").mkdir()
+    Path("notes.csv").write_text("my notes")
+    Path("other.csv.journal").write_text("Dear diary\n")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    run = ptcc("batch", *args)
+    assert (run.code, run.out) == (2, "")
+    (line,) = run.err.splitlines()
+    assert says in line
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("package", "args"),
+    [
+        ("pyarrow", ("-o", "t.parquet")),
+        ("joblib.externals.loky", ("--workers", "2")),
+        ("distributed", ("--scheduler", "tcp://127.0.0.1:1")),
+    ],
+)
+def test_a_missing_extra_is_one_line(package: str, args: tuple[str, ...], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    run = ptcc("batch", "spec.toml", *args)
+    assert run.code == 2 and run.out == ""
+    (line,) = run.err.splitlines()
+    assert 'pip install "ptcc-certify[batch]"' in line
+    assert ptcc("batch", "fig1a", *QUICK).code == 0  # which needs none of them
+
+
+# ---------------------------------------------------------------------- interruption
+
+
+def interrupted_after(count: int) -> Callable[[int, int, int], None]:
+    def progress(done: int, total: int, errors: int) -> None:
+        if done == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def begin(count: int, output: str = "t.csv", **more: Any) -> Path:
+    """Begin a batch and interrupt it after some rows; return its journal."""
+    with pytest.raises(KeyboardInterrupt):
+        quickly("spec.toml", output=output, progress=interrupted_after(count), **more)
+    assert not Path(output).exists()
+    return Path(f"{output}.journal")
+
+
+@pytest.fixture
+def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the graphs that are computed, as they come."""
+    names: list[str] = []
+    row = module.certified_row
+
+    def watched(name: str, *args: Any) -> Row:
+        names.append(name)
+        return row(name, *args)
+
+    monkeypatch.setattr(module, "certified_row", watched)
+    return names
+
+
+def test_an_interrupted_batch_goes_on_with_what_is_missing(computed: list[str]):
+    whole = quickly("spec.toml")
+    journal = begin(3)
+    computed.clear()
+    counts: list[tuple[int, ...]] = []
+    rows = quickly("spec.toml", output="t.csv", progress=lambda *now: counts.append(now))
+    assert computed == [f"spec.toml#{i}" for i in range(3, 8)]
+    assert counts == [(done, 8, 0) for done in range(3, 9)]
+    assert facts(rows) == facts(whole)
+    assert read_csv("t.csv") == texts(whole)
+    assert not journal.exists()
+
+
+def test_a_journal_may_be_torn_at_any_byte(monkeypatch: pytest.MonkeyPatch):
+    """Whatever the rows are; these are empty."""
+    computed: list[str] = []
+
+    def empty(name: str, *args: Any) -> Row:
+        computed.append(name)
+        return dict.fromkeys(COLUMNS) | {"graph": name}
+
+    monkeypatch.setattr(module, "certified_row", empty)
+    everything = [f"spec.toml#{i}" for i in range(8)]
+    content = begin(3).read_bytes()
+    ends = [i + 1 for i, byte in enumerate(content) if byte == 10]
+    assert len(ends) == 4  # the settings and three rows
+    cuts = {*range(40), *range(0, len(content), 23), *ends, *(end - 1 for end in ends), *(end + 1 for end in ends[:-1])}
+    for cut in sorted(cuts):
+        Path("t.csv").unlink(missing_ok=True)
+        Path("t.csv.journal").write_bytes(content[:cut])
+        computed.clear()
+        kept = max(sum(end <= cut for end in ends) - 1, 0)
+        begin(kept + 1)  # once more, so that the journal that was mended is read too
+        rows = quickly("spec.toml", output="t.csv")
+        assert computed == everything[kept:] and [row["graph"] for row in rows] == everything
+
+
+def test_a_complete_journal_only_wants_its_table_written(computed: list[str]):
+    begin(8)
+    computed.clear()
+    assert len(quickly("spec.toml", output="t.csv")) == 8
+    assert computed == [] and Path("t.csv").exists()
+
+
+def test_a_damaged_journal_is_refused():
+    journal = begin(3)
+    lines = journal.read_bytes().splitlines(keepends=True)
+    for damage in (b"\x00\xff\n", b"{}\n", b'{"number": 99, "file": "", "row": {}}\n', b"[1]\n"):
+        journal.write_bytes(b"".join([*lines[:2], damage, *lines[2:]]))
+        with pytest.raises(ParameterError, match="line 3: is no row"):
+            quickly("spec.toml", output="t.csv")
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"method": "paper"}, 'begun with method "perron", not "paper"'),
+        ({"seed": 1}, "begun with seed 0, not 1"),
+        ({"min_rate": 2}, 'begun with min_rate null, not "2"'),
+        ({"x0": [0] * 3}, "begun with x0"),
+        ({"undirected": True}, "begun with undirected false"),
+    ],
+)
+def test_other_settings_than_the_journals_are_refused(more: dict[str, Any], says: str):
+    journal = begin(3)
+    before = journal.read_bytes()
+    with pytest.raises(ParameterError, match=says):
+        quickly("spec.toml", output="t.csv", **more)
+    assert journal.read_bytes() == before
+    assert len(quickly("spec.toml", output="t.csv", restart=True, **more)) == 8
+
+
+def test_other_graphs_and_protocols_than_the_journals_are_refused():
+    begin(3)
+    for sources in (["spec.toml", "fig1a"], "fig1a"):
+        with pytest.raises(ParameterError, match="begun with graphs 8"):
+            quickly(sources, output="t.csv")
+    with pytest.raises(ParameterError, match="begun with other graphs"):
+        quickly([Ensemble.read("spec.toml")], output="t.csv")
+    with pytest.raises(ParameterError, match="begun with protocol"):
+        certify_many("spec.toml", NominalProtocol(2, 1, 1, 2), method="perron", output="t.csv")
+    Path("spec.toml").write_text(TINY.replace("seed = 5", "seed = 6"))
+    with pytest.raises(ParameterError, match="begun with other graphs"):
+        quickly("spec.toml", output="t.csv")
+
+
+def test_files_that_have_changed_are_computed_again(computed: list[str]):
+    for name in "abcd":
+        write_graph(TRIANGLE, f"{name}.csv")
+    Path("b.csv").write_text("1,2,0\n")
+    with pytest.raises(KeyboardInterrupt):
+        quickly("?.csv", output="t.csv", progress=interrupted_after(3))
+    write_graph(TRIANGLE, "b.csv")  # mended
+    write_graph(SignedDigraph.from_edges([(1, 2, 1)]), "c.csv")
+    computed.clear()
+    rows = quickly("?.csv", output="t.csv")
+    assert computed == ["b.csv", "c.csv", "d.csv"]
+    assert [(row["nodes"], row["error"]) for row in rows] == [(3, None), (3, None), (2, None), (3, None)]
+
+
+def test_a_table_is_replaced_only_if_asked(computed: list[str]):
+    quickly("spec.toml", output="t.csv")
+    before = Path("t.csv").read_bytes()
+    with pytest.raises(ParameterError, match="--restart"):
+        quickly("spec.toml", output="t.csv", seed=1)
+    with pytest.raises(KeyboardInterrupt):
+        quickly("spec.toml", output="t.csv", seed=1, restart=True, progress=interrupted_after(5))
+    assert Path("t.csv").read_bytes() == before  # whole until the new one is
+    computed.clear()
+    quickly("spec.toml", output="t.csv", seed=1)
+    assert len(computed) == 3 and Path("t.csv").read_bytes() != before
+
+
+def test_a_pattern_leaves_out_the_table_itself():
+    write_graph(TRIANGLE, "a.csv")
+    for restart in (False, True):
+        rows = quickly("*.csv", output="t.csv", restart=restart)
+        assert [row["graph"] for row in rows] == ["a.csv"]
+
+
+def test_two_batches_do_not_share_a_journal():
+    said = []
+
+    def meddle(done: int, total: int, errors: int) -> None:
+        if done == 2:
+            with pytest.raises(ParameterError) as refused:
+                quickly("spec.toml", output="t.csv")
+            said.append(str(refused.value))
+
+    assert len(quickly("spec.toml", output="t.csv", progress=meddle)) == 8
+    assert len(said) == 1 and "another process" in said[0]
+
+
+def test_ctrl_c_keeps_the_rows_and_says_so(monkeypatch: pytest.MonkeyPatch):
+    row = module.certified_row
+
+    def stopped(name: str, *args: Any) -> Row:
+        if name.endswith("#4"):
+            raise KeyboardInterrupt
+        return row(name, *args)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "certified_row", stopped)
+        run = ptcc("batch", "spec.toml", "-o", "t.csv", *QUICK)
+    assert (run.code, run.out) == (130, "")
+    (line,) = run.err.splitlines()
+    assert "4 of 8 rows are kept" in line and "the same command goes on" in line
+    run = ptcc("batch", "spec.toml", "-o", "t.csv", *QUICK)
+    assert run.code == 0 and run.err == "note: 4 of 8 rows were there already\n"
+
+
+def rows_in(journal: Path) -> int:
+    return journal.read_bytes().count(b"\n") - 1 if journal.exists() else 0
+
+
+@pytest.fixture
+def killed() -> Iterator[Callable[[list[str], Path, int, int], None]]:
+    """Start a command, and send a signal when its journal has some rows."""
+    running: list[subprocess.Popen[bytes]] = []
+
+    def kill(args: list[str], journal: Path, rows: int, number: int) -> None:
+        process = subprocess.Popen([sys.executable, "-m", "ptcc_certify.cli", *args], stderr=subprocess.PIPE)
+        running.append(process)
+        until = time.monotonic() + 60
+        while rows_in(journal) < rows and process.poll() is None and time.monotonic() < until:
+            time.sleep(0.005)
+        assert process.poll() is None, "ended before it was killed"
+        process.send_signal(number)
+        process.communicate(timeout=30)
+
+    yield kill
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_killed_batch_loses_nothing_and_does_nothing_twice(killed: Any, computed: list[str]):
+    Path("many.toml").write_text(TINY.replace("8", "60"))
+    args = ["batch", "many.toml", "fig1a", "-o", "t.csv", *QUICK]
+    journal = Path("t.csv.journal")
+    killed(args, journal, 5, signal.SIGKILL)
+    kept = rows_in(journal)
+    assert 5 <= kept < 61 and not Path("t.csv").exists()
+    computed.clear()
+    run = ptcc(*args)
+    assert run.code == 0 and f"{kept} of 61 rows were there already" in run.err
+    assert len(computed) == len(set(computed)) == 61 - kept
+    assert ptcc("batch", "many.toml", "fig1a", "-o", "whole.csv", *QUICK).code == 0
+    assert read_csv("t.csv") == read_csv("whole.csv")
+    assert not journal.exists()
