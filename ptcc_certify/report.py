@@ -29,7 +29,7 @@ from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import format_exact, nearest_float, writable
 from ptcc_certify.saved import RejectedCertificate, SavedCertificate, read_certificate
 from ptcc_certify.structure import Claim, ClosedComponent
-from ptcc_certify.summary import remarks_on, down, up, structure_text
+from ptcc_certify.summary import down, remarks_on, structure_text, up
 from ptcc_certify.theorems import THEOREMS
 from ptcc_certify.trajectory import SlidingTrajectory
 
