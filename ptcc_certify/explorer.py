@@ -25,7 +25,7 @@ from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.outcomes import exact_start, outcome
-from ptcc_certify.plots import plot_sliding, plot_trajectory
+from ptcc_certify.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plot_trajectory
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction
 from ptcc_certify.reaching import certified_reaching_times
@@ -65,7 +65,7 @@ _NOMINAL = ("T", "rho1", "rho2", "kappa")
 _SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
 _SHOWN = ("claim", "ends at", "sliding", "disturbed", "rate", "left", "proof", "input", "INPUT", "simulated", "note")
-_SAMPLES, _DPI = 81, 80
+_SAMPLES, _DPI = 81, 120
 #: Share of the error at the start down to which the decay is drawn: below it the integrator resolves little.
 _LEAST = 1e-8
 #: Changes of sign of each telegraph signal until the deadline, in the mean.
@@ -499,14 +499,17 @@ def _unchecked_lines(certificate: Certificate) -> list[str]:
 
 def _figure(certificate: Certificate) -> Figure:
     """Draw states, sliding variables if there is a reaching phase, and decay under the bound."""
+    from matplotlib import style
     from matplotlib.figure import Figure
 
     draw = [_draw_states]
     draw += [] if certificate.direct else [_draw_sliding]
     draw += [_draw_decay] if certificate.envelope.members else []
-    figure = Figure(figsize=(5.2 * len(draw), 3.8), dpi=_DPI, layout="constrained")
-    for ax, panel in zip(np.atleast_1d(figure.subplots(1, len(draw))), draw, strict=True):
-        panel(certificate, ax)
+    width, height = SINGLE_COLUMN
+    with style.context(STYLE):
+        figure = Figure((width * len(draw), height), dpi=_DPI, layout="constrained")
+        for place, panel in enumerate(draw, start=1):
+            panel(certificate, new_axes(figure, (1, len(draw), place)))
     return figure
 
 
@@ -545,6 +548,6 @@ def _refusal(message: str) -> Figure:
     """Return a figure that holds nothing but a message."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.4, 3.8), dpi=_DPI)
+    figure = Figure((2 * SINGLE_COLUMN[0], SINGLE_COLUMN[1]), dpi=_DPI)
     figure.text(0.5, 0.5, textwrap.fill(message, 90), ha="center", va="center", parse_math=False)
     return figure
