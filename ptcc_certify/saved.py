@@ -42,10 +42,34 @@ ADVERSARY = "adversary"
 
 
 class RejectedCertificate(PTCCError, ValueError):
-    """The independent check does not accept a certificate; ``path`` names it, ``report`` tells what it found."""
+    """The independent check does not accept a certificate: nothing in its file may be taken for proved.
+
+    Attributes
+    ----------
+    path : Path
+        Of the file.
+    report : CheckReport
+        What the check found: ``rejected`` names the part, ``reason`` tells why.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from ptcc_certify import NominalProtocol, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "c.json")
+    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)).save(path)
+    ...     _ = path.write_text(path.read_text().replace('"rho2": "1"', '"rho2": "2"'))
+    ...     try:
+    ...         read_certificate(path)
+    ...     except RejectedCertificate as error:
+    ...         print(error.path.name, error.report.rejected)
+    c.json effort
+    """
 
     def __init__(self, path: Path, report: CheckReport):
-        self.path, self.report = path, report
+        self.path = path
+        self.report = report
         reason = f"the independent check rejects {report.rejected}: {report.reason}"
         super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
 
@@ -84,6 +108,21 @@ class SavedCertificate:
         A run repeated by :meth:`with_simulation`; a file holds none.
     comparison : Comparison or None
         That run against the bounds.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from ptcc_certify import NominalProtocol, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> with TemporaryDirectory() as folder:
+    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
+    ...     saved = read_certificate(f"{folder}/c.json")
+    >>> saved.verdict, saved.claim.theorem, saved.rate <= 4 <= saved.rate_limit
+    ('certified', '1.1', True)
+    >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
+    True
+    >>> saved.with_simulation(samples=11).comparison.violated
+    False
     """
 
     path: Path
@@ -156,9 +195,19 @@ class SavedCertificate:
         return None if said is None else exact(said["value"])
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start, (M,).
+        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start.
 
-        At the instants where ``1 - t/T`` is ``remaining``; under the sliding-mode protocol whatever the disturbance.
+        Under the sliding-mode protocol it holds whatever the disturbance.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in (0, 1].
+
+        Returns
+        -------
+        (M,) array
+            Infinite where nothing was proved.
 
         Raises
         ------
@@ -168,7 +217,17 @@ class SavedCertificate:
         return self.envelope.norm_bound(remaining, self._known_start())
 
     def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Bound of ``|x_k(t) - x_k(T)|`` from the start, (N, M), at the instants where ``1 - t/T`` is ``remaining``.
+        """Bound of ``|x_k(t) - x_k(T)|`` from the start, for every agent.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in (0, 1].
+
+        Returns
+        -------
+        (N, M) array
+            Infinite where nothing was proved.
 
         Raises
         ------
@@ -207,8 +266,13 @@ class SavedCertificate:
 
         Parameters
         ----------
-        **options
+        **options : Any
             ``samples`` and others of :func:`ptcc_certify.simulation.simulate`.
+
+        Returns
+        -------
+        Trajectory
+            The run, from 0 to the deadline.
 
         Raises
         ------
@@ -229,7 +293,24 @@ class SavedCertificate:
             return simulate(self.graph, self.protocol, start, disturbance=ADVERSARY, **options)
 
     def with_simulation(self, **options: Any) -> SavedCertificate:
-        """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``; see :meth:`simulate`."""
+        """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.
+
+        Parameters
+        ----------
+        **options : Any
+            Those of :meth:`simulate`.
+
+        Returns
+        -------
+        SavedCertificate
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        SimulationError
+            The integrator failed.
+        """
         run = self.simulate(**options)
         bounded = bool(self.envelope.members) or isinstance(self.envelope, SlidingEnvelope)
         return replace(self, trajectory=run, comparison=self.envelope.compare(run) if bounded else None)

@@ -27,7 +27,10 @@ from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, 
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
-from ptcc_certify.report import LISTED, ROWS, _tex, report_html, report_latex, write_report
+from ptcc_certify.report import report_html, report_latex, write_report
+from ptcc_certify.report.page import ROWS
+from ptcc_certify.report.statement import _tex
+from ptcc_certify.report.texts import LISTED
 from ptcc_certify.saved import RejectedCertificate, read_certificate
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
@@ -472,7 +475,7 @@ def test_the_equations_are_those_of_the_protocol(protocol: Any, tmp_path: Path):
 
 def test_colours_have_enough_contrast():
     """WCAG 2: text of 4.5 to 1 on its ground, in the light, in the dark and on paper."""
-    style = (resources.files("ptcc_certify") / "report.css").read_text(encoding="utf-8")
+    style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     palettes = [dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", part)) for part in style.split(":root {")[1:]]
     assert len(palettes) == 3
     pairs = [("text", "page"), ("text", "card"), ("muted", "page"), ("muted", "card")]
@@ -491,7 +494,7 @@ def luminance(colour: str) -> float:
 
 
 def test_letters_are_large_enough_and_details_open_on_paper():
-    style = (resources.files("ptcc_certify") / "report.css").read_text(encoding="utf-8")
+    style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     screen, _, paper = style.partition("@media print")
     assert "font: 1rem/" in screen
     assert all(float(size) >= 1 for size in re.findall(r"font-size: ([0-9.]+)rem", screen))

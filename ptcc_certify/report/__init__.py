@@ -1,0 +1,130 @@
+"""A certificate as something to send to a person: one page of HTML, or a statement in LaTeX.
+
+Both are made from a file that the independent check accepts (:mod:`ptcc_certify.saved`). What was proved is told apart
+from what is numerical: a simulated run, repeated for the figures. The page is one file that loads nothing and runs no
+script; every text that stands in the certificate is shown as text, whatever it holds.
+
+:mod:`~ptcc_certify.report.page` is the page, section by section, of pieces from :mod:`~ptcc_certify.report.markup` and
+equations from :mod:`~ptcc_certify.report.mathml`; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both take numbers
+and words from :mod:`~ptcc_certify.report.texts`, which rounds what was proved to the safe side, and figures from
+:mod:`~ptcc_certify.report.figures`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.io import write_atomically
+from ptcc_certify.plots import save_figure
+from ptcc_certify.report.figures import INPUT_NODES, draw, missing_letters_as_boxes
+from ptcc_certify.report.page import rejected_html, report_html
+from ptcc_certify.report.statement import report_latex
+from ptcc_certify.saved import RejectedCertificate, SavedCertificate, read_certificate
+
+#: What a report is written as.
+SUFFIXES = (".html", ".htm", ".tex")
+#: Agents up to which a run is repeated unasked.
+SIMULATED_NODES = 1000
+
+__all__ = ["SIMULATED_NODES", "SUFFIXES", "rejected_html", "report_html", "report_latex", "write_report"]
+
+
+def write_report(
+    certificate: str | Path,
+    output: str | Path,
+    *,
+    simulation: bool | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> str:
+    """Check a certificate's file and write a report of it: a page (``.html``) or a statement in LaTeX (``.tex``).
+
+    A statement has its figures beside it, ``<name>_graph.pdf`` and ``<name>_decay.pdf``. Of a certificate that the
+    check rejects there is a page that says so and shows nothing else of it, and no statement.
+
+    Parameters
+    ----------
+    certificate : path
+        A file of schema ``ptcc-certificate/1``.
+    output : path
+        The suffix decides what is written.
+    simulation : bool, optional
+        Whether to repeat the CVODES run for the figures; by default up to 1,000 agents.
+    progress : callable
+        Told which of ``independent check``, ``simulation``, ``report`` begins.
+
+    Returns
+    -------
+    str
+        ``certified``, ``undecided`` or ``rejected``.
+
+    Raises
+    ------
+    ParameterError
+        Another suffix, or ``output`` is the certificate.
+    FormatError
+        The file cannot be read as a certificate, or the report not be written.
+    RejectedCertificate
+        A statement is asked of a certificate that the check rejects.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> with TemporaryDirectory() as folder:
+    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
+    ...     write_report(f"{folder}/c.json", f"{folder}/c.html", simulation=False)
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    'certified'
+    ['c.html', 'c.json']
+    """
+    path, suffix = Path(output), Path(output).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
+    if path.is_file() and Path(certificate).is_file() and path.samefile(certificate):
+        raise ParameterError(f"{output}: is the certificate itself; name another file")
+    if not path.parent.is_dir():
+        raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if suffix == ".tex" and not re.fullmatch(r"[A-Za-z0-9_.-]+", path.stem):
+        raise ParameterError(f"{output}: LaTeX wants a plain name; use letters, digits, -, _ and .")
+    progress("independent check")
+    try:
+        saved = read_certificate(certificate)
+    except RejectedCertificate as error:
+        if suffix == ".tex":
+            raise
+        write_atomically(path, rejected_html(error))
+        return "rejected"
+    progress("simulation")
+    saved, why = _with_run(saved, simulation)
+    progress("report")
+    if suffix == ".tex":
+        figures = {}
+        for name, figure in draw(saved, ("graph", "decay")).items():
+            figures[name] = path.with_name(f"{path.stem}_{name}.pdf")
+            with missing_letters_as_boxes():
+                save_figure(figure, figures[name])
+        write_atomically(path, report_latex(saved, {name: file.name for name, file in figures.items()}))
+    else:
+        write_atomically(path, report_html(saved, no_run=why))
+    return saved.verdict
+
+
+def _with_run(saved: SavedCertificate, simulation: bool | None) -> tuple[SavedCertificate, str]:
+    """Repeat the run, if there is one to repeat; return why there is none."""
+    n = saved.graph.n_nodes
+    if simulation is False:
+        return saved, "it was left out (--no-simulation)"
+    if saved.start is None:
+        return saved, "the certificate names no start"
+    if simulation is None and n > SIMULATED_NODES:
+        return saved, f"above {SIMULATED_NODES} agents it is repeated only where that is asked for"
+    try:
+        return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), ""
+    except (SimulationError, ParameterError) as error:
+        return saved, f"it failed: {error}"
+    except OverflowError:
+        return saved, "a number of the start is beyond the range of float64"
