@@ -3,9 +3,10 @@
     python benchmarks/batch.py [--count 1000] [--method perron]
 
 An ensemble of all classes, 5 to 8 nodes, in four parts. Every part is certified by one worker and by two in turn, so
-that a machine that is busy with other work is so for both; wall times include the start of the processes. Then all
-parts together: by two workers, killed when half of the rows are there, and started again; and by a Dask cluster of two
-processes. Rows must be the same each time, but for the seconds. Ends with an error if they are not.
+that a machine that is busy with other work is so for both; wall times include the start of the processes. Processor
+times tell what two workers could reach if nothing else ran: twice the work of one over theirs. Then all parts together:
+by two workers, killed when half of the rows are there, and started again; and by a Dask cluster of two processes. Rows
+must be the same each time, but for the seconds. Ends with an error if they are not.
 """
 
 from __future__ import annotations
@@ -28,6 +29,12 @@ Rows = list[dict[str, str]]
 def command(specs: list[Path], table: Path, *options: str) -> list[str]:
     start = [sys.executable, "-m", "ptcc_certify.cli", "batch"]
     return [*start, *(path.name for path in specs), "-o", table.name, *options]
+
+
+def cpu() -> float:
+    """Processor time of all processes that have ended."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def run(specs: list[Path], table: Path, *options: str) -> tuple[Rows, float]:
@@ -77,10 +84,14 @@ def main() -> None:
             spec.write_text(f"count = {options.count // PARTS}\nseed = {k}\nnodes = {{ from = 5, to = 8 }}\n")
         method = ("--method", options.method)
         whole: Rows = []
-        ratios, times = [], {"1": 0.0, "2": 0.0}
+        ratios, times, used = [], {"1": 0.0, "2": 0.0}, {"1": 0.0, "2": 0.0}
         for k, spec in enumerate(specs):
             order = ("1", "2") if k % 2 == 0 else ("2", "1")
-            found = {w: run([spec], Path(folder, f"{k}-{w}.csv"), "--workers", w, *method) for w in order}
+            found = {}
+            for w in order:
+                before = cpu()
+                found[w] = run([spec], Path(folder, f"{k}-{w}.csv"), "--workers", w, *method)
+                used[w] += cpu() - before
             agree(f"part {k}, two workers and one", found["2"][0], found["1"][0])
             whole += found["1"][0]
             ratios.append(found["1"][1] / found["2"][1])
@@ -92,6 +103,7 @@ def main() -> None:
         certified = sum(row["verdict"] == "certified" for row in whole)
         print(f"{len(whole)} graphs, {certified} certified, {errors} with an error")
         print(f"one worker {times['1']:.1f} s, two {times['2']:.1f} s: {times['1'] / times['2']:.2f} times as fast")
+        print(f"processor time {used['1']:.1f} s and {used['2']:.1f} s: {2 * used['1'] / used['2']:.2f} on idle cores")
         print(f"ratios of the parts: {min(ratios):.2f} .. {max(ratios):.2f}, median {statistics.median(ratios):.2f}")
 
         table = Path(folder, "killed.csv")
