@@ -11,7 +11,6 @@ import io
 import json
 import os
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError, explain, one_line
 
 if TYPE_CHECKING:
     from ptcc_certify.actuator import Actuator
@@ -691,23 +690,25 @@ def _ends(certificate: Certificate) -> str:
 
 
 def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    if x0 != "random":
-        from ptcc_certify.io import read_state
+    from ptcc_certify.io import random_states, read_state
 
+    if x0 != "random":
         try:
             return read_state(x0, graph)
         except PTCCError as error:
             raise type(error)(f"{option}{error}") from None
-    return [row[0] for row in _random_start(seed, graph.n_nodes, 1)]
+    return [x for (x,) in random_states(seed, graph.n_nodes)]
 
 
 def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> Any:
     import numpy as np
 
+    from ptcc_certify.io import random_states
+
     if dimension == 1:
         return _start(x0, seed, graph)
     if x0 == "random":
-        return _random_start(seed, graph.n_nodes, dimension)
+        return random_states(seed, graph.n_nodes, dimension)
     texts = x0.split(",")
     if len(texts) != graph.n_nodes * dimension:
         raise ParameterError(
@@ -715,14 +716,6 @@ def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> 
             f"give {graph.n_nodes * dimension} numbers, agent after agent"
         )
     return np.array([_number(text, "--x0") for text in texts]).reshape(graph.n_nodes, dimension)
-
-
-def _random_start(seed: Any, n: int, dimension: int) -> list[list[Fraction]]:
-    """Return starts uniform on [-10, 10], to three decimals, so that they can be written down."""
-    import numpy as np
-
-    thousandths = np.random.default_rng(seed).integers(-10_000, 10_001, size=(n, dimension))
-    return [[Fraction(int(x), 1000) for x in row] for row in thousandths]
 
 
 def _behaviour(text: str | None) -> str | None:
@@ -898,12 +891,8 @@ def main() -> None:
             code = BAD_INPUT
         else:
             code = _refuse(error.format_message())
-    except PTCCError as error:
-        code = _refuse(str(error))
-    except OverflowError:
-        code = _refuse("a number is beyond the range of float64; choose other units of time, weight or state")
-    except MemoryError:
-        code = _refuse("not enough memory for a graph or a table of this size")
+    except (PTCCError, OverflowError, MemoryError) as error:
+        code = _refuse(explain(error))
     except (KeyboardInterrupt, click.Abort):
         click.echo("ptcc: interrupted", err=True)
         code = INTERRUPTED
@@ -913,16 +902,13 @@ def main() -> None:
     except OSError as error:
         code = _refuse(f"the result cannot be written ({error.strerror or error})")
     except Exception as error:
-        at = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(at.filename).name}, line {at.lineno}"
-        click.echo(f"ptcc: a defect of this program ({type(error).__name__} in {where}), please report it", err=True)
+        click.echo(f"ptcc: {explain(error)}", err=True)
         code = INTERNAL_ERROR
     sys.exit(code if isinstance(code, int) else OK)
 
 
 def _refuse(message: str) -> int:
-    line = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
-    click.echo(f"ptcc: {line}", err=True)
+    click.echo(f"ptcc: {one_line(message)}", err=True)
     return BAD_INPUT
 
 

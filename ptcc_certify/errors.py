@@ -1,8 +1,11 @@
-"""Every exception this package raises on purpose.
+"""Every exception this package raises on purpose, and what is said of one that stops the work.
 
 Each class inherits :class:`PTCCError` and the built-in exception that fits, so that callers may catch either.
 A message is one line: what is wrong, where, and how to mend it.
 """
+
+import traceback
+from pathlib import Path
 
 
 class PTCCError(Exception):
@@ -92,3 +95,47 @@ class SimulationError(PTCCError, RuntimeError):
     Traceback (most recent call last):
     ptcc_certify.errors.SimulationError: the sampled run grows beyond the range of floats; take a shorter sample_period
     """
+
+
+def one_line(text: str) -> str:
+    r"""Return a text as one line that a terminal can show.
+
+    Examples
+    --------
+    >>> one_line("a.csv,\n  line 2: \x1b[31m")
+    'a.csv, line 2: ?[31m'
+    """
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+
+
+def explain(error: Exception) -> str:
+    r"""Tell in one line why there is no result: the input, the size of its numbers or of itself, or this program.
+
+    Parameters
+    ----------
+    error : Exception
+        As it was caught; of one that is not raised on purpose, the place where it was raised is told.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> explain(ParameterError("T = 0 is outside its domain;\nT must be > 0"))
+    'T = 0 is outside its domain; T must be > 0'
+    >>> try:
+    ...     float(10**400)
+    ... except OverflowError as error:
+    ...     print(explain(error))
+    a number is beyond the range of float64; choose other units of time, weight or state
+    """
+    if isinstance(error, PTCCError):
+        return one_line(str(error))
+    if isinstance(error, OverflowError):
+        return "a number is beyond the range of float64; choose other units of time, weight or state"
+    if isinstance(error, MemoryError):
+        return "not enough memory for a graph or a table of this size"
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(at.filename).name}, line {at.lineno}"
+    return f"a defect of this program ({type(error).__name__} in {where}), please report it"

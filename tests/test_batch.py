@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pickle
+import pkgutil
 import signal
 import subprocess
 import sys
@@ -22,12 +23,12 @@ import networkx as nx
 import pytest
 from bad_inputs import ptcc
 
-from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, certify, certify_many
-from ptcc_certify import batch as module
-from ptcc_certify.batch import COLUMNS, Row, table_bytes
+from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, batch, certify, certify_many
+from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
+from ptcc_certify.batch import rows as rows_module
 from ptcc_certify.ensembles import CONNECTIVITIES
 from ptcc_certify.examples import load_graph
-from ptcc_certify.io import read_graph, write_graph
+from ptcc_certify.io import random_states, read_graph, write_graph
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 TRIANGLE = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 1, 2)])
@@ -66,6 +67,11 @@ def names(folder: str = ".") -> list[str]:
 def read_csv(path: str) -> list[dict[str, str]]:
     with Path(path).open(newline="", encoding="utf-8") as file:
         return facts(list(csv.DictReader(file)))
+
+
+def test_no_module_of_the_package_bears_the_name_of_what_it_exports():
+    modules = {module.name for module in pkgutil.iter_modules(batch.__path__)}
+    assert "rows" in modules and not modules & set(batch.__all__)
 
 
 # ---------------------------------------------------------------------- ensembles
@@ -253,7 +259,7 @@ def test_columns_are_documented_and_of_their_types():
     for row in rows:
         for name, kind in COLUMNS.items():
             assert row[name] is None or type(row[name]) is kind, name
-    lines = (module.__doc__ or "").splitlines()
+    lines = (rows_module.__doc__ or "").splitlines()
     documented = [line.split()[:2] for line in lines[lines.index("") :] if line[:1].isalpha() and line[20:25].strip()]
     kinds = {"text": str, "int": int, "float": float, "bool": bool}
     assert {name: kinds[kind] for name, kind in documented if kind in kinds} == COLUMNS
@@ -272,7 +278,7 @@ def test_a_row_depends_on_its_graph_alone():
 def test_the_peak_of_the_input_is_for_the_start_or_for_all_starts():
     for bound in (None, "1/3"):
         (row,) = quickly("fig1b", initial_bound=bound)
-        start = None if bound else module._start("random", row["seed"], load_graph("fig1b"))
+        start = None if bound else [x for (x,) in random_states(row["seed"], load_graph("fig1b").n_nodes)]
         starts = Fraction(1, 3) if bound else None
         effort = certify(load_graph("fig1b"), PROTOCOL, start, method="perron", simulation=False, starts=starts).effort
         assert effort is not None and effort.peak is not None and row["input_bounded"] is effort.bounded
@@ -314,7 +320,7 @@ def test_a_defect_is_an_error_of_its_row(monkeypatch: pytest.MonkeyPatch):
     def broken(graph: SignedDigraph, *args: Any, **more: Any) -> Any:
         return {}["no such key"] if graph.n_nodes == 3 else certify(graph, *args, **more)
 
-    monkeypatch.setattr(module, "certify", broken)
+    monkeypatch.setattr(rows_module, "certify", broken)
     before, bad, after = quickly(["fig1a", TRIANGLE, "fig1b"])
     assert bad["error"].startswith("a defect of this program (KeyError in test_batch.py, line ")
     assert before["verdict"] == after["verdict"] == "certified"
@@ -351,7 +357,7 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
         cluster.scale(0)
-        monkeypatch.setattr(module, "PATIENCE", 3)
+        monkeypatch.setattr(backends, "PATIENCE", 3)
         with pytest.raises(ParameterError, match="no workers"):
             quickly(sources, scheduler=cluster.scheduler_address)
     assert names() == ["a.csv", "bad.csv", "dask.csv", "spec.toml"]  # no worker writes anything
@@ -454,6 +460,31 @@ def test_what_cannot_be_done_is_refused_before_the_work(args: tuple[str, ...], s
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
+def test_nothing_is_said_after_a_scheduler_was_refused():
+    command = [sys.executable, "-m", "ptcc_certify.cli", "batch", "fig1a", "--scheduler", "no://h:1"]
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (process.returncode, process.stdout) == (2, "")
+    (line,) = process.stderr.splitlines()
+    assert "no://h:1: no Dask scheduler answers" in line
+
+
+def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPatch):
+    """The packages and the scheduler are asked for after the journal is locked."""
+    write_graph(TRIANGLE, "g.csv")
+    for package, options in (("joblib.externals.loky", {"workers": 2}), ("distributed", {"scheduler": "tcp://h:1"})):
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, package, None)
+            with pytest.raises(ParameterError, match="pip install"):
+                quickly(["g.csv", "fig1a"], output="t.csv", **options)
+            assert names() == ["g.csv", "spec.toml"]
+            kept = begin(3, "kept.csv")
+            before = kept.read_bytes()
+            with pytest.raises(ParameterError, match="pip install"):
+                quickly("spec.toml", output="kept.csv", **options)
+            assert kept.read_bytes() == before
+            kept.unlink()
+
+
 @pytest.mark.parametrize(
     ("package", "args"),
     [
@@ -494,13 +525,13 @@ def begin(count: int, output: str = "t.csv", **more: Any) -> Path:
 def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of the graphs that are computed, as they come."""
     names: list[str] = []
-    row = module.certified_row
+    row = backends.certified_row
 
     def watched(name: str, *args: Any) -> Row:
         names.append(name)
         return row(name, *args)
 
-    monkeypatch.setattr(module, "certified_row", watched)
+    monkeypatch.setattr(backends, "certified_row", watched)
     return names
 
 
@@ -525,7 +556,7 @@ def test_a_journal_may_be_torn_at_any_byte(monkeypatch: pytest.MonkeyPatch):
         computed.append(name)
         return dict.fromkeys(COLUMNS) | {"graph": name}
 
-    monkeypatch.setattr(module, "certified_row", empty)
+    monkeypatch.setattr(backends, "certified_row", empty)
     everything = [f"spec.toml#{i}" for i in range(8)]
     content = begin(3).read_bytes()
     ends = [i + 1 for i, byte in enumerate(content) if byte == 10]
@@ -638,7 +669,7 @@ def test_two_batches_do_not_share_a_journal():
 
 
 def test_ctrl_c_keeps_the_rows_and_says_so(monkeypatch: pytest.MonkeyPatch):
-    row = module.certified_row
+    row = backends.certified_row
 
     def stopped(name: str, *args: Any) -> Row:
         if name.endswith("#4"):
@@ -646,7 +677,7 @@ def test_ctrl_c_keeps_the_rows_and_says_so(monkeypatch: pytest.MonkeyPatch):
         return row(name, *args)
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "certified_row", stopped)
+        patch.setattr(backends, "certified_row", stopped)
         run = ptcc("batch", "spec.toml", "-o", "t.csv", *QUICK)
     assert (run.code, run.out) == (130, "")
     (line,) = run.err.splitlines()

@@ -7,6 +7,15 @@ the graph; so a rule of the reader holds for all formats, and a refusal names fi
 from ptcc_certify.io.files import MAX_BYTES, MAX_LINE, write_atomically
 from ptcc_certify.io.graph_files import read_graph, write_graph
 from ptcc_certify.io.matrices import MAX_NODES
-from ptcc_certify.io.state import read_state
+from ptcc_certify.io.state import random_states, read_state
 
-__all__ = ["MAX_BYTES", "MAX_LINE", "MAX_NODES", "read_graph", "read_state", "write_atomically", "write_graph"]
+__all__ = [
+    "MAX_BYTES",
+    "MAX_LINE",
+    "MAX_NODES",
+    "random_states",
+    "read_graph",
+    "read_state",
+    "write_atomically",
+    "write_graph",
+]

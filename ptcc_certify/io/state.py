@@ -1,4 +1,4 @@
-"""Starts: one exact number for each node, from a text or a file."""
+"""Starts: one exact number for each node, from a text or a file, or random."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import csv
 import os
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
+
+import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError
 from ptcc_certify.graph import SignedDigraph
@@ -62,6 +65,31 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
         size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
         raise ParameterError(f"{place}: no such file, and {size}; give one for each of {_some(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
+
+
+def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]:
+    """Draw starts uniform on [-10, 10], to three decimals, so that they can be written down.
+
+    Parameters
+    ----------
+    seed : int or sequence of int
+        The same seed draws the same start.
+    n, dimension : int
+        Number of nodes, and of numbers for each.
+
+    Returns
+    -------
+    list of list of Fraction
+        ``dimension`` numbers for each node.
+
+    Examples
+    --------
+    >>> states = random_states(7, 3, dimension=2)
+    >>> states == random_states(7, 3, dimension=2), [len(numbers) for numbers in states]
+    (True, [2, 2, 2])
+    """
+    thousandths = np.random.default_rng(seed).integers(-10_000, 10_001, size=(n, dimension))
+    return [[Fraction(int(x), 1000) for x in row] for row in thousandths]
 
 
 def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:

@@ -1,0 +1,171 @@
+"""Rows as they come, kept beside the table that they will be, so that an interrupted batch goes on where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from ptcc_certify.batch.rows import COLUMNS, Row, package_version
+from ptcc_certify.batch.settings import Settings
+from ptcc_certify.batch.sources import Source
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.rationals import shorten
+
+#: What the first line of a journal begins with.
+SCHEMA = "ptcc-batch/1"
+
+
+def journal_path(path: Path) -> Path:
+    """Return where the journal of a table is: beside it."""
+    return path.with_name(f"{path.name}.journal")
+
+
+class Journal:
+    """Rows as they come, one JSON object per line, the first of which holds the settings; locked while it is open.
+
+    A batch that is killed leaves whole lines and perhaps part of one, which is dropped. One that was refused before its
+    first row leaves nothing.
+    """
+
+    def __init__(self, path: Path, chosen: Sequence[Source], settings: Settings, restart: bool):
+        self.path, self.name, self._chosen = path, shorten(os.fspath(path), 200), chosen
+        header = _header(chosen, settings)
+        self._file = _opened_alone(path, self.name)
+        self._rows: dict[int, tuple[str | None, Row]] = {}
+        try:
+            self._read(header, restart)
+        except BaseException:
+            self._file.close()
+            raise
+        self._empty = not self._rows
+
+    def _read(self, header: dict[str, Any], restart: bool) -> None:
+        data = self._file.read()
+        whole = data.rfind(b"\n") + 1
+        lines = data[:whole].splitlines()
+        mark = json.dumps({"schema": SCHEMA}).encode()[:-1]  # how the first line begins, of which a part may be missing
+        if data[: len(mark)] != mark[: len(data)]:
+            raise ParameterError(f"{self.name}: is no journal of ptcc batch; name another -o")
+        whole = 0 if restart else whole
+        self._file.seek(whole)
+        self._file.truncate()
+        if not whole:
+            self._write(header)
+            return
+        self._refuse_other(self._object(1, lines[0]), header)
+        for number, line in enumerate(lines[1:], start=2):
+            entry = self._object(number, line)
+            try:
+                place, fingerprint, row = entry["number"], entry["file"], entry["row"]
+                intact = 0 <= place < header["graphs"] and list(row) == list(COLUMNS)
+            except (KeyError, TypeError):
+                intact = False
+            if not intact:
+                raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
+            self._rows[place] = fingerprint, row
+
+    def _object(self, number: int, line: bytes) -> dict[str, Any]:
+        try:
+            entry = json.loads(line)
+        except ValueError:
+            entry = None
+        if isinstance(entry, dict):
+            return entry
+        raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
+
+    def _refuse_other(self, old: dict[str, Any], new: dict[str, Any]) -> None:
+        mend = "go on with that, name another -o, or drop the journal with --restart"
+        for key in new:
+            if key == "list" and old.get(key) != new[key]:
+                raise ParameterError(f"{self.name}: was begun with other graphs; {mend}")
+            if old.get(key) != new[key]:
+                before, now = (shorten(json.dumps(x), 60) for x in (old.get(key), new[key]))
+                raise ParameterError(f"{self.name}: was begun with {key} {before}, not {now}; {mend}")
+
+    def current(self) -> dict[int, Row]:
+        """Return the rows whose files are what they were."""
+        return {n: row for n, (mark, row) in self._rows.items() if self._chosen[n].fingerprint == mark}
+
+    def append(self, number: int, fingerprint: str | None, row: Row) -> None:
+        """Keep a row."""
+        self._empty = False
+        self._write({"number": number, "file": fingerprint, "row": row})
+
+    def _write(self, entry: dict[str, Any]) -> None:
+        self._file.write(json.dumps(entry, allow_nan=False).encode() + b"\n")
+        self._file.flush()
+
+    def remove(self) -> None:
+        """Delete the journal, whose rows are in the table."""
+        if os.name == "nt":  # where an open file cannot be deleted
+            self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Release the journal, and delete it if it keeps no row."""
+        if self._empty:
+            self.remove()
+        self._file.close()
+
+
+def _header(chosen: Sequence[Source], settings: Settings) -> dict[str, Any]:
+    """Return what the first line of a journal holds: everything that the rows depend on."""
+    digest = hashlib.sha256()
+    known: dict[int, str] = {}
+    for source in chosen:
+        mark = ""
+        if isinstance(source.origin, SignedDigraph):
+            mark = source.origin.sha256
+        elif isinstance(source.origin, tuple):
+            ensemble = source.origin[0]
+            mark = known.setdefault(id(ensemble), json.dumps(ensemble.to_dict(), sort_keys=True))
+        digest.update(f"{json.dumps([source.name, mark])}\n".encode())
+    graphs = {"graphs": len(chosen), "list": digest.hexdigest()}
+    return {"schema": SCHEMA, "version": package_version(), **graphs, **settings.to_dict()}
+
+
+def _opened_alone(path: Path, name: str) -> IO[bytes]:
+    """Open a file to be read and continued, and lock it; the lock ends with the process, however that ends."""
+    for _ in range(10):
+        try:
+            file = path.open("r+b") if path.exists() else path.open("x+b")
+        except (FileExistsError, FileNotFoundError):
+            continue  # another process was faster
+        except OSError as error:
+            raise ParameterError(f"{name}: cannot be written ({error.strerror})") from None
+        try:
+            _lock(file)
+        except BlockingIOError:
+            file.close()
+            raise ParameterError(f"{name}: another process is at work on it; wait for it, or name another -o") from None
+        if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+            return file
+        file.close()  # the other process finished in between
+    raise ParameterError(f"{name}: cannot be opened; remove what is there, or name another -o")
+
+
+def _lock(file: IO[bytes]) -> None:
+    if sys.platform == "win32":
+        import msvcrt
+
+        file.seek(2**40)  # a byte beyond all content: a locked one could not be read
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            raise BlockingIOError from None
+        file.seek(0)
+        return
+    import fcntl
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        pass  # some network file systems know no locks

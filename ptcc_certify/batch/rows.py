@@ -1,0 +1,266 @@
+"""The row of one graph: what its certificate says in numbers and words, or why there is none.
+
+The columns, in this order; an entry that does not apply, or was not proved, is empty:
+
+==================  =====  ============================================================================================
+graph               text   path, or ``spec.toml#i`` for graph ``i`` of an ensemble
+sha256              text   of the canonical edge list (:attr:`SignedDigraph.sha256`)
+nodes               int
+edges               int
+negative            int    edges of negative weight
+connectivity        text   strong, quasi-strong, weak or disconnected
+components          int    weakly connected components
+leaders             int    nodes in closed components
+followers           int
+closed_components   int
+balanced_leaders    int    closed components that are balanced
+balanced            bool   whether the whole graph is balanced
+theorem             text   of a disconnected graph those of its components, each once, joined by ``"; "``
+behaviour           text   likewise
+verdict             text   certified or undecided
+asked               text   holds, refuted or undecided: what was expected, and the least rate; empty if nothing was
+rate                float  proved, rounded down; per unit of the stretched clock
+rate_limit          float  proved: no rate exceeds it; rounded up
+tightness           float  rate over rate_limit, rounded down
+fastest             text   class of the Lyapunov function with that rate: paper, perron, lmi or full
+prefactor           float  its prefactor, rounded up
+paper_rate          float  of the paper's own certificate, proved, rounded down
+diagonal_rate       float  largest proved rate of a diagonal matrix, rounded down
+input_bounded       bool   whether the input stays bounded up to the deadline for every start
+peak_input          float  proved bound of every ``|u_k|`` from the start or the set of starts, rounded up
+seed                int    of the random start: ``ptcc certify GRAPH --x0 random --seed SEED`` certifies the same
+largest_outcome     float  largest ``|x_k|`` at the deadline
+degenerate          bool   whether some balanced closed component meets at 0
+reaching_time       float  sliding mode: when the last sliding variable is proved to be 0
+worst_ratio         float  numerical: largest simulated ``sqrt(V)`` over its bound
+bound_kept          bool   numerical: whether the simulated run exceeds no bound
+obligations         int    statements proved
+note                text   what kept the verdict from certified, and other remarks
+seconds             float  that the row took
+error               text   why there is no certificate, in one line; empty if there is one
+==================  =====  ============================================================================================
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import threading
+import time
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.batch.settings import Settings, Start
+from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.errors import PTCCError, explain, one_line
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import random_states, read_graph, read_state
+from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.rationals import nearest_float
+
+#: A row: column by column, None where an entry is empty.
+Row = dict[str, Any]
+#: The columns in their order, and of which type their entries are.
+COLUMNS: dict[str, type] = {
+    "graph": str,
+    "sha256": str,
+    "nodes": int,
+    "edges": int,
+    "negative": int,
+    "connectivity": str,
+    "components": int,
+    "leaders": int,
+    "followers": int,
+    "closed_components": int,
+    "balanced_leaders": int,
+    "balanced": bool,
+    "theorem": str,
+    "behaviour": str,
+    "verdict": str,
+    "asked": str,
+    "rate": float,
+    "rate_limit": float,
+    "tightness": float,
+    "fastest": str,
+    "prefactor": float,
+    "paper_rate": float,
+    "diagonal_rate": float,
+    "input_bounded": bool,
+    "peak_input": float,
+    "seed": int,
+    "largest_outcome": float,
+    "degenerate": bool,
+    "reaching_time": float,
+    "worst_ratio": float,
+    "bound_kept": bool,
+    "obligations": int,
+    "note": str,
+    "seconds": float,
+    "error": str,
+}
+#: Entries of the column ``asked``.
+HOLDS, REFUTED, UNDECIDED = "holds", "refuted", "undecided"
+# python-flint keeps one working precision for a whole process: its threads take turns.
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def certified_row(name: str, payload: Any, settings: Settings) -> Row:
+    """Return the row of one graph; whatever goes wrong is told in it.
+
+    Parameters
+    ----------
+    name : str
+    payload : bytes, pair (Ensemble, int), SignedDigraph or PTCCError
+        The content of a file, or what stands for a graph, or why there is none.
+    settings : Settings
+    """
+    began = time.perf_counter()
+    row: Row = dict.fromkeys(COLUMNS)
+    row["graph"] = _unicode(name)
+    try:
+        with _ONE_AT_A_TIME:
+            graph = _graph(name, payload, settings)
+            negative = int((graph.sign < 0).sum())
+            row |= {"sha256": graph.sha256, "nodes": graph.n_nodes, "edges": graph.n_edges, "negative": negative}
+            row["seed"] = settings.seed_of(graph)
+            row |= _columns(_certificate(graph, settings, row["seed"]), settings)
+    except Exception as error:
+        row["error"] = explain(error)
+    row["seconds"] = round(time.perf_counter() - began, 6)
+    return row
+
+
+def failed_row(name: str, why: str) -> Row:
+    """Return the row of a graph of which nothing is known but why."""
+    return dict.fromkeys(COLUMNS) | {"graph": _unicode(name), "seconds": 0.0, "error": why}
+
+
+def package_version() -> str:
+    """Return the version of this package, on which rows depend."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("ptcc-certify")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
+    if isinstance(payload, PTCCError):
+        raise payload
+    if isinstance(payload, SignedDigraph):
+        return payload
+    if isinstance(payload, tuple):
+        ensemble, i = payload
+        return ensemble.graph(i)
+    file = io.BytesIO(payload)
+    file.name = name  # its ending tells the format
+    return read_graph(
+        file,
+        orientation=settings.orientation,
+        duplicates=settings.duplicates,
+        drop_self_loops=settings.drop_self_loops,
+        undirected=settings.undirected,
+    )
+
+
+def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certificate:
+    more: dict[str, Any] = {}
+    if isinstance(settings.protocol, SlidingModeProtocol):
+        # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
+        more["sigma0"] = _start(settings.sigma0, [seed, 1], graph)
+        more["disturbance"] = settings.disturbance_of(graph.n_nodes, seed)
+    return certify(
+        graph,
+        settings.protocol,
+        _start(settings.x0, seed, graph),
+        method=settings.method,
+        simulation=settings.simulation,
+        starts=settings.initial_bound,
+        **more,
+    )
+
+
+def _start(start: Start, seed: Any, graph: SignedDigraph) -> Any:
+    if not isinstance(start, str):
+        return start
+    if start != "random":
+        return [Fraction(0)] * graph.n_nodes if start.strip() == "0" else read_state(start, graph)
+    return [x for (x,) in random_states(seed, graph.n_nodes)]
+
+
+def _columns(certificate: Certificate, settings: Settings) -> Row:
+    structure, effort, seen = certificate.structure, certificate.effort, certificate.comparison
+    rate, limit = certificate.rate, certificate.rate_limit
+    result, reaching = certificate.outcome, certificate.reaching
+    return {
+        "connectivity": structure.connectivity,
+        "components": len(structure.components),
+        "leaders": int(structure.leaders.size),
+        "followers": int(structure.followers.size),
+        "closed_components": len(structure.closed_components),
+        "balanced_leaders": sum(c.balanced for c in structure.closed_components),
+        "balanced": structure.balanced,
+        "theorem": "; ".join(dict.fromkeys(claim.theorem for claim in certificate.claims)),
+        "behaviour": "; ".join(dict.fromkeys(claim.behaviour for claim in certificate.claims)),
+        "verdict": certificate.verdict,
+        "asked": _asked(certificate, settings),
+        "rate": _down(rate),
+        "rate_limit": _up(limit),
+        "tightness": None if rate is None or not limit else _down(rate / limit),
+        "fastest": None if rate is None else certificate.fastest[2],
+        "prefactor": _up(certificate.prefactor),
+        "paper_rate": _down(certificate.proof.rate),
+        "diagonal_rate": _down(certificate.diagonal_rate),
+        "input_bounded": None if effort is None else effort.bounded,
+        "peak_input": None if effort is None or effort.peak is None else _up(Fraction(effort.peak.largest)),
+        "largest_outcome": None if result is None else _finite(float(np.abs(result.values).max())),
+        "degenerate": None if result is None else bool(result.degenerate),
+        "reaching_time": None if reaching is None else max(r.time for r in reaching),
+        "worst_ratio": None if seen is None else _finite(seen.worst_ratio),
+        "bound_kept": None if seen is None else not seen.violated,
+        "obligations": len(certificate.obligations),
+        "note": one_line("; ".join(certificate.notes)) or None,
+    }
+
+
+def _asked(certificate: Certificate, settings: Settings) -> str | None:
+    """Tell whether what was asked for holds: the behaviour by its theorem, the rate by proof."""
+    if settings.expect is None and settings.min_rate is None:
+        return None
+    if settings.expect is not None and not certificate.structure.holds(settings.expect):
+        return REFUTED
+    if settings.min_rate is None or certificate.constant:
+        return HOLDS
+    if certificate.rate is not None and certificate.rate >= settings.min_rate:
+        return HOLDS
+    limit = certificate.rate_limit
+    return REFUTED if limit is not None and settings.min_rate > limit else UNDECIDED
+
+
+def _down(x: Fraction | None) -> float | None:
+    """Round a proved number so that it stays true as a lower bound; None beyond float64."""
+    return _rounded(x, -math.inf)
+
+
+def _up(x: Fraction | None) -> float | None:
+    """Round a proved number so that it stays true as an upper bound; None beyond float64."""
+    return _rounded(x, math.inf)
+
+
+def _rounded(x: Fraction | None, towards: float) -> float | None:
+    if x is None or not math.isfinite(nearest := nearest_float(x)):
+        return None
+    wrong = nearest > x if towards < 0 else nearest < x
+    return _finite(math.nextafter(nearest, towards)) if wrong else nearest
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None
+
+
+def _unicode(name: str) -> str:
+    """Write what is no character in the name of a file as an escape code."""
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")

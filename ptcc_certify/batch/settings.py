@@ -1,0 +1,107 @@
+"""The settings: everything that a row depends on besides its graph, checked before the work."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from ptcc_certify.disturbance import as_disturbance
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.protocols import Protocol, SlidingModeProtocol
+from ptcc_certify.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.sharpen import METHODS
+from ptcc_certify.structure import behaviour_name
+
+#: What a start may be given as.
+Start = str | Sequence[Any] | Mapping[Any, Any] | None
+#: How to get the packages that several workers, Dask and Parquet need.
+INSTALL = 'install it with: pip install "ptcc-certify[batch]"'
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that a row depends on besides its graph; see :func:`ptcc_certify.certify_many` for the entries."""
+
+    protocol: Protocol
+    x0: Start = "random"
+    seed: int = 0
+    sigma0: Start = None
+    disturbance: str | None = None
+    method: str = "best"
+    simulation: bool | None = False
+    initial_bound: Fraction | None = None
+    expect: str | None = None
+    min_rate: Fraction | None = None
+    orientation: str | None = None
+    duplicates: Literal["refuse", "sum", "last"] = "refuse"
+    drop_self_loops: bool = False
+    undirected: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.protocol.prescribed:
+            raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        if self.method not in METHODS:
+            raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise ParameterError(f"seed = {self.seed} is outside its domain; it must be a natural number")
+        sliding = isinstance(self.protocol, SlidingModeProtocol)
+        for name in ("x0", "sigma0"):
+            start = getattr(self, name)
+            if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
+                raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
+        for name in ("sigma0", "disturbance"):
+            if getattr(self, name) is not None and not sliding:
+                raise ParameterError(
+                    f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol"
+                )
+        if self.disturbance is not None:
+            self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
+        for name in ("initial_bound", "min_rate"):
+            if (value := getattr(self, name)) is not None:
+                try:
+                    number = as_fraction(value)
+                except NumberError as error:
+                    raise ParameterError(f"{name}: {error}") from None
+                if number <= 0:
+                    raise ParameterError(f"{name} is outside its domain; it must be > 0")
+                object.__setattr__(self, name, number)
+        if self.expect is not None:
+            try:
+                object.__setattr__(self, "expect", behaviour_name(self.expect))
+            except ValueError as error:
+                raise ParameterError(f"expect: {error}") from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the settings as JSON takes them."""
+        entries = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {name: _plain(value) for name, value in entries.items()}
+
+    def seed_of(self, graph: SignedDigraph) -> int:
+        """Return the seed of a graph's own random start: 32 bits of a hash of ``seed`` and the graph."""
+        return int.from_bytes(hashlib.sha256(f"{self.seed} {graph.sha256}".encode()).digest()[:4], "big")
+
+    def disturbance_of(self, n: int, seed: int = 0) -> Any:
+        """Return the disturbance of ``n`` agents, which a simulated run meets."""
+        text = "adversary" if self.disturbance is None else self.disturbance
+        delta = getattr(self.protocol, "delta", 0)
+        return as_disturbance(text, n, delta, 2 * float(self.protocol.T), seed)
+
+
+def _plain(value: Any) -> Any:
+    """Return a setting as JSON takes it."""
+    if isinstance(value, Protocol):
+        return value.to_dict()
+    if isinstance(value, Fraction):
+        return format_exact(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(x) for key, x in value.items()}
+    if isinstance(value, str | int | None):
+        return value
+    if hasattr(value, "__len__"):
+        return [_plain(x) for x in value]
+    return _plain(as_fraction(value))

@@ -1,0 +1,118 @@
+"""What paths, patterns and ensembles stand for: sources, one for each graph, and what a worker is sent of them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from glob import glob, has_magic
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ptcc_certify.ensembles import Ensemble
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.examples import GRAPHS, graph_path
+from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io.files import read_bytes
+from ptcc_certify.rationals import shorten
+
+#: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
+Origin = str | tuple[Ensemble, int] | SignedDigraph
+
+
+class Task(NamedTuple):
+    """What a worker needs to make a row, besides the settings, and what the batch keeps with it."""
+
+    number: int
+    name: str
+    payload: Any
+    fingerprint: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself."""
+
+    name: str
+    origin: Origin
+
+    def load(self) -> tuple[Any, str]:
+        """Return what a worker makes the graph of, and its fingerprint."""
+        if isinstance(self.origin, str):
+            data = read_bytes(self.origin, shorten(self.name, 200))
+            return data, hashlib.sha256(data).hexdigest()
+        if isinstance(self.origin, SignedDigraph):
+            return self.origin, self.origin.sha256
+        return self.origin, ""  # the ensemble is among the settings
+
+    @property
+    def fingerprint(self) -> str | None:
+        """The fingerprint; None if there is nothing to be read."""
+        try:
+            return self.load()[1]
+        except PTCCError:
+            return None
+
+    def task(self, number: int) -> Task:
+        """Return the task of this graph, the ``number``-th of a batch; of one that cannot be read with the reason."""
+        try:
+            return Task(number, self.name, *self.load())
+        except PTCCError as error:
+            return Task(number, self.name, error, None)
+
+
+def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
+    """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
+    if isinstance(sources, str | os.PathLike | SignedDigraph | Ensemble):
+        sources = [sources]
+    found: dict[str, Source] = {}
+    given = ensembles = 0
+    for source in sources:
+        if isinstance(source, SignedDigraph):
+            own_sources = [Source(f"graph#{given}", source)]
+            given += 1
+        elif isinstance(source, Ensemble):
+            ensembles += 1
+            own_sources = _members("ensemble" if ensembles == 1 else f"ensemble{ensembles}", source)
+        elif isinstance(source, str | os.PathLike):
+            own_sources = _named(os.fspath(source), own)
+        else:
+            raise ParameterError(f"{shorten(repr(source))} is no graph; give paths, SignedDigraphs or Ensembles")
+        for one in own_sources:
+            found.setdefault(one.name, one)
+    if not found:
+        raise ParameterError("there are no graphs; name files or patterns")
+    return list(found.values())
+
+
+def _named(text: str, own: Sequence[Path]) -> list[Source]:
+    """Return what a text stands for."""
+    name, path = shorten(text, 200), Path(text)
+    try:
+        exists, folder = path.exists(), path.is_dir()
+    except (OSError, ValueError):  # a name that no file can have
+        exists = folder = False
+    if exists and not folder:
+        return _file(text)
+    if text in GRAPHS:
+        return [Source(text, str(graph_path(text)))]
+    if folder:
+        raise ParameterError(f"{name}: is a folder; write a pattern such as {Path(name, '*.csv')}")
+    if not has_magic(text):
+        raise FormatError(f"{name}: no such file; check the path")
+    mine = {os.path.realpath(one) for one in own}
+    matches = sorted(glob(text, recursive=True))  # noqa: PTH207 - Path.glob takes no absolute patterns
+    files = [one for one in matches if Path(one).is_file() and os.path.realpath(one) not in mine]
+    if not files:
+        raise FormatError(f"{name}: no file matches this pattern; check it, and quote it for the shell")
+    return [source for one in files for source in _file(one)]
+
+
+def _file(text: str) -> list[Source]:
+    path = os.path.normpath(text)
+    return _members(path, Ensemble.read(path)) if path.lower().endswith(".toml") else [Source(path, path)]
+
+
+def _members(name: str, ensemble: Ensemble) -> list[Source]:
+    return [Source(f"{name}#{i}", (ensemble, i)) for i in range(len(ensemble))]
