@@ -63,6 +63,8 @@ DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
 _DECAY_AXES = {"left": "time left, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
 #: Colour and width, in points, of what marks the closed components of a graph.
 HALO = ("#DDDDDD", 22)
+#: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
+RESOLVED_ERROR = 10
 #: Decades of the input that are drawn below its size at the start; changes of sign go further down.
 INPUT_DECADES = 3
 
@@ -277,15 +279,15 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
     if run is None or start is None or certificate.comparison is None or not envelope.members:
         raise ValueError("the certificate holds no simulated run with a proved bound")
-    ax, before = _axes(ax), run.remaining > 0
-    remaining, states = run.remaining[before], run.states[:, before]
+    ax, before, unit = _axes(ax), run.remaining > 0, _unit(run)
+    remaining, states = run.remaining[before], run.states[:, before] / unit
     place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
     shown = [m for m in envelope.members if m.coordinates == envelope.coordinates]
     norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
-    bound = envelope.norm_bound(remaining, start)
+    bound = envelope.norm_bound(remaining, start) / unit
     scale = float(norm[0]) or float(bound[0]) or 1.0
     for number, member in enumerate(shown if len(shown) > 1 else ()):
-        alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / scale
+        alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / unit / scale
         if member.kind == "paper":
             ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
         else:
@@ -355,8 +357,9 @@ def plot_input(
     """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same start proves.
 
     The axis of the input is logarithmic, from three decades below its size at the start. Behind an actuator it is the
-    input that acts. No peak is drawn where none holds: for sampled inputs, and for runs with disturbance or noise of
-    the nominal protocol or with a boundary layer. Under caps and stops that ``certificate`` judges, theirs is drawn.
+    input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn
+    where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol,
+    boundary layers. Under caps and stops that ``certificate`` judges, theirs is drawn.
 
     Parameters
     ----------
@@ -388,13 +391,15 @@ def plot_input(
     """
     _need_one_start(trajectory)
     peak = None if certificate is None else _certified_peak(trajectory, certificate)
-    ax, size = _axes(ax), np.abs(trajectory.input)
+    ax, u = _axes(ax), _resolved_input(trajectory)
+    size = np.where(np.isnan(u), 0.0, np.abs(u))
     top = max(float(size.max(initial=0)), peak or 0.0)
     if top > 0:
         ax.set_yscale("log", nonpositive="clip")
-        ax.set_ylim((float(size[:, 0].max()) or top) * 10.0**-INPUT_DECADES, top * 2)
+        first = float(size[:, 0].max(initial=0)) if u.shape[1] else 0.0
+        ax.set_ylim((first or top) * 10.0**-INPUT_DECADES, top * 2)
     held = trajectory.held_input is not None
-    _draw_agents(trajectory, size, structure, ax, drawstyle="steps-post" if held else "default")
+    _draw_agents(trajectory, np.abs(u), structure, ax, drawstyle="steps-post" if held else "default")
     if peak is not None:
         ax.axhline(peak, color="black", linewidth=0.9, linestyle="--", label="certified peak")
     ax.set_xlabel("time $t$")
@@ -407,8 +412,9 @@ def plot_input(
 def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, ax: Axes | None = None) -> Axes:
     """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate of the same start proves.
 
-    The integral is numerical, by trapezoids between the samples. No bound is drawn where none holds: as in
-    :func:`plot_input`, and under the sliding-mode protocol, whose switching part no certificate integrates.
+    The integral is numerical: between the samples ``||u||^2`` is taken for an exponential of ``ln(T/(T - t))``, as it
+    is along a single mode. No bound is drawn where none holds: as in :func:`plot_input`, and under the sliding-mode
+    protocol, whose switching part no certificate integrates.
 
     Parameters
     ----------
@@ -425,7 +431,8 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     Raises
     ------
     ValueError
-        The trajectory holds several starts, or the certificate is of another graph, protocol or start.
+        The trajectory holds several starts, its samples do not settle the energy, or the certificate is of another
+        graph, protocol or start.
 
     Examples
     --------
@@ -436,15 +443,12 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     >>> [line.get_label() for line in ax.lines]
     ['simulated (CVODES)', 'certified bound', 'deadline']
     """
-    from scipy.integrate import cumulative_trapezoid
-
     _need_one_start(trajectory)
     proved = None if certificate is None else _certified_effort(trajectory, certificate)
     bound = None
     if proved is not None and proved.energy is not None and trajectory.actuator is None:
         bound = None if isinstance(trajectory, SlidingTrajectory) else float(proved.energy.value)
-    ax, power = _axes(ax), (trajectory.input**2).sum(axis=0)
-    spent = cumulative_trapezoid(power, trajectory.t, initial=0)
+    ax, spent = _axes(ax), _energy(trajectory)
     ax.plot(trajectory.t, spent, color="#0072B2", label="simulated (CVODES)")
     if bound is not None:
         ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
@@ -713,6 +717,65 @@ def _need_one_start(trajectory: Trajectory) -> None:
         raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
 
 
+def _unit(trajectory: Trajectory) -> float:
+    """Return the size of the largest state, in which squares neither overflow nor vanish."""
+    return float(np.abs(trajectory.states).max(initial=0)) or 1.0
+
+
+def _resolved_input(trajectory: Trajectory) -> np.ndarray:
+    """Return the input, NaN where the infinite gain multiplies what the integrator does not resolve."""
+    u = np.array(trajectory.input)
+    if trajectory.held_input is not None:
+        return u
+    weights = abs(trajectory.graph.laplacian())
+    floor = RESOLVED_ERROR * trajectory.rtol * np.asarray(weights @ np.abs(trajectory.states))
+    u[np.abs(trajectory.error) < floor] = np.nan
+    return u
+
+
+def _energy(trajectory: Trajectory) -> np.ndarray:
+    """Return ``int ||u||^2 dt`` up to each instant, (M,).
+
+    Raises
+    ------
+    ValueError
+        With every second sample it would differ by more than a hundredth.
+    """
+    power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
+    if trajectory.held_input is not None:
+        return np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(trajectory.t))])
+    T, t, left = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
+    full = (trajectory.input**2).sum(axis=0)
+    every, some = (_integrated(power[::k], full[::k], t[::k], left[::k], T) for k in (1, 2))
+    if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
+        raise ValueError("these samples do not settle the energy: simulate with more, unless it is infinite")
+    return every
+
+
+def _integrated(power: np.ndarray, full: np.ndarray, t: np.ndarray, left: np.ndarray, T: float) -> np.ndarray:
+    """Integrate over time, before ``T`` over ``tau = -ln(left)``: exact for exponentials of ``tau``.
+
+    ``full`` holds besides ``power`` what is not resolved: it tells how fast ``power`` fell to there.
+    """
+    power = power.copy()
+    lost = 1 + np.flatnonzero((power[1:] == 0) & (power[:-1] > 0))
+    power[lost] = np.minimum(full[lost], power[lost - 1])
+    late = left[1:] <= 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tau = np.where(late, 0.0, np.log(left[:-1] / left[1:]))
+    early = _logarithmic_mean(power[:-1] * left[:-1], power[1:] * left[1:]) * T * tau
+    pieces = np.where(late, np.minimum(power[:-1], power[1:]) * np.diff(t), early)
+    return np.concatenate([[0.0], np.cumsum(pieces)])
+
+
+def _logarithmic_mean(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return ``(a - b) / ln(a/b)``, the mean of the exponential from ``a`` to ``b``; half the sum if one is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.log(a / b)
+        mean = (a - b) / ratio
+    return np.where(np.isfinite(ratio) & (np.abs(ratio) > 1e-6), mean, (a + b) / 2)
+
+
 def _draw_deadlines(trajectory: Trajectory, ax: Axes) -> None:
     if trajectory.protocol.prescribed:
         ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
@@ -754,15 +817,18 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     for name in ("graph", "protocol"):
         if getattr(certificate, name) != getattr(trajectory, name):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
-    starts = [("start", certificate.start, trajectory.states[:, 0])] if 0.0 in trajectory.t[:1] else []
-    unproved = trajectory.forcing is not None
+    starts = [("start", certificate.start, trajectory.states[:, :1])]
+    rounding = np.zeros((len(trajectory.labels), 1))
+    unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     if isinstance(trajectory, SlidingTrajectory):
-        starts.append(("sigma(0)", certificate.sigma0, trajectory.sigma0))
-        unproved = trajectory.boundary_layer is not None
-    for name, proved, run in starts:
-        at = None if proved is None else np.array([float(x) for x in proved])
+        sigma0 = trajectory.sigma0[:, None]
+        starts.append(("sigma(0)", certificate.sigma0, sigma0))
+        unproved = unproved or trajectory.boundary_layer is not None
         # The states of the sliding mode are sums of two parts, whose rounding the run shows.
-        if at is not None and np.abs(at - run).max(initial=0) > 1e-12 * np.abs(trajectory.states).max(initial=0):
+        rounding = 4 * np.finfo(float).eps * (np.abs(trajectory.states[:, :1]) + np.abs(sigma0))
+    for name, proved, run in starts if 0.0 in trajectory.t[:1] else ():
+        at = run if proved is None else np.array([[float(x)] for x in proved])
+        if (np.abs(at - run) > rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
     if effort is None or effort.starts is not None or certificate.start is None or unproved:
