@@ -414,12 +414,12 @@ def design(
 def examples(name: str, output: str | None, suffix: str) -> int:
     """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each.
 
-    With -o also every certificate, the figures of the paper's Section 4 (and decay and input besides), and the table
-    in full as examples.csv.
+    worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
+    paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
     """
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.paper_figures import Run, paper_figures, results_csv
+    from ptcc_certify.paper_figures import Run, paper_figures, results_csv, tightness
 
     chosen, code, runs = select(name), OK, []
     if output:
@@ -440,7 +440,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
         assert claim is not None
         click.echo(
             f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-            f"{int((rate or 0) * 10_000) / 10_000:>9.4f}{certificate.tightness or 0:>11.3f}"
+            f"{int((rate or 0) * 10_000) / 10_000:>9.4f}{tightness(certificate) or 0:>11.4f}"
             f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  "
             f"{_ends(certificate):<14}{certificate.verdict}"
         )
@@ -673,11 +673,12 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 def _reached(certificate: Certificate) -> str:
     """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
     from ptcc_certify.paper_figures import reaching_times
+    from ptcc_certify.summary import up
 
     last, proved, deadline = reaching_times(certificate)
     if isinstance(last, str):
         return f"{'-':>10}{'-':>11}{'-':>5}"
-    return f"{last:>10.5f}{proved:>11.5f}{deadline:>5.2g}"
+    return f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
 
 
 def _ends(certificate: Certificate) -> str:

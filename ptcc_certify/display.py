@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ptcc_certify.plots import STYLE, plot_decay, plot_graph, plot_run, plot_trade_off
+from ptcc_certify.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
 from ptcc_certify.structure import Structure, analyse
 from ptcc_certify.summary import certificate_lines, structure_lines
 from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
@@ -47,7 +46,9 @@ def certificate_html(certificate: Certificate) -> str:
     def draw() -> FigureBase:
         return plot_decay(certificate).figure
 
-    drawable = certificate.comparison is not None and bool(certificate.envelope.members)
+    run = certificate.trajectory
+    moves = run is not None and certificate.comparison is not None and bool(run.error.any())
+    drawable = moves and bool(certificate.envelope.members)
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
     return _page(certificate_lines(certificate, "signed digraph"), [(draw, alt)] if drawable else [])
 
@@ -73,14 +74,8 @@ def design_html(found: Design) -> str:
     return _page(found.lines(), [(draw, "certified peak input against the deadline, and what no gains can stay below")])
 
 
-def svg(figure: FigureBase) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure."""
-    from matplotlib import style
-
-    buffer = io.BytesIO()
-    with style.context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})  # type: ignore[attr-defined]
-    return buffer.getvalue()
+def _base64(figure: FigureBase) -> str:
+    return base64.b64encode(figure_bytes(figure, ".svg")).decode()
 
 
 _Drawing = tuple[Callable[[], "FigureBase"], str]
@@ -103,7 +98,7 @@ def _page(lines: Iterable[str], figures: Sequence[_Drawing]) -> str:
     )
     images = "".join(
         f'<img alt="{html.escape(alt)}" style="max-width:100%;background:white" '
-        f'src="data:image/svg+xml;base64,{base64.b64encode(svg(draw())).decode()}">'
+        f'src="data:image/svg+xml;base64,{_base64(draw())}">'
         for draw, alt in figures
     )
     return (

@@ -111,7 +111,7 @@ def certificate_document(certificate: Certificate, verdict: str, files: bool = F
     claim, outcome = certificate.claim, outcome_section(certificate, out)
     document: dict[str, Any] = {
         "schema": SCHEMA,
-        "producer": _producer(),
+        "producer": producer(),
         "graph": graph_section(graph, out),
         "structure": structure_section(structure, out),
         "claim": None if claim is None else claim_section(claim),
@@ -489,7 +489,8 @@ def _sliding_run_section(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def _producer() -> str:
+def producer() -> str:
+    """Return the name and version of this program, as certificates tell who made them."""
     from importlib.metadata import version
 
     return f"ptcc-certify {version('ptcc-certify')}"

@@ -290,6 +290,8 @@ class Explorer:
             return View(settings, self.certificate(settings))
         except PTCCError as error:
             return View(settings, None, str(error))
+        except OverflowError:
+            return View(settings, None, "a number is beyond the range of float64; choose other settings")
 
     def _base(self, settings: Settings) -> Certificate:
         """Return a nominal certificate of the graph, whose structure and Lyapunov functions serve all gains."""
@@ -418,6 +420,7 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
         text.value = f"<pre>{html.escape(words)}</pre>"
 
     def update(_: object = None) -> None:
+        tell("verdict    none: not computed yet")  # nothing of the settings before may stay
         settings = wanted()
         sliding = settings.kind != "nominal"
         names = ("graph", "kind", "method", "seed", *(_SLIDING if sliding else _NOMINAL))
@@ -529,7 +532,7 @@ def _draw_decay(certificate: Certificate, ax: Any) -> None:
     member = next(m for m in envelope.members if m.coordinates == envelope.coordinates)
     norm = np.linalg.norm(member.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
     bound, scale = certificate.norm_bound(run.remaining[before]), float(norm[0]) or 1.0
-    ax.loglog(run.remaining[before], bound / scale, color="#D55E00", linewidth=1.6, label="proved bound")
+    ax.loglog(run.remaining[before], bound / scale, color="#D55E00", linewidth=1.6, label="bound")
     ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
     top = float(bound[0]) / scale
     ax.set_ylim(_LEAST, 3 * max(1.0, top if math.isfinite(top) else 1.0))

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = (
-    *("example", "graph", "claim", "theorem", "certified_rate", "paper_rate", "tightness", "worst_ratio"),
-    *("reached", "reached_by", "T_r", "final_state", "verdict"),
+    *("example", "graph", "claim", "theorem", "certified_rate", "paper_rate", "tightness", "reached_by", "T_r"),
+    *("final_state", "verdict", "simulated_worst_ratio", "simulated_reached"),
 )
 
 
@@ -82,15 +82,16 @@ def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
 def results_csv(runs: Sequence[Run]) -> str:
     """Return what came of the examples as CSV: claim, theorem, rate, tightness, reaching times, final state, verdict.
 
-    Rates are per unit of the stretched clock, rounded down to a float; ``reached`` is when the last sliding variable of
-    the run was 0, ``reached_by`` when each is proved to be; the final state is written in full, exactly.
+    Rates are per unit of the stretched clock and tightness is the certified rate over a proved limit of all rates, both
+    rounded down; ``reached_by`` is when each sliding variable is proved to be 0; the final state is written in full,
+    exactly. What the simulated run showed is called so.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for example, graph, certificate in runs:
         claim, paper, seen = certificate.claim, certificate.proof.rate, certificate.comparison
-        ends = certificate.outcome
+        ends, (last, proved, deadline) = certificate.outcome, reaching_times(certificate)
         writer.writerow(
             [
                 example.number,
@@ -99,16 +100,25 @@ def results_csv(runs: Sequence[Run]) -> str:
                 claim.theorem if claim else "",
                 "" if certificate.rate is None else float_below(certificate.rate),
                 "" if paper is None else float_below(paper),
-                certificate.tightness,
-                seen.worst_ratio if seen else "",
-                *reaching_times(certificate),
+                tightness(certificate),
+                proved,
+                deadline,
                 ""
                 if ends is None
                 else "; ".join(f"{k}={x}" for k, x in zip(ends.labels, ends.final_state, strict=True)),
                 certificate.verdict,
+                seen.worst_ratio if seen else "",
+                last,
             ]
         )
     return text.getvalue()
+
+
+def tightness(certificate: Certificate) -> float | None:
+    """Return the proved rate over a proved limit of all rates, rounded down to four digits; None without rates."""
+    if certificate.rate is None or certificate.rate_limit is None:
+        return None
+    return int(certificate.rate / certificate.rate_limit * 10_000) / 10_000
 
 
 def reaching_times(certificate: Certificate) -> tuple[float, float, float] | tuple[str, str, str]:

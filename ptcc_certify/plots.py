@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import io
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -107,16 +108,25 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: graph.jpg: figures are written to .png, .pdf, .svg; choose one of these
     """
-    from matplotlib import style
-
     suffix = Path(path).suffix.lower()
     if suffix not in FIGURES:
         raise ParameterError(f"{path}: figures are written to {', '.join(FIGURES)}; choose one of these")
+    write_atomically(path, figure_bytes(figure, suffix))
+
+
+def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
+    """Return a figure as one of :data:`FIGURES`, the same bytes for the same figure.
+
+    Letters of scripts that the font does not have become boxes, without a word about each.
+    """
+    from matplotlib import style
+
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
     buffer = io.BytesIO()
-    with style.context(STYLE):
-        figure.savefig(buffer, format=suffix[1:], metadata=undated)
-    write_atomically(path, buffer.getvalue())
+    with style.context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        figure.savefig(buffer, format=suffix[1:], metadata=undated)  # type: ignore[attr-defined]
+    return buffer.getvalue()
 
 
 @_styled
@@ -285,7 +295,9 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     shown = [m for m in envelope.members if m.coordinates == envelope.coordinates]
     norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
     bound = envelope.norm_bound(remaining, start) / unit
-    scale = float(norm[0]) or float(bound[0]) or 1.0
+    scale = float(norm[0]) or float(bound[0])
+    if scale == 0:
+        raise ValueError("the agents begin where they end: nothing decays")
     for number, member in enumerate(shown if len(shown) > 1 else ()):
         alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / unit / scale
         if member.kind == "paper":

@@ -145,7 +145,8 @@ def _distance_lines(certificate: Certificate) -> list[str]:
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
     worst = certificate.outcome_distance([q for q, _ in instants]).max(axis=0, initial=0.0)
     said = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, instants, strict=True))
-    lines = [_line("distance", f"of every agent to its outcome at most {said}")] if instants else []
+    numerical = "" if certificate.direct else " (numerical, rounded up)"
+    lines = [_line("distance", f"of every agent to its outcome at most {said}{numerical}")] if instants else []
     if certificate.at is not None:
         q = float(1 - certificate.at / certificate.protocol.T)
         each = certificate.outcome_distance([q])[:, 0]

@@ -275,9 +275,10 @@ def test_settings_outside_the_choices_are_refused_at_once(change: dict[str, Any]
 def test_nothing_is_called_certified_before_the_check(explorer: Explorer):
     panel = Panel(explorer, Settings())
     panel.set("T", 0.7)
-    assert "certified" not in panel.texts[0]
-    assert "proved" not in panel.texts[0]
-    assert "not checked yet" in panel.texts[0]
+    assert "not computed yet" in panel.texts[0]
+    assert "certified" not in "".join(panel.texts[:2])
+    assert "proved" not in "".join(panel.texts[:2])
+    assert "not checked yet" in panel.texts[1]
     assert panel.texts[-1].endswith("verdict    certified")
 
 
@@ -293,7 +294,7 @@ def test_the_first_view_of_a_class_is_the_papers_until_it_is_found():
     panel = Panel(Explorer(), Settings(method="paper"))
     panel.set("bounds", "full")
     assert len(panel.images) == 1  # the paper's image was there already
-    assert "the class full is being searched" in panel.texts[0]
+    assert "the class full is being searched" in panel.texts[1]
     panel.set("graph", "fig3b")
     assert len(panel.images) == 2
     assert "certified" not in "".join(panel.texts[:-1])

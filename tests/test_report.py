@@ -410,7 +410,8 @@ def test_without_a_proved_rate_little_is_said(tmp_path: Path):
     assert write_report(path, tmp_path / "c.html") == write_report(path, tmp_path / "c.tex") == "undecided"
     page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert "no decay was proved" in page.text and "No rate of decay was proved" in page.text
-    assert "Where the agents end, proved exactly" in page.text
+    assert "Where the agents end if they settle (exact)" in page.text and "proved exactly" not in page.text
+    assert "limit, if it settles" in (tmp_path / "c.tex").read_text() and "Limit, if it settles" in page.text
     assert "e^" not in (tmp_path / "c.tex").read_text()
 
 
@@ -516,6 +517,56 @@ def test_a_statement_compiles(name: str, tmp_path: Path):
     assert done.returncode == 0, done.stdout[-2000:]
     assert b"Missing character" not in done.stdout
     assert (tmp_path / "state_ment_graph.pdf").exists()
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
+def test_a_label_in_brackets_is_no_argument_of_latex(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "[br]", -1), ("[br]", "*", 1)])
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3, 4], simulation=False).save(
+        tmp_path / "c.json"
+    )
+    write_report(tmp_path / "c.json", tmp_path / "s.tex", simulation=False)
+    source = r"\documentclass{article}\usepackage{amsmath,graphicx}\begin{document}\input{s}\end{document}"
+    (tmp_path / "main.tex").write_text(source)
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "main.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "*", -1)])
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3], simulation=False).save(tmp_path / "c.json")
+    text = report_latex(read_certificate(tmp_path / "c.json"))
+    after = re.findall(r"\\\\\n(?:\\hline\n)?(.)", text)
+    assert after and not set(after) & set("[*")
+
+
+@pytest.mark.parametrize("size", ["1e300", "1e160", "1e-250", "0"])
+def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    start = [Fraction(size), -Fraction(size)]
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), start).save(tmp_path / "c.json")
+    for name in ("c.html", "c.tex"):
+        assert write_report(tmp_path / "c.json", tmp_path / name) == "certified"
+    assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
+
+
+def test_a_statement_whose_figure_has_no_place_writes_nothing(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    (tmp_path / "s_decay.pdf").mkdir()
+    with pytest.raises(ParameterError, match="is a folder, where a figure of the statement would go"):
+        write_report(tmp_path / "c.json", tmp_path / "s.tex")
+    assert {path.name for path in tmp_path.iterdir()} == {"c.json", "s_decay.pdf"}
+
+
+def test_the_file_does_not_say_who_checked_it(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    path = forged(tmp_path, producer="Theorem. Everything is proved")
+    write_report(path, tmp_path / "c.html", simulation=False)
+    write_report(path, tmp_path / "c.tex", simulation=False)
+    assert "Everything is proved" not in (tmp_path / "c.tex").read_text()
+    page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert page.text.count("Everything is proved") == 1 and "as the file says" in page.text
 
 
 def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.io import write_atomically
-from ptcc_certify.plots import save_figure
-from ptcc_certify.report.figures import INPUT_NODES, draw, missing_letters_as_boxes
+from ptcc_certify.plots import figure_bytes
+from ptcc_certify.report.figures import INPUT_NODES, draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.statement import report_latex
 from ptcc_certify.saved import RejectedCertificate, SavedCertificate, read_certificate
@@ -102,12 +102,15 @@ def write_report(
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":
-        figures = {}
-        for name, figure in draw(saved, ("graph", "decay")).items():
-            figures[name] = path.with_name(f"{path.stem}_{name}.pdf")
-            with missing_letters_as_boxes():
-                save_figure(figure, figures[name])
-        write_atomically(path, report_latex(saved, {name: file.name for name, file in figures.items()}))
+        drawn = draw(saved, ("graph", "decay"))
+        files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
+        if folder := next((file for file in files.values() if file.is_dir()), None):
+            raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
+        text = report_latex(saved, {name: file.name for name, file in files.items()})
+        contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
+        for file, content in contents.items():
+            write_atomically(file, content)
+        write_atomically(path, text)
     else:
         write_atomically(path, report_html(saved, no_run=why))
     return saved.verdict

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.display import svg
-from ptcc_certify.plots import DRAWN_NODES, plot_decay, plot_graph, plot_input, plot_sliding
+from ptcc_certify.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
 from ptcc_certify.saved import SavedCertificate
 from ptcc_certify.trajectory import SlidingTrajectory
 
@@ -28,7 +25,7 @@ def draw(saved: SavedCertificate, wanted: Sequence[str]) -> dict[str, Figure]:
         figures["graph"] = plot_graph(saved.structure).figure
     if run is None:
         return figures
-    if "decay" in wanted and saved.comparison is not None and saved.envelope.members and not saved.constant:
+    if "decay" in wanted and saved.comparison is not None and saved.envelope.members and run.error.any():
         figures["decay"] = plot_decay(saved).figure
     if "sliding" in wanted and isinstance(run, SlidingTrajectory) and not saved.direct and n <= INPUT_NODES:
         figures["sliding"] = plot_sliding(run, saved.reaching).figure
@@ -37,18 +34,9 @@ def draw(saved: SavedCertificate, wanted: Sequence[str]) -> dict[str, Figure]:
     return figures
 
 
-@contextmanager
-def missing_letters_as_boxes() -> Iterator[None]:
-    """Draw labels in scripts that the font does not have as boxes, without a word about each."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from")
-        yield
-
-
 def inline_figure(figure: Figure, name: str, caption: str) -> str:
     """Return a figure as inline SVG, which a caption of HTML describes in words and numbers."""
-    with missing_letters_as_boxes():
-        image = svg(figure).decode()
+    image = figure_bytes(figure, ".svg").decode()
     image = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", image, flags=re.DOTALL)
     # the figures of a page share its names, so each puts its own before them
     image = re.sub(r"\bid=\"", f'id="{name}-', image.replace("xlink:href=", "href="))

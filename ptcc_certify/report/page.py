@@ -9,6 +9,7 @@ from fractions import Fraction
 from itertools import islice
 
 from ptcc_certify.bounds import FRACTIONS
+from ptcc_certify.document import producer
 from ptcc_certify.effort import Effort
 from ptcc_certify.plots import DRAWN_NODES
 from ptcc_certify.protocols import SlidingModeProtocol
@@ -293,7 +294,7 @@ class _Page:
         if not saved.direct:
             head.append("\u03c3(0)")
         if saved.final_state is not None:
-            head.append("State at the deadline")
+            head.append("State at the deadline" if saved.verdict == "certified" else "Limit, if it settles")
         rows = []
         for k in range(min(n, ROWS)):
             row = [label_html(self.graph.labels[k]), parts[k], rational(saved.start[k])]
@@ -306,6 +307,8 @@ class _Page:
         if saved.final_state is not None:
             exact = not any(radius for _, radius in saved.final_state)
             caption = f"Where the agents end, proved {'exactly' if exact else 'in intervals'}"
+            if saved.verdict != "certified":
+                caption = f"Where the agents end if they settle ({'exact' if exact else 'in proved intervals'})"
         more = f'<p class="note">The first {ROWS} of {n:,} agents; the file has all.</p>' if n > ROWS else ""
         if not saved.direct:
             more += "<p>The agents end at Q (X(0) \u2212 \u03c3(0)), whatever the disturbance.</p>"
@@ -324,7 +327,8 @@ class _Page:
             rows.append(("No rate exceeds", f"{above(limit, 8)}, proved, rounded up"))
             rows.append(("Tightness", f"at least {below(saved.rate / limit, 4)} (proved rate over that limit)"))
         if saved.prefactor is not None:
-            rows.append(("Prefactor at that rate", f"{above(saved.prefactor, 4)} of the squared norm"))
+            z = "E" if saved.document["prefactor"]["of"] == "||E||^2" else "\u03b5"
+            rows.append(("Prefactor at that rate", f"{above(saved.prefactor, 4)} of \u2016{z}\u2016\u00b2"))
         if saved.paper_rate is not None and saved.lyapunov is not None:
             formula = escaped(saved.lyapunov.objective)
             rows.append(("The article's own rate", f"{below(saved.paper_rate)} = {formula}"))
@@ -362,7 +366,8 @@ class _Page:
             bounds = saved.norm_bound([float(1 - f) for f, _ in instants]).tolist()
         columns = [[above(x, 2) for x in bounds]]
         if saved.start is not None and any(m.distance is not None for m in saved.envelope.members):
-            head.append("Distance of any agent to its outcome at most")
+            numerical = "" if saved.direct else " (numerical, rounded up)"
+            head.append(f"Distance of any agent to its outcome at most{numerical}")
             worst = saved.outcome_distance([float(1 - f) for f, _ in instants]).max(axis=0)
             columns.append([above(float(x), 2) for x in worst])
         rows = [(name, *cells) for (_, name), *cells in zip(instants, *columns, strict=True)]
@@ -458,8 +463,9 @@ class _Page:
                 abs(float(x) - nearest_float(m))
                 for x, (m, _) in zip(saved.trajectory.final_state.tolist(), saved.final_state, strict=True)
             )
+            where = "the proved final state" if saved.verdict == "certified" else "that limit"
             settled = "" if saved.trajectory.deadline_resolved else " (it had not settled)"
-            told.append(f"<p>It ends within {above(Fraction(gap), 2)} of the proved final state{settled}.</p>")
+            told.append(f"<p>It ends within {above(Fraction(gap), 2)} of {where}{settled}.</p>")
         return "\n".join(told)
 
     def effort(self) -> str:
@@ -557,7 +563,8 @@ class _Page:
             ("SHA-256 of the file", f"<code>{saved.sha256}</code>"),
             ("SHA-256 of the graph", f"<code>{escaped(saved.report.sha256)}</code>"),
             ("Digest of the claims", f"<code>{escaped(saved.document['digest'])}</code>"),
-            ("Written by", escaped(saved.document["producer"], 200)),
+            ("Written by, as the file says", escaped(saved.document["producer"], 200)),
+            ("Checked by", producer()),
         ]
         commands = [f"ptcc check {name} YOUR_GRAPH.csv", f"python -m ptcc_certify.checker {name} --stdlib"]
         return (
@@ -578,6 +585,6 @@ class _Page:
         which = f"Theorem{'s' * (len(theorems) > 1)} {', '.join(theorems)}"
         return (
             f"<p>{which} of: {AUTHORS}. <cite>{TITLE}</cite>. Manuscript.</p><p>BibTeX: <code>ptcc cite "
-            f"{theorems[0]}</code>. The program: {escaped(self.saved.document['producer'], 200)}; its "
+            f"{theorems[0]}</code>. The program: {producer()}; its "
             "<code>CITATION.cff</code> says how to cite it.</p>"
         )

@@ -7,6 +7,7 @@ from collections import Counter
 from fractions import Fraction
 
 from ptcc_certify.bounds import FRACTIONS
+from ptcc_certify.document import producer
 from ptcc_certify.latex import symbol_latex
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.report.texts import (
@@ -50,8 +51,8 @@ def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None)
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     text = report_latex(read_certificate(f"{folder}/c.json"))
-    >>> print(next(line for line in text.splitlines() if line.startswith("a")))
-    a\_1 & leader, camp 1 & $3$ & $-1$ \\
+    >>> print(next(line for line in text.splitlines() if line.startswith("{}a")))
+    {}a\_1 & leader, camp 1 & $3$ & $-1$ \\
     """
     p, graph = saved.protocol, saved.graph
     sliding = isinstance(p, SlidingModeProtocol)
@@ -64,8 +65,9 @@ def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None)
         r"% For \input in a document with \usepackage{amsmath,graphicx}.",
         r"\begin{trivlist}",
         rf"\item[\hskip\labelsep\textbf{{{_head(saved)}}}]",
-        f"Let ${graph.n_nodes}$ agents be connected by a signed digraph of ${graph.n_edges}$ edges, of which "
-        f"${int((graph.sign < 0).sum())}$ are negative ({_tex(structure_text(saved.structure))}), and let agent $k$ "
+        f"Let ${graph.n_nodes}$ agents be connected by a signed digraph of ${graph.n_edges}$ edges, "
+        f"${int((graph.sign < 0).sum())}$ of them negative ({_tex(structure_text(saved.structure))}), "
+        "and let agent $k$ "
         + (
             r"move by $\dot x_{k} = u_{k} + d_{k}$ with $|d_{k}| \le \delta$"
             if sliding
@@ -82,7 +84,7 @@ def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None)
         *_limits(saved),
         r"\end{trivlist}",
         *_states(saved),
-        *_figures(figures or {}),
+        *_figures(figures or {}, saved.path.stem),
         *_source(saved),
     ]
     return "\n".join(parts) + "\n"
@@ -142,7 +144,8 @@ def _decay(saved: SavedCertificate, T: str) -> list[str]:
         shares = ((f, saved.envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS)
         left = ", ".join(f"${_above(share, 2)}$ at $t = {f}\\,{whole}$" for f, share in shares)
         name = "E" if saved.envelope.coordinates == "E" else r"\varepsilon"
-        lines.append(rf"Of $\|{name}(0)\|$ at most the following share is left: {left}.")
+        norm = rf"$\|{name}(0)\|$" + ("" if name == z else f", {said[name].rstrip(',')},")
+        lines.append(f"Of {norm} at most the following share is left: {left}.")
     if not saved.direct and saved.reaching is not None:
         late = sum(r.z is None for r in saved.reaching)
         last = max((r.time for r in saved.reaching if r.z is not None), default=0.0)
@@ -208,13 +211,14 @@ def _states(saved: SavedCertificate) -> list[str]:
         return []
     parts, gone = agent_parts(saved), saved.sigma0 if not saved.direct else None
     heads = ["Agent", "Part", "$x_{k}(0)$"] + ([r"$\sigma_{k}(0)$"] if gone else [])
-    heads += ["at the deadline"] if saved.final_state is not None else []
+    ends = "at the deadline" if saved.verdict == "certified" else "limit, if it settles"
+    heads += [ends] if saved.final_state is not None else []
     rows = []
     for k, label in enumerate(saved.graph.labels[:LISTED]):
         row = [_tex(printable(label, CHARACTERS // 2)), parts[k], f"${_rational(saved.start[k])}$"]
         row += [f"${_rational(gone[k])}$"] if gone else []
         row += [f"${_interval(saved.final_state[k])}$"] if saved.final_state is not None else []
-        rows.append(" & ".join(row) + r" \\")
+        rows.append(_ROW + " & ".join(row) + r" \\")
     more = saved.graph.n_nodes - LISTED
     lines = [
         r"\begin{center}",
@@ -230,7 +234,7 @@ def _states(saved: SavedCertificate) -> list[str]:
     return lines + ([rf"\noindent The table leaves out ${more}$ more agents."] if more > 0 else [])
 
 
-def _figures(figures: dict[str, str]) -> list[str]:
+def _figures(figures: dict[str, str], stem: str) -> list[str]:
     """Return the figures, by the names of their files."""
     captions = {
         "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",
@@ -238,7 +242,7 @@ def _figures(figures: dict[str, str]) -> list[str]:
     }
     return [
         f"\\begin{{figure}}[htbp]\n\\centering\n\\includegraphics[width=0.75\\linewidth]{{{file}}}\n"
-        f"\\caption{{{captions[name]}}}\n\\label{{fig:ptcc-{name}}}\n\\end{{figure}}"
+        f"\\caption{{{captions[name]}}}\n\\label{{fig:{re.sub('[^A-Za-z0-9]+', '-', stem)}-{name}}}\n\\end{{figure}}"
         for name, file in figures.items()
     ]
 
@@ -249,13 +253,15 @@ def _source(saved: SavedCertificate) -> list[str]:
     return [
         rf"\noindent Theorems: {AUTHORS}, \emph{{{TITLE}}}, manuscript. The statement follows from a certificate of "
         f"${len(saved.report.steps)}$ obligations, which the checker of "
-        rf"{_tex(printable(saved.document['producer'], 200))} verified in exact arithmetic; "
+        rf"{_tex(producer())} verified in exact arithmetic; "
         rf"SHA-256 of its file: \texttt{{{breakable}}}."
     ]
 
 
 # ---------------------------------------------------------------------- texts and numbers
 
+#: Before a label that begins with ``[``, which would else be an argument of the end of the row above.
+_ROW = "{}"
 _TEX = {c: f"\\{c}" for c in "{}$&#%_"}
 _TEX |= {"\\": r"$\backslash$", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$", "|": "$|$"}
 _TEX |= {c: rf"{{\char{ord(c)}}}" for c in "\"'`"}
