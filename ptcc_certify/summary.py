@@ -374,6 +374,7 @@ def remarks_on(structure: Structure) -> list[str]:
             ("undirected", structure.undirected and structure.graph.n_edges > 0),
             ("all weights positive", structure.all_positive and structure.graph.n_edges > 0),
             ("sign-asymmetric", not structure.sign_symmetric),
+            ("no edges, is this the right file?", structure.graph.n_edges == 0),
         )
         if holds
     ]
