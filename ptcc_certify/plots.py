@@ -741,7 +741,11 @@ def _resolved_input(trajectory: Trajectory) -> np.ndarray:
         return u
     weights = abs(trajectory.graph.laplacian())
     floor = RESOLVED_ERROR * trajectory.rtol * np.asarray(weights @ np.abs(trajectory.states))
-    u[np.abs(trajectory.error) < floor] = np.nan
+    lost = np.abs(trajectory.error) < floor
+    if isinstance(trajectory, SlidingTrajectory):  # what answers the disturbance is resolved
+        u[lost] -= (trajectory.protocol.gain.value_at_remaining(trajectory.remaining) * trajectory.error)[lost]
+        lost &= u == 0
+    u[lost] = np.nan
     return u
 
 

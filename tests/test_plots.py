@@ -47,6 +47,7 @@ from ptcc_certify.plots import (
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.simulation import simulate
 from ptcc_certify.structure import Structure, analyse
+from ptcc_certify.trajectory import SlidingTrajectory
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -177,6 +178,11 @@ def test_the_input_of_the_sliding_mode() -> None:
     assert {"deadline", "$T_r$"} <= set(labelled(ax))
     peak = cert.effort and cert.effort.peak
     assert ("certified peak" in labelled(ax)) == (peak is not None)
+    run = cert.trajectory
+    assert isinstance(run, SlidingTrajectory)
+    late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
+    answers = {line.get_ydata()[late].round(6).tobytes() for line in ax.lines[:6]}
+    assert answers == {row.round(6).tobytes() for row in np.abs(run.disturbance[:, late])}
     other = certify(graph, example.protocol(), start, sigma0=[1.0] * 6, simulation=False)
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, cert.structure, other)
