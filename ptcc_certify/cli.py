@@ -678,7 +678,7 @@ def _reached(certificate: Certificate) -> str:
     last, proved, deadline = reaching_times(certificate)
     if isinstance(last, str):
         return f"{'-':>10}{'-':>11}{'-':>5}"
-    return f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
+    return f"{last:>10.5f}{up(float(proved), 5):>11}{deadline:>5.2g}"
 
 
 def _ends(certificate: Certificate) -> str:
