@@ -834,17 +834,16 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         if getattr(certificate, name) != getattr(trajectory, name):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     starts = [("start", certificate.start, trajectory.states[:, :1])]
-    rounding = np.zeros((len(trajectory.labels), 1))
+    rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the start
     unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     if isinstance(trajectory, SlidingTrajectory):
         sigma0 = trajectory.sigma0[:, None]
         starts.append(("sigma(0)", certificate.sigma0, sigma0))
         unproved = unproved or trajectory.boundary_layer is not None
-        # The states of the sliding mode are sums of two parts, whose rounding the run shows.
-        rounding = 4 * np.finfo(float).eps * (np.abs(trajectory.states[:, :1]) + np.abs(sigma0))
+        rounding = rounding + np.abs(sigma0)  # the states are sums of two parts
     for name, proved, run in starts if 0.0 in trajectory.t[:1] else ():
         at = run if proved is None else np.array([[float(x)] for x in proved])
-        if (np.abs(at - run) > rounding).any():
+        if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
     if effort is None or effort.starts is not None or certificate.start is None or unproved:

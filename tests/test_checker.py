@@ -984,6 +984,7 @@ STANDARD = {
     "pathlib",
     "re",
     "sys",
+    "traceback",
     "typing",
 }
 OWN = {

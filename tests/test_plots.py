@@ -509,3 +509,11 @@ def test_starts_of_any_size_are_drawn(size: str) -> None:
     norm = labelled(plot_decay(cert))["simulated (CVODES)"].get_ydata()  # type: ignore[attr-defined]
     small = certify(pair, PROTOCOL, [x / Fraction(size) for x in start])
     assert norm[:20] == pytest.approx(labelled(plot_decay(small))["simulated (CVODES)"].get_ydata()[:20])  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("start", [["0.123", "-7.013", "2.739"], ["1/3", "-1e5", "1e-5"]])
+def test_the_start_of_a_certificate_is_known_again_whatever_its_decimals(start: list[str]) -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])
+    cert = certify(graph, PROTOCOL, start)
+    assert cert.trajectory is not None
+    assert "certified peak" in labelled(plot_input(cert.trajectory, cert.structure, cert))
