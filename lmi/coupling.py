@@ -69,7 +69,7 @@ class Coupling:
         Diagonals of the Lyapunov matrices of leaders and followers.
     A_FL, A_F : (n_F, n_L), (n_F, n_F) arrays
         The followers' rows of the matrix, ``x_F' = -A_FL x_L - A_F x_F``.
-    printed_numerator : float
+    printed_numerator : float or None
         The paper's numerator of the printed interval, ``lmin(Gamma)`` by default.
 
     Raises
@@ -246,7 +246,7 @@ def couple_blocks(
     Parameters
     ----------
     A : (n, n) array
-    parts : sequence of int arrays
+    parts : sequence of (k,) int arrays
         Irreducible blocks, those that drive first (:func:`lmi.irreducible_blocks`).
     log_omega : (n,) array
         Logarithms of the blocks' own diagonals.

@@ -1144,7 +1144,8 @@ def definite_by_polynomial(S: Rows) -> bool:
 
     Parameters
     ----------
-    S : n rows of n Fractions, ints or floats
+    S : n rows of n Fractions
+        Or other real numbers; a float is the dyadic number that it is.
 
     Returns
     -------

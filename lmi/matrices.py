@@ -212,7 +212,7 @@ def irreducible_blocks(A: Any) -> list[np.ndarray]:
 
     Returns
     -------
-    list of int arrays
+    list of (k,) int arrays
 
     References
     ----------

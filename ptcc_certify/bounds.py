@@ -352,7 +352,7 @@ class Envelope:
         return self._distances(clock, x0, lambda d: d.roots)
 
     def distance_norm(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
-        """Bound of ``||x - Q x0||`` at clock values ``s`` from ``x0``; see :meth:`distance`."""
+        """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`distance`."""
         return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
 
     def _distances(

@@ -486,8 +486,8 @@ def certify(
     x0 : sequence of N numbers or mapping of label to number, optional
         The start, in node order or by label. Without it there is no final state and no simulation.
     sigma0 : sequence of N numbers or mapping of label to number, optional
-        Sliding mode: ``sigma(0)``, by default 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
-    disturbance : optional
+        Sliding mode: ``sigma(0)``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
+    disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
     simulation : bool, optional
         Whether to compare the proved bound with a CVODES run; by default up to 10,000 agents.

@@ -433,12 +433,12 @@ class ExpressionDisturbance(Disturbance):
         return values
 
     def casadi(self, t: ca.SX | ca.MX, agent: int) -> ca.SX | ca.MX:
-        """Return the CasADi expression of the symbol ``t`` for an agent, of the type of ``t``."""
+        """Return the CasADi expression of the symbol ``t`` for ``agent`` (from 0), of the type of ``t``."""
         number = type(t)
         return self._symbolic(agent, {"k": number(agent + 1), "t": t, "pi": number(math.pi), "e": number(math.e)})
 
     def latex(self, agent: int = 0) -> str:
-        """Return the LaTeX of the common expression, or of that of an agent.
+        """Return the LaTeX of the common expression, or of that of ``agent`` (counted from 0).
 
         Raises
         ------

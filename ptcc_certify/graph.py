@@ -106,8 +106,9 @@ class SignedDigraph:
         The weights, each rounded once; the constructor takes them exactly.
     sign : (n_edges,) int8 array
         +1 ally, -1 opponent.
-    read : mapping
-        How the data were read: ``orientation``, ``duplicates``, ``self_loops``, ``undirected``, ``notes``.
+    read : mapping, optional
+        How the data were read: ``orientation``, ``duplicates``, ``self_loops``, ``undirected``, ``notes``. The
+        constructor fills in what it is not told.
 
     Raises
     ------

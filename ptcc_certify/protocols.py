@@ -95,7 +95,7 @@ class NominalProtocol:
         x : (N, 1) casadi.SX, optional
             The states; symbols ``x1 .. xN`` by default.
         t : casadi.SX, optional
-            The time; a symbol ``t`` by default.
+            The instant, in units of time; the symbol ``t`` by default.
 
         Returns
         -------
@@ -114,7 +114,7 @@ class NominalProtocol:
         return self.gain.expression(t) * _coupling(graph, x)
 
     def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
-        """Return ``x' = u`` as CasADi's ``{"t", "x", "ode"}``, fit for ``casadi.integrator`` (before ``T``).
+        """Return ``x' = u`` on ``graph`` as CasADi's ``{"t", "x", "ode"}``, for ``casadi.integrator`` (before ``T``).
 
         Examples
         --------
@@ -291,7 +291,7 @@ class SlidingModeProtocol:
         x, varsigma : (N, 1) casadi.SX, optional
             The states and the auxiliary variables of (47); symbols ``x1 ..`` and ``varsigma1 ..`` by default.
         t : casadi.SX, optional
-            The time; a symbol ``t`` by default.
+            The instant, in units of time; the symbol ``t`` by default.
 
         Returns
         -------
@@ -304,7 +304,7 @@ class SlidingModeProtocol:
         return _driven(self.nominal.input(graph, x, t), sigma, float(self.mu1), self.reaching_gain.expression(t))
 
     def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
-        """Return the closed loop as CasADi's ``{"t", "x", "p", "ode"}``.
+        """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "p", "ode"}``.
 
         ``x`` stacks states and auxiliary variables, ``p`` holds the disturbances, and ``ode`` is ``(u + d, -u^nom)``.
         Its right-hand side is discontinuous where a ``sigma_k`` is 0: an integrator that does not know this chatters.

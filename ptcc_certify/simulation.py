@@ -75,8 +75,8 @@ def simulate(
         The start in the order of ``graph.labels``; S columns are S starts, or the S components of vector-valued
         agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode: one column.
     sigma0 : (N,) array of numbers, optional
-        Sliding mode: ``sigma(0)``, by default 0, which leaves no reaching phase.
-    disturbance : optional
+        Sliding mode: ``sigma(0)``; without it 0, which leaves no reaching phase.
+    disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``; by
         default the adversary ``d_k = delta sign(sigma_k)``. It is refused where it exceeds ``delta``. Nominal
         protocol: one that reads neither states nor sliding variables, by default none.
@@ -86,14 +86,18 @@ def simulate(
         Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
     delta : int, float, str or Fraction, optional
         Nominal protocol: the bound of the disturbance, needed with it; in units of the input.
-    noise, noise_bound : optional
-        Nominal protocol: what is added to every measurement, and its bound, like ``disturbance`` and ``delta``; with
-        an actuator that bounds the gain.
+    noise : Disturbance, str, number or sequence, optional
+        Nominal protocol: what is added to every measurement, like ``disturbance``; with an actuator that bounds the
+        gain.
+    noise_bound : int, float, str or Fraction, optional
+        The bound of ``noise``, needed with it; in units of the states.
     times : increasing numbers >= 0, optional
         The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
-    remaining, samples : float, int
-        Without ``times``: ``samples`` instants uniform in ``tau`` from ``1 - t/T = 1`` to ``remaining`` and half as
-        many uniform in t (with ``rho2 = 0``: ``samples`` uniform in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
+    remaining : float
+        Without ``times``: instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; dimensionless.
+    samples : int
+        Without ``times``: so many of these instants and half as many uniform in t (with ``rho2 = 0``: so many uniform
+        in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
     past : float
         Without ``times``: go on to ``T (1 + past)``; dimensionless.
     rtol, atol : float

@@ -25,7 +25,7 @@ class SymbolicLyapunov:
     ----------
     protocol : NominalProtocol
     t, x : casadi.SX
-        Time and states (N, 1).
+        The instant, in units of time, and the states (N, 1).
     gain : casadi.SX
         ``rho1 + rho2 phi'/phi``.
     E : (N, 1) casadi.SX
@@ -180,7 +180,7 @@ class SymbolicSliding:
     ----------
     protocol : SlidingModeProtocol
     t, x, varsigma, d : casadi.SX
-        Time, states, auxiliary variables and disturbances, (N, 1) each but time.
+        The instant, in units of time; states, auxiliary variables and disturbances, (N, 1) each.
     sigma : (N, 1) casadi.SX
         ``x + varsigma``.
     V : casadi.SX

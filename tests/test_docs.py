@@ -7,12 +7,13 @@ import doctest
 import inspect
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Mapping
+from fractions import Fraction
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, get_origin
 
 import pytest
 
@@ -45,15 +46,55 @@ NO_SOURCE = {
     "the check names the lemma of each step in its report": {"check", "CheckReport"},
 }
 
+#: How an example may refer to a public name: imported by itself, or with its package.
+PLACES = ("", "ptcc.", "ptcc_certify.", "lmi.")
 SECTIONS = {"Summary", "Parameters", "Attributes", "Returns", "Raises", "Warns", "Notes", "References", "Examples"}
 #: Quantities of time, rate or input: their entry tells the unit.
 DIMENSIONED = {
     *("T", "T_r", "T_s", "deadline", "t", "at", "times", "until", "sample_period", "stop_before"),
     *("rho1", "mu1", "mu2", "delta", "gain_cap", "rate", "rates", "numerical_rate", "spectral_rate"),
 }
-UNIT = re.compile(r"\b(units?|times?|clock|dimensionless)\b", re.IGNORECASE)
+UNIT = re.compile(r"\bunits? of \w|\b1/(time|weight)\b|\bdimensionless\b", re.IGNORECASE)
+LENGTH = r"\w+( ?[-+] ?\w+)?"
+SHAPE = re.compile(rf"\({LENGTH},( {LENGTH}(, {LENGTH})*)?\)|\b[Oo]f (any shapes?|the shape (of|to))\b")
 NUMBERED = r"(Theorem|Lemma|Corollar(y|ie)|Definition|Proposition|Example|Section|Remark)s?"
-CITATION = re.compile(rf"\b{NUMBERED} ([0-9]|[IVX]+\b)|(?<![\w)])\([0-9]{{1,2}}\)")
+EQUATION = r"\b([Ee]quation|[Pp]rotocol|[Nn]etwork|[Ss]ystem)s?\s+\([0-9]{1,2}\)"
+DATED = re.compile(r"\b(18|19|20)[0-9]{2}\b")
+CITATION = re.compile(rf"\b{NUMBERED}\s+([0-9]|[IVX]+\b)|{EQUATION}")
+#: Words for types, and the names in an annotation of which one justifies each.
+TYPE_WORDS = {
+    r"bools?": {"bool"},
+    r"ints?|integers?": {"int", "ndarray", "ArrayLike"},
+    r"floats?": {"float", "ndarray", "ArrayLike"},
+    r"str|strings?|texts?": {"str"},
+    r"bytes": {"bytes"},
+    r"Fractions?": {"Fraction"},
+    r"[Pp]aths?": {"Path", "PathLike"},
+    r"mappings?|dicts?": {"Mapping", "dict"},
+    r"tuples?": {"tuple", "Sequence", "Iterable"},
+    r"lists?": {"list", "Sequence", "Iterable"},
+    r"sequences?|iterables?": {"tuple", "list", "Sequence", "Iterable"},
+    r"arrays?|array_like": {"ndarray", "ArrayLike"},
+    r"callables?": {"Callable"},
+}
+#: What an entry must say if its annotation admits the type: its word, a word for more, or choices.
+SAID = {
+    "bool": r"\bbools?\b",
+    "int": r"\b(ints?|integers?|numbers?)\b|\{[^}]*\d",
+    "float": r"\b(floats?|numbers?)\b",
+    "str": r"\b(str|[Pp]aths?)\b|\"",
+    "bytes": r"\bbytes\b",
+    "Mapping": r"\b(mapping|dict)\b",
+    "dict": r"\b(mapping|dict)\b",
+    "Callable": r"\bcallable\b",
+    "None": r"\b(None|optional)\b",
+}
+#: A default as an entry states it; words that are no literal ("by default up to 10 agents") state none.
+VALUE = r"(``[^`]+``|\"[^\"]*\"|[-+]?\.?\d[\d,._]*(?:e[-+]?\d+)?|\w+)(?!\w)"
+STATED = (
+    rf"\bdefault(?:s to| is|:|=)? ?{VALUE}(?! and\b)",
+    rf"(?<![\w`\",.]){VALUE} (?:by default|\(the default\))(?! [\d`\"]| up\b)",
+)
 
 
 def sections(doc: str) -> dict[str, str]:
@@ -118,16 +159,157 @@ def own_docs(cls: type, name: str | None = None) -> list[str]:
     return [inspect.cleandoc(doc) for doc in docs if doc]
 
 
-def faults_of_entries(documented: dict[str, str]) -> Iterator[str]:
-    """Find entries that lack a type, arrays without a shape, and quantities without a unit."""
+def that_run(body: str) -> list[doctest.Example]:
+    """Return the examples of a section that are not skipped."""
+    examples = doctest.DocTestParser().get_examples(body)
+    return [one for one in examples if not one.options.get(doctest.SKIP)]
+
+
+def used(examples: Iterable[doctest.Example], kind: type[ast.AST], part: str) -> set[str]:
+    """Return a part of every node of a kind in the code of examples, as text; comments and strings are no such node."""
+    nodes = [node for one in examples for node in ast.walk(ast.parse(one.source)) if isinstance(node, kind)]
+    parts = [getattr(node, part) for node in nodes]
+    return {ast.unparse(part) if isinstance(part, ast.AST) else str(part) for part in parts}
+
+
+def literal(text: str) -> Any:
+    """Return the value that a text writes down; a text that is no literal is returned as it is, without backquotes."""
+    bare = re.sub(r"(?<=\d),(?=\d{3})", "", text.strip("`").rstrip(".,"))
+    try:
+        return ast.literal_eval(bare)
+    except (SyntaxError, ValueError):
+        return bare
+
+
+@cache
+def aliases(module_name: str) -> dict[str, Any]:
+    """Return the names that the annotations of a module may use, with those imported for type checkers only."""
+    module = import_module(module_name)
+    tree = ast.parse(inspect.getsource(module))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    found = {
+        name.asname or name.name: getattr(import_module(node.module), name.name, None)
+        for node in imports
+        if node.module.split(".")[0] in ROOTS
+        for name in node.names
+    }
+    return found | vars(module)
+
+
+def annotation_text(annotation: Any) -> str:
+    """Return an annotation as it is written, whether Python kept it as a text or not."""
+    return annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+
+
+def written_out(annotation: str, names: dict[str, Any]) -> str:
+    """Return an annotation with the aliases of types in it written out."""
+
+    def alias(word: re.Match) -> str:
+        value = names.get(word[0])
+        return written_out(annotation_text(value), names) if get_origin(value) else word[0]
+
+    return re.sub(r"(?<![\w.\"'])[A-Z]\w*", alias, annotation)
+
+
+def union(annotation: ast.expr) -> list[str]:
+    """Return the members of a union."""
+    if isinstance(annotation, ast.BinOp):
+        return [*union(annotation.left), *union(annotation.right)]
+    return [ast.unparse(annotation)]
+
+
+def faults_of_type(name: str, kind: str, annotation: str) -> Iterator[str]:
+    """Compare the type that an entry tells with the annotation, its aliases written out."""
+    said = re.sub(r"\{.*?\}|\".*?\"|``.*?``", "", kind)
+    known = set(re.findall(r"\w+", annotation))
+    if "Any" not in known:
+        for word, types in TYPE_WORDS.items():
+            found = re.search(rf"\b({word})\b", said)
+            if found and not known & types:
+                yield f"{name} is documented as {found[0]}, not {annotation}"
+    for member in union(ast.parse(annotation, mode="eval").body):
+        head = member.split("[")[0]
+        if head in SAID and not re.search(SAID[head], kind):
+            yield f"{name} is {head}, its entry does not say so"
+        public = member.removeprefix("lmi.") in {name for _, name in PUBLIC}
+        if public and not re.search(rf"\b{re.escape(member)}\b", kind):
+            yield f"{name} is {member}, its entry does not say so"
+        if member.startswith("Literal["):
+            choices = ast.literal_eval(member.removeprefix("Literal"))
+            if choices_of(kind) != {*choices}:
+                yield f"{name} has other choices than documented"
+
+
+def choices_of(kind: str) -> set[Any]:
+    """Return the choices that an entry tells in braces."""
+    found = re.match(r"\{.*?\}", kind)
+    return set(literal(found[0])) if found else set()
+
+
+def faults_of_default(name: str, text: str, default: Any) -> Iterator[str]:
+    """Compare the default and the choices that an entry tells with the default there is."""
+    kind = text.split("\n")[0]
+    required = default is inspect.Parameter.empty
+    if re.search(r"\boptional\b", kind) and required:
+        yield f"{name} is not optional"
+    if not required and not isinstance(default, bool | int | float | str | None):
+        return
+    sentences = " ".join(text.split())
+    stated = [literal(found[1]) for pattern in STATED for found in re.finditer(pattern, sentences, re.IGNORECASE)]
+    for value in stated:
+        # A word that is no literal tells a default only where that is a text; "by default up to 10 agents" tells none.
+        telling = isinstance(default, str) or not isinstance(value, str)
+        if telling and required:
+            yield f"{name} has no default, not {value!r}"
+        elif telling and (value != default or isinstance(value, bool) != isinstance(default, bool)):
+            yield f"{name} is {default!r} by default, not {value!r}"
+    choices = choices_of(kind)
+    if choices and not required and default is not None and default not in choices:
+        yield f"{name} is {default!r} by default, which is none of its choices"
+
+
+def faults_of_unit(name: str, text: str, alone: bool) -> Iterator[str]:
+    """Ask for a unit; in an entry of several names behind the name, in its clause, where the entry names it."""
+    clauses = [clause for clause in re.split(r"[.;](?=\s|$)", text) if f"``{name}``" in clause and not alone]
+    places = [clause.split(f"``{name}``", 1)[1] for clause in clauses] or [text]
+    if not any(UNIT.search(place) for place in places):
+        yield f"{name} has no unit"
+
+
+def faults_of_entries(
+    documented: dict[str, str], there: Mapping[str, inspect.Parameter], names: dict[str, Any]
+) -> Iterator[str]:
+    """Find entries without type, shape or unit, and those that contradict the parameters or fields that are there."""
     for name, text in documented.items():
         kind = text.split("\n")[0]
-        if not kind:
+        if not re.sub(r"\W*optional\W*", "", kind):
             yield f"{name} has no type"
-        if re.search(r"\barrays?\b", kind) and not re.search(r"\(.*\)|\bshapes?\b", text):
+        if re.search(r"\barrays?\b", kind) and not SHAPE.search(text):
             yield f"{name} is an array without a shape"
-        if name in DIMENSIONED and not UNIT.search(text):
-            yield f"{name} has no unit"
+        if name in DIMENSIONED:
+            yield from faults_of_unit(name, text, alone=[*documented.values()].count(text) == 1)
+        if name not in there:
+            continue
+        default, annotation = there[name].default, there[name].annotation
+        yield from faults_of_default(name, text, default)
+        if annotation is not inspect.Parameter.empty:
+            yield from faults_of_type(name, kind, written_out(annotation_text(annotation), names))
+        elif isinstance(default, bool | int | float | str):
+            yield from faults_of_type(name, kind, type(default).__name__)
+
+
+def faults_of_result(function: Any, found: dict[str, str]) -> Iterator[str]:
+    """Compare what a function is documented to return with its annotation."""
+    body, annotation = found.get("Returns", ""), inspect.signature(function).return_annotation
+    documented = entries(body)
+    if len(documented) == 1 and annotation is not inspect.Signature.empty:
+        # A result without a name has its type in the place of the name.
+        kind = next(line.partition(" : ")[2] or line for line in body.splitlines() if line)
+        yield from faults_of_type(
+            "the result", kind, written_out(annotation_text(annotation), aliases(function.__module__))
+        )
+    if re.search(r"\barrays?\b", body) and not SHAPE.search(body):
+        yield "the result is an array without a shape"
 
 
 def is_error(name: str) -> bool:
@@ -145,12 +327,11 @@ def faults_of_parts(name: str, found: dict[str, str]) -> Iterator[str]:
     yield from (f"unknown section {title}" for title in found if title not in SECTIONS)
     if not re.match(r"[A-Z`]", found["Summary"]) or not re.search(r"[.:](\s|$)", found["Summary"]):
         yield "no first sentence"
-    examples = doctest.DocTestParser().get_examples(found.get("Examples", ""))
-    if not any(one.want and not one.options.get(doctest.SKIP) for one in examples):
+    if not any(one.want for one in that_run(found.get("Examples", ""))):
         yield "no example that shows something"
     elsewhere = "\n".join(body for title, body in found.items() if title != "Examples")
     exempt = any(name in names for names in NO_SOURCE.values())
-    if not exempt and not found.get("References") and not CITATION.search(elsewhere):
+    if not exempt and not DATED.search(found.get("References", "")) and not CITATION.search(elsewhere):
         yield "no source"
     errors = [line.strip() for line in found.get("Raises", "").splitlines() if line and not line.startswith(" ")]
     yield from (f"{error} is no public exception" for error in errors if not is_error(error))
@@ -166,19 +347,49 @@ def faults_of_function(function: Any, found: dict[str, str]) -> Iterator[str]:
     """Compare a function's sections with its signature and its source."""
     documented = entries(found.get("Parameters", ""))
     yield from faults_of_names(documented, parameters(function), "parameter")
-    yield from faults_of_entries(documented)
+    yield from faults_of_entries(documented, inspect.signature(function).parameters, aliases(function.__module__))
+    yield from faults_of_result(function, found)
     if "Returns" not in found and inspect.signature(function).return_annotation not in (None, "None"):
         yield "no Returns"
     if "Raises" not in found and raises(function):
         yield "no Raises"
-    if f"{function.__name__}(" not in found.get("Examples", ""):
+    called = used(that_run(found.get("Examples", "")), ast.Call, "func")
+    if not called & {f"{place}{function.__name__}" for place in PLACES}:
         yield "its example does not call it"
+
+
+def fields_of(cls: type) -> dict[str, inspect.Parameter]:
+    """Return the parameters of a class's constructor, and its properties and other annotated names as if they were."""
+    kinds: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        kinds |= inspect.get_annotations(base)
+        properties = {name: plain(member) for name, member in vars(base).items() if ours(plain(member))}
+        kinds |= {
+            name: inspect.signature(function).return_annotation
+            for name, function in properties.items()
+            if isinstance(vars(base)[name], property | cached_property)
+        }
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    found = {name: inspect.Parameter(name, keyword, annotation=kind) for name, kind in kinds.items()}
+    given = {} if issubclass(cls, BaseException) else inspect.signature(cls).parameters
+    return found | {name: one.replace(annotation=kinds.get(name, one.annotation)) for name, one in given.items()}
+
+
+def is_shown(cls: type, examples: list[doctest.Example]) -> bool:
+    """Tell whether examples call or catch a class, call its constructors, read a member of it, or print its name."""
+    called = used(examples, ast.Call, "func") | used(examples, ast.ExceptHandler, "type")
+    made = {call.removeprefix(place).split(".")[0] for call in called for place in PLACES}
+    read = used(examples, ast.Attribute, "attr") & {*dir(cls), *fields_of(cls)}
+    return cls.__name__ in made or bool(read) or any(re.search(rf"\b{cls.__name__}\b", one.want) for one in examples)
 
 
 def faults_of_class(cls: type, found: dict[str, str]) -> Iterator[str]:
     """Compare a class's sections with its fields, its constructor and its public members."""
-    own = entries(found.get("Attributes", "")) | entries(found.get("Parameters", ""))
-    yield from faults_of_entries(own)
+    constructor = {} if issubclass(cls, BaseException) else inspect.signature(cls).parameters
+    attributes, arguments = (entries(found.get(title, "")) for title in ("Attributes", "Parameters"))
+    yield from faults_of_entries(attributes, fields_of(cls), aliases(cls.__module__))
+    yield from faults_of_entries(arguments, constructor, aliases(cls.__module__))
+    own = attributes | arguments
     documented = set(own)
     for doc in own_docs(cls)[1:]:
         documented |= set(entries(sections(doc).get("Attributes", "")))
@@ -195,6 +406,8 @@ def faults_of_class(cls: type, found: dict[str, str]) -> Iterator[str]:
             yield f"documented {name} is no field"
     if "Raises" not in found and any(map(raises, makers)):
         yield "no Raises"
+    if not is_shown(cls, that_run(found.get("Examples", ""))):
+        yield "its example does not show it"
     for name in dir(cls):
         member = inspect.getattr_static(cls, name)
         if not name.startswith("_") and ours(plain(member)):
@@ -208,13 +421,19 @@ def faults_of_member(member: Any, docs: list[str]) -> Iterator[str]:
         return
     found = [sections(doc) for doc in docs]
     documented = entries(found[0].get("Parameters", ""))
-    yield from faults_of_entries(documented)
+    function = plain(member)
+    yield from faults_of_entries(documented, inspect.signature(function).parameters, aliases(function.__module__))
+    yield from faults_of_result(function, found[0])
     yield from (f"unknown section {title}" for title in found[0] if title not in SECTIONS)
-    if raises(plain(member)) and not any("Raises" in one for one in found):
+    if raises(function) and not any("Raises" in one for one in found):
         yield "no Raises"
     if not isinstance(member, property | cached_property):
-        there = parameters(plain(member))
-        yield from (f"{name} is not named" for name in there if not re.search(rf"\b{name}\b", "\n".join(docs)))
+        there = parameters(function)
+        named = {name for one in found for name in entries(one.get("Parameters", ""))}
+        named |= {
+            word for doc in docs for quoted in re.findall(r"``(.+?)``", doc) for word in re.findall(r"\w+", quoted)
+        }
+        yield from (f"{name} is not named" for name in there if name not in named)
         yield from (f"documented {name} is no parameter" for name in documented if name not in there)
 
 
@@ -310,6 +529,154 @@ def test_the_rule_sees_what_is_missing_and_what_is_stale():
     }
     assert faults("silent", lambda: None) == ["no docstring"]
     assert list(faults_of_constant(ptcc_certify, "PTCCError")) == ["a constant without a comment #: above it"]
+
+
+def contradicted(a=3, b: bool = False, kind: str = "x", at: float | None = None) -> bool:
+    """Return whether ``a`` is large (Lemma 1).
+
+    Parameters
+    ----------
+    a : dict of bytes, default 99
+    b : int
+        True by default.
+    kind : {"y", "z"}
+        What is done.
+    at : str
+        Many times.
+
+    Returns
+    -------
+    list of int
+
+    Examples
+    --------
+    >>> 1 + 1  # contradicted(
+    2
+    >>> "contradicted()"
+    'contradicted()'
+    """
+    return bool(a) == b
+
+
+class Hidden:
+    """Hold parts (5) of the best of 3 (equations).
+
+    Examples
+    --------
+    >>> 1 + 1  # Hidden(
+    2
+    """
+
+    def part(self, a: int, it: int, of: int) -> int:
+        """Return a part of it, ``self`` as it is (``abs``)."""
+        return a + it + of
+
+    def power(self, a: int, it: int, of: int) -> int:
+        """Return ``a ** it`` in units of ``of``."""
+        return a**it * of
+
+
+def test_the_rule_sees_what_contradicts_the_code():
+    assert set(faults("contradicted", contradicted)) == {
+        *("a is documented as bytes, not int", "a is documented as dict, not int"),
+        *("a is int, its entry does not say so", "a is 3 by default, not 99"),
+        *(
+            "b is documented as int, not bool",
+            "b is bool, its entry does not say so",
+            "b is False by default, not True",
+        ),
+        "kind is 'x' by default, which is none of its choices",
+        *("at is documented as str, not float | None", "at is float, its entry does not say so", "at has no unit"),
+        *("at is None, its entry does not say so", "its example does not call it"),
+        *("the result is documented as int, not bool", "the result is documented as list, not bool"),
+        "the result is bool, its entry does not say so",
+    }
+    assert set(faults("Hidden", Hidden)) == {
+        *("no source", "its example does not show it"),
+        *(f"part: {name} is not named" for name in ("a", "it", "of")),
+    }
+
+
+@pytest.mark.parametrize(
+    ("entry", "annotation", "default", "wrong"),
+    [
+        ("int", "int", 3, []),
+        ("int\nHow many; 3 by default.", "int", 3, []),
+        ("int, default 3", "int", 4, ["a is 4 by default, not 3"]),
+        ("int (default: 10,000)", "int", 10_000, []),
+        ("float\nDefaults to 1e-9.", "float", 1e-8, ["a is 1e-08 by default, not 1e-09"]),
+        ("float\nIts default is 1e-8.", "float", 1e-8, []),
+        ("bool\nTrue by default.", "bool", True, []),
+        ("int\nTrue by default.", "int", 1, ["a is 1 by default, not True"]),
+        ("int, optional", "int", inspect.Parameter.empty, ["a is not optional"]),
+        ("int, default 3", "int", inspect.Parameter.empty, ["a has no default, not 3"]),
+        ("float", "Mapping[str, Any]", inspect.Parameter.empty, ["a is Mapping, its entry does not say so"]),
+        ("int, optional\nBy default up to 10 agents.", "int | None", None, []),
+        ("int, optional\n7 by default.", "int | None", None, ["a is None by default, not 7"]),
+        ('str\n``"best"`` by default.', "str", "best", []),
+        ('str\n"lmi" by default.', "str", "best", ["a is 'best' by default, not 'lmi'"]),
+        ('{"best", "lmi"}, default "best"', "str", "best", []),
+        ('{"lmi", "full"}', "str", "best", ["a is 'best' by default, which is none of its choices"]),
+        ('{"lmi"}, optional', "Literal['lmi', 'full'] | None", None, ["a has other choices than documented"]),
+        ('{"lmi", "full"}', "Literal['lmi', 'full']", "lmi", []),
+        ("number", "float", 1.0, []),
+        ("Fraction or number", "Number", inspect.Parameter.empty, []),
+        ("Fraction", "Number", inspect.Parameter.empty, ["a is float, its entry does not say so"]),
+        ("path", "str | Path", inspect.Parameter.empty, []),
+        ("sequence of int", "Sequence[int]", inspect.Parameter.empty, []),
+        (
+            "tuple of str",
+            "np.ndarray",
+            inspect.Parameter.empty,
+            ["a is documented as str, not np.ndarray", "a is documented as tuple, not np.ndarray"],
+        ),
+        ("Gain", "Structure", inspect.Parameter.empty, ["a is Structure, its entry does not say so"]),
+        ("SlidingTrajectory", "Trajectory", inspect.Parameter.empty, ["a is Trajectory, its entry does not say so"]),
+        ("optional", "Any", None, ["a has no type"]),
+        ("array\nOf some (or many) numbers.", "Any", None, ["a is an array without a shape"]),
+        ("(N, n + 1) array", "Any", None, []),
+    ],
+)
+def test_an_entry_agrees_with_annotation_and_default(entry, annotation, default, wrong):
+    parameter = inspect.Parameter("a", inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    names = {"Number": Fraction | float}
+    assert list(faults_of_entries({"a": entry}, {"a": parameter}, names)) == wrong
+
+
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [
+        ("float\nMany times the clock, a unit.", ["T", "rate"]),
+        ("float\nPositive, in units of time.", []),
+        ("float\nPositive; 1/time.", []),
+        ("float\n``T`` in units of time, ``rate`` as you like.", ["rate"]),
+        ("float\n``T`` is positive; ``rate`` is dimensionless.", ["T"]),
+        ("float\n``T`` in units of time, ``rate`` per unit of the clock.", []),
+    ],
+)
+def test_the_unit_is_told_of_each_name(text, missing):
+    assert list(faults_of_entries({"T": text, "rate": text}, {}, {})) == [f"{name} has no unit" for name in missing]
+
+
+@pytest.mark.parametrize(
+    ("text", "cites"),
+    [
+        *(("Lemma 3.2", True), ("equations (3)", True), ("Protocol (8)", True), ("the network\n(2)", True)),
+        *(("(5) best", False), ("(1)", False), ("the best (1) of lemmas", False), ("f (2)", False)),
+    ],
+)
+def test_a_number_in_parentheses_is_a_source_only_after_what_it_counts(text, cites):
+    found = sections(f"Return one, {text}.\n\nExamples\n--------\n>>> 1\n1\n")
+    assert ("no source" not in faults_of_parts("one", found)) == cites
+
+
+@pytest.mark.parametrize(
+    ("references", "missing"),
+    [("Horn and Johnson, Matrix Analysis, Cambridge 2013.", []), ("See there.", ["no source"])],
+)
+def test_a_reference_has_a_year(references, missing):
+    doc = f"Return one.\n\nReferences\n----------\n{references}\n\nExamples\n--------\n>>> 1\n1\n"
+    assert list(faults_of_parts("one", sections(doc))) == missing
 
 
 @pytest.mark.parametrize(
