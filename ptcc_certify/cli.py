@@ -477,7 +477,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
-@click.option("--restart", is_flag=True, help="Begin again, and replace the table.")
+@click.option("--restart", is_flag=True, help="Begin again, and replace the table, or the graphs of --write-graphs.")
 @click.option("--write-graphs", metavar="DIR", help="Only write the graphs of SPEC.toml to this folder, as CSV.")
 def batch(
     pattern: tuple[str, ...],
@@ -512,13 +512,16 @@ def batch(
     expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")
     bound = _number(initial_bound, "--initial-bound")
     if write_graphs is not None:
-        click.echo(f"written    {many.write_graphs(pattern, write_graphs)} graphs to {write_graphs}")
+        for name, value in (("-o", output), ("--scheduler", scheduler), ("--workers", workers)):
+            if value is not None:
+                raise ParameterError(f"{name} has no effect beside --write-graphs; leave it out")
+        click.echo(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
         return OK
     if scheduler is not None and workers is not None:
         raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
     if restart and output is None:
         raise ParameterError("--restart replaces a table; name it with -o")
-    if output == "-":
+    if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out")
     protocol = _protocol(kind, {**dict.fromkeys(_LIMITS), **options}, ())
     done = total = 0

@@ -65,7 +65,8 @@ class Ensemble:
     negative : number
         Probability that a node of a balanced closed component is in the second camp, or that another edge is negative.
     weight_range : pair of numbers
-        Sizes of weights are uniform in it, to three digits.
+        Sizes of weights are uniform in it, to three digits, or to a thousandth of its width where fewer than ten such
+        numbers are in it.
     weight_decades : number, optional
         Instead: sizes are log-uniform over so many decades around 1, to three digits.
     undirected : bool
@@ -178,8 +179,9 @@ class Ensemble:
         try:
             # Decimals are read exactly, as in every other input.
             spec = tomllib.loads(data.decode("utf-8"), parse_float=parse_exact)
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError, NumberError, RecursionError) as error:
-            raise FormatError(f"{name}: no TOML that can be read ({' '.join(str(error).split())})") from None
+        except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
+            reason = shorten(" ".join(str(error).split()), 160)
+            raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
         keys = [field.name for field in fields(cls)]
         for key in spec:
             if key not in keys:
@@ -253,6 +255,8 @@ class Ensemble:
             return [Fraction(f"{x:.2e}") for x in (10.0 ** rng.uniform(-half, half, m)).tolist()]
         if low == high:
             return [low] * m
+        if high - low < 10 * Fraction(10) ** (int(f"{float(high):e}".partition("e")[2]) - 2):
+            return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in rng.uniform(size=m).tolist()]
         drawn = rng.uniform(float(low), float(high), m).tolist()
         return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
 
@@ -265,7 +269,10 @@ class Ensemble:
 
 
 def _text(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else shorten(str(value))
+    try:
+        return str(value).lower() if isinstance(value, bool) else shorten(str(value))
+    except ValueError:  # Python writes no integer of more than 4,300 digits
+        return "a number of thousands of digits"
 
 
 def _require(holds: bool, name: str, value: Any, domain: str) -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import networkx as nx
+import numpy as np
 import pytest
 from bad_inputs import ptcc
 
@@ -147,6 +148,10 @@ def test_sizes_degrees_and_weights_are_what_was_asked_for():
     narrow = Ensemble(count=4, nodes=12, weight_range=(low, high), mean_degree=6)
     sizes = {abs(w) for i in range(4) for _, _, w in narrow.graph(i).edges}
     assert low <= min(sizes) and max(sizes) <= high and len(sizes) > 20
+    low, high = Fraction(1000), Fraction("1000.001")
+    slit = Ensemble(count=1, nodes=12, weight_range=(low, high), mean_degree=6).graph(0)
+    sizes = {abs(w) for _, _, w in slit.edges}
+    assert low <= min(sizes) < max(sizes) <= high and len(sizes) > 20
     wide = Ensemble(count=4, nodes=40, weight_decades=8, mean_degree=6)
     logs = [math.log10(abs(w)) for i in range(4) for _, _, w in wide.graph(i).edges]
     assert -4 <= min(logs) < -3 and 3 < max(logs) <= 4
@@ -174,6 +179,28 @@ def test_written_graphs_are_those_of_the_ensemble():
     assert facts(mine) == named
 
 
+def test_written_graphs_are_lost_in_no_other_file():
+    for folder in ("a", "b"):
+        Path(folder).mkdir()
+        Path(folder, "e.toml").write_text(TINY)
+    for args, says in (
+        (("a/e.toml", "b/e.toml", "--write-graphs", "made"), "would be two graphs"),
+        (("a/e.toml", "--write-graphs", ""), "is empty"),
+        (("a/e.toml", "--write-graphs", "made", "-o", "t.csv"), "-o has no effect"),
+        (("a/e.toml", "--write-graphs", "made", "--scheduler", "tcp://h:1"), "--scheduler has no effect"),
+    ):
+        run = ptcc("batch", *args)
+        assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1) and says in run.err
+        assert names() == ["a", "b", "spec.toml"]
+    Path("made").mkdir()
+    Path("made/e-3.csv").write_text("mine")
+    run = ptcc("batch", "a/e.toml", "--write-graphs", "made")
+    assert run.code == 2 and "e-3.csv: is there already" in run.err
+    assert names("made") == ["e-3.csv"] and Path("made/e-3.csv").read_text() == "mine"
+    assert ptcc("batch", "a/e.toml", "--write-graphs", "made", "--restart").code == 0
+    assert read_graph("made/e-3.csv") == Ensemble.read("a/e.toml").graph(3)
+
+
 BAD_SPECS = [
     ("count = 3\nnodes = 6\nedges = 4", 'unknown key "edges"'),
     ("nodes = 6", '"count" is missing'),
@@ -198,6 +225,8 @@ BAD_SPECS = [
     ("count = 3\nnodes = 6\nweight_range = 2", "weight_range"),
     ("count = 3\nnodes = 6\nweight_decades = 1000", "weight_decades = 1000"),
     ("count = ", "no TOML"),
+    ("count = " + 5000 * "1", "no TOML"),
+    ("nodes = 6\ncount = 0x" + 5000 * "f", "thousands of digits"),
 ]
 
 
@@ -344,6 +373,38 @@ def test_a_process_that_dies_is_an_error_of_one_row():
     ]
 
 
+class Unlucky(SignedDigraph):
+    """A graph whose process dies until it was sent a third time."""
+
+    def __reduce__(self) -> Any:
+        return die_twice, (Path("deaths").absolute(), list(self.edges))
+
+
+def die_twice(deaths: Path, edges: Any) -> SignedDigraph:
+    with deaths.open("a") as file:
+        file.write("x")
+    if deaths.stat().st_size < 3:
+        os._exit(1)
+    return SignedDigraph.from_edges(edges)
+
+
+def test_a_graph_is_to_blame_only_for_two_processes_that_died_with_it_alone():
+    """It dies once among others, and once alone, which may be chance."""
+    unlucky = Unlucky(TRIANGLE.labels, TRIANGLE.source, TRIANGLE.target, TRIANGLE._weights)
+    rows = quickly([TRIANGLE, unlucky], workers=2)
+    assert [row["error"] for row in rows] == [None, None]
+    assert Path("deaths").read_text() == "xxx"
+
+
+def scale(cluster: Any, workers: int) -> None:
+    """Have so many workers in a cluster, and wait until it has."""
+    cluster.scale(workers)
+    until = time.monotonic() + 60
+    while len(cluster.scheduler.workers) != workers and time.monotonic() < until:
+        time.sleep(0.05)
+    assert len(cluster.scheduler.workers) == workers
+
+
 def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.MonkeyPatch):
     from distributed import LocalCluster
 
@@ -356,10 +417,21 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
     assert facts(quickly(sources, workers=2)) == here
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
-        cluster.scale(0)
+        scale(cluster, 0)
         monkeypatch.setattr(backends, "PATIENCE", 3)
         with pytest.raises(ParameterError, match="no workers"):
             quickly(sources, scheduler=cluster.scheduler_address)
+        scale(cluster, 1)
+
+        def lose(done: int, total: int, errors: int) -> None:
+            if done == 2:
+                scale(cluster, 0)
+
+        monkeypatch.setattr(backends, "AHEAD", 1)
+        with pytest.raises(ParameterError, match="lost all its workers"):
+            quickly(sources, scheduler=cluster.scheduler_address, output="lost.csv", progress=lose)
+    assert rows_in(Path("lost.csv.journal")) >= 2
+    Path("lost.csv.journal").unlink()
     assert names() == ["a.csv", "bad.csv", "dask.csv", "spec.toml"]  # no worker writes anything
     assert read_csv("dask.csv") == texts(here)
 
@@ -385,6 +457,56 @@ def test_a_graph_that_is_named_twice_has_one_row():
     write_graph(TRIANGLE, "a.csv")
     rows = quickly(["a.csv", "*.csv", "./a.csv", "fig1a", "fig1a", "spec.toml", "spec.*"])
     assert [row["graph"] for row in rows] == ["a.csv", "fig1a", *(f"spec.toml#{i}" for i in range(8))]
+    rows = quickly(["./a.csv", Path("a.csv").absolute(), ".//spec.toml", Path("spec.toml").absolute()])
+    assert [row["graph"] for row in rows] == ["a.csv", *(f"spec.toml#{i}" for i in range(8))]
+
+
+def test_a_file_that_is_named_like_a_graph_of_an_ensemble_has_a_row_of_its_own():
+    write_graph(TRIANGLE, "spec.toml#0.csv")
+    Path("spec.toml#0.csv").rename("spec.toml#0")
+    rows = quickly(["spec.toml", "spec.toml#0"])
+    assert [row["graph"] for row in rows] == [*(f"spec.toml#{i}" for i in range(8)), "spec.toml#0"]
+    assert rows[-1]["sha256"] == TRIANGLE.sha256 != rows[0]["sha256"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links, pipes and names of POSIX")
+def test_odd_files_are_what_the_system_says(folder: Path):
+    """A folder behind a link, links to files and to nowhere, pipes, and names that mean something elsewhere."""
+    Path("far/inner").mkdir(parents=True)
+    Path("link").symlink_to("far/inner")
+    other = SignedDigraph.from_edges([(1, 2, 1)])
+    write_graph(TRIANGLE, "a.csv")
+    write_graph(other, "far/a.csv")
+    rows = quickly(["link/../a.csv", "a.csv"])
+    assert [(row["graph"], row["nodes"]) for row in rows] == [("link/../a.csv", 2), ("a.csv", 3)]
+    Path("again.csv").symlink_to("a.csv")
+    Path("gone.csv").symlink_to("nowhere.csv")
+    Path("gone.toml").symlink_to("nowhere.toml")
+    Path("folder.csv").mkdir()
+    os.mkfifo("pipe.csv")
+    Path("a.csv").rename("-")
+    Path("again.csv").unlink()
+    Path("again.csv").symlink_to("-")
+    rows = quickly(["?", "*.csv", "g*.toml"])
+    assert [row["graph"] for row in rows] == ["-", "gone.csv", "pipe.csv", "gone.toml"]
+    errors = [row["error"] for row in rows]
+    assert errors[0] is None and rows[0]["sha256"] == TRIANGLE.sha256
+    assert "no such file" in errors[1] and "no regular file" in errors[2] and "no such file" in errors[3]
+    for args in (("pipe.csv",), ("fig1a", "-o", "pipe.csv"), ("fig1a", "-o", "p.csv")):
+        if args[-1] == "p.csv":
+            os.mkfifo("p.csv.journal")
+        run = ptcc("batch", *args, *QUICK)
+        assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1) and "no regular file" in run.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of POSIX")
+def test_no_name_of_a_file_breaks_a_table():
+    odd = "a\rb\n\x1b\u2028,c.csv"
+    write_graph(TRIANGLE, odd)
+    (row,) = quickly("a*.csv", output="t.csv")
+    assert row["graph"] == r"a\rb\n\x1b\u2028,c.csv" and row["error"] is None
+    assert len(Path("t.csv").read_text().splitlines()) == 2
+    assert read_csv("t.csv") == texts([row])
 
 
 # ---------------------------------------------------------------------- exit codes and refusals
@@ -436,6 +558,7 @@ def test_without_a_file_the_table_is_printed():
         (("fig1a", "-o", "other.csv"), "no journal"),
         (("fig1a", "-o", "other.csv", "--restart"), "no journal"),
         (("fig1a", "--restart"), "name it with -o"),
+        (("fig1a", "-o", ""), "-o names a file"),
         (("fig1a", "--rho2", "0"), "no deadline"),
         (("fig1a", "--delta", "1"), "--protocol sliding-mode"),
         (("fig1a", "--x0", "g.csv"), "is a file"),
@@ -458,6 +581,35 @@ def test_what_cannot_be_done_is_refused_before_the_work(args: tuple[str, ...], s
     (line,) = run.err.splitlines()
     assert says in line
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"x0": [1, math.nan, 2]}, "x0: .*nan"),
+        ({"x0": {"1": math.inf}}, "x0: .*inf"),
+        ({"x0": [10**5000]}, "x0: .*too long"),
+        ({"seed": 1.5}, "seed = 1.5"),
+        ({"seed": 10**5000}, "seed = a number of thousands of digits"),
+        ({"workers": 0}, "workers = 0"),
+        ({"protocol": None}, "protocol = None"),
+        ({"sources": None}, "None is no graph"),
+    ],
+)
+def test_settings_are_refused_with_and_without_a_table(more: dict[str, Any], says: str):
+    for output in (None, "t.csv"):
+        with pytest.raises(ParameterError, match=says):
+            certify_many(**{"sources": TRIANGLE, "protocol": PROTOCOL, "output": output} | more)
+    assert names() == ["spec.toml"]
+
+
+def test_numpy_integers_are_integers():
+    assert facts(quickly(TRIANGLE, seed=np.int64(3), workers=np.int32(1))) == facts(quickly(TRIANGLE, seed=3))
+
+
+def test_an_empty_name_of_a_table_is_refused():
+    with pytest.raises(ParameterError, match="names no file"):
+        quickly(TRIANGLE, output="")
 
 
 def test_nothing_is_said_after_a_scheduler_was_refused():
@@ -582,7 +734,32 @@ def test_a_complete_journal_only_wants_its_table_written(computed: list[str]):
 def test_a_damaged_journal_is_refused():
     journal = begin(3)
     lines = journal.read_bytes().splitlines(keepends=True)
-    for damage in (b"\x00\xff\n", b"{}\n", b'{"number": 99, "file": "", "row": {}}\n', b"[1]\n"):
+    good = json.loads(lines[2])
+
+    def edited(**row: Any) -> bytes:
+        return json.dumps(good | {"row": good["row"] | row}).encode() + b"\n"
+
+    for damage in (
+        b"\x00\xff\n",
+        b"{}\n",
+        b'{"number": 99, "file": "", "row": {}}\n',
+        b"[1]\n",
+        b"[" * 10**5 + b"\n",
+        json.dumps(good | {"number": True}).encode() + b"\n",
+        json.dumps(good | {"number": 1.0}).encode() + b"\n",
+        json.dumps(good | {"row": list(COLUMNS)}).encode() + b"\n",
+        edited(graph=None),
+        edited(graph="\ud800"),
+        edited(nodes=True),
+        edited(nodes=3.0),
+        edited(nodes=10**30),
+        edited(rate="much"),
+        edited(rate=math.nan),
+        edited(rate=math.inf),
+        edited(rate=0.125).replace(b"0.125", b"1e999"),
+        edited(nodes=77).replace(b"77", b"7" * 5000),
+        edited(verdict=["certified"]),
+    ):
         journal.write_bytes(b"".join([*lines[:2], damage, *lines[2:]]))
         with pytest.raises(ParameterError, match="line 3: is no row"):
             quickly("spec.toml", output="t.csv")
@@ -646,6 +823,21 @@ def test_a_table_is_replaced_only_if_asked(computed: list[str]):
     computed.clear()
     quickly("spec.toml", output="t.csv", seed=1)
     assert len(computed) == 3 and Path("t.csv").read_bytes() != before
+
+
+def test_a_table_that_another_batch_finished_meanwhile_is_kept(monkeypatch: pytest.MonkeyPatch):
+    """It appears, and its journal goes, after this batch looked for it and before it has a journal of its own."""
+    refuse = batch.refuse_table
+
+    def late(path: Path, *args: Any) -> None:
+        refuse(path, *args)
+        if not path.exists():
+            path.write_bytes(table_bytes([], ".csv"))
+
+    monkeypatch.setattr(batch, "refuse_table", late)
+    with pytest.raises(ParameterError, match="is there already, complete"):
+        quickly("spec.toml", output="t.csv")
+    assert Path("t.csv").read_bytes() == table_bytes([], ".csv") and not Path("t.csv.journal").exists()
 
 
 def test_a_pattern_leaves_out_the_table_itself():
@@ -726,3 +918,25 @@ def test_a_killed_batch_loses_nothing_and_does_nothing_twice(killed: Any, comput
     assert ptcc("batch", "many.toml", "fig1a", "-o", "whole.csv", *QUICK).code == 0
     assert read_csv("t.csv") == read_csv("whole.csv")
     assert not journal.exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups of POSIX")
+@pytest.mark.parametrize("delay", [0, 0.15, 0.6])
+def test_ctrl_c_while_processes_start_is_one_line(delay: float):
+    """A terminal sends it to every process of the group; the journal is there just before the processes."""
+    Path("many.toml").write_text(TINY.replace("8", "5000"))
+    command = [sys.executable, "-m", "ptcc_certify.cli", "batch", "many.toml", "-o", "t.csv", "--workers", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0)
+    try:
+        until = time.monotonic() + 60
+        while not Path("t.csv.journal").exists() and process.poll() is None and time.monotonic() < until:
+            time.sleep(0.005)
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        if process.poll() is None:
+            process.kill()
+    assert (process.returncode, out) == (130, "")
+    (line,) = err.splitlines()
+    assert line.startswith("ptcc: interrupted; ")

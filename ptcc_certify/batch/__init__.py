@@ -20,9 +20,10 @@ from typing import Any, Literal
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.journal import Journal, journal_path
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import Settings, Start
+from ptcc_certify.batch.settings import Settings, Start, whole_number
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.batch.table import refuse_table, table_bytes
+from ptcc_certify.ensembles import Ensemble
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.io import write_atomically, write_graph
 from ptcc_certify.protocols import Protocol
@@ -62,7 +63,9 @@ def certify_many(
     ----------
     sources : path, pattern, SignedDigraph, Ensemble, or a sequence of these
         A text is a file, a pattern such as ``"graphs/*.csv"`` (``**`` for folders within), the name of a packaged
-        graph, or an ensemble's ``.toml`` file. A file that is named twice has one row.
+        graph, or an ensemble's ``.toml`` file. A pattern skips folders and the table itself; a link to nowhere that
+        matches has an error. A file that is named several times, in whatever way or through links, has one row, under
+        the first of its names. Paths are read as they are written, and a leading ``./`` is left out of names.
     protocol : NominalProtocol or SlidingModeProtocol
     x0 : "random", str, sequence of numbers, mapping or None
         ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
@@ -112,9 +115,12 @@ def certify_many(
 
     Raises
     ------
+    FormatError
+        A file that is named is not there or is no regular file, a pattern matches none, or a ``.toml`` file cannot be
+        read.
     ParameterError
         No graph, a setting outside its domain, a table that is there already, a journal of other settings or of a
-        batch that still runs, or a missing package.
+        batch that still runs, a missing package, or a cluster that answers no longer or has no workers.
 
     Examples
     --------
@@ -139,9 +145,10 @@ def certify_many(
         drop_self_loops=drop_self_loops,
         undirected=undirected,
     )
-    if not isinstance(workers, int) or workers < 1:
-        raise ParameterError(f"workers = {workers} is outside its domain; it must be 1 or more")
+    workers = whole_number(workers, "workers", 1)
     path = None if output is None else Path(output)
+    if path is not None and not path.name:
+        raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
     chosen = chosen_sources(sources, () if path is None else (path, journal_path(path)))
 
     def complete(rows: dict[int, Row], keep: Callable[[int, str | None, Row], None]) -> list[Row]:
@@ -164,24 +171,28 @@ def certify_many(
     # A table that is being replaced has a journal.
     refuse_table(path, chosen, restart or journal_path(path).exists())
     with closing(Journal(journal_path(path), chosen, settings, restart)) as journal:
+        if journal.new:  # another batch may have written the table, and removed its journal, since it was looked for
+            refuse_table(path, chosen, restart)
         rows = complete(journal.current(), journal.append)
         write_atomically(path, table_bytes(rows, path.suffix.lower()))
         journal.remove()
     return rows
 
 
-def write_graphs(sources: Any, folder: str | os.PathLike[str]) -> int:
+def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool = False) -> int:
     """Write the graphs of ensembles as CSV files ``<spec>-<i>.csv`` into a folder, which is made, and return how many.
 
     Parameters
     ----------
     sources : path of a ``.toml`` file, Ensemble, or a sequence of these
     folder : path
+    restart : bool
+        Replace files that are there already.
 
     Raises
     ------
     ParameterError
-        A source is no ensemble, or the folder cannot be made.
+        A source is no ensemble, two graphs would be one file, a file is there already, or the folder cannot be made.
 
     Examples
     --------
@@ -195,13 +206,24 @@ def write_graphs(sources: Any, folder: str | os.PathLike[str]) -> int:
     for source in chosen:
         if not isinstance(source.origin, tuple):
             raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ParameterError(f"{shorten(os.fspath(folder), 200)}: cannot make this folder ({error.strerror})") from None
+    if not os.fspath(folder):
+        raise ParameterError("the name of the folder is empty; name a folder")
+    targets: dict[Path, tuple[Ensemble, int]] = {}
     for source in chosen:
         assert isinstance(source.origin, tuple)
         ensemble, i = source.origin
         stem, digits = Path(source.name.rpartition("#")[0]).stem, len(str(len(ensemble) - 1))
-        write_graph(ensemble.graph(i), Path(folder, f"{stem}-{i:0{digits}d}.csv"))
-    return len(chosen)
+        target = Path(folder, f"{stem}-{i:0{digits}d}.csv")
+        name = shorten(os.fspath(target), 200)
+        if target in targets:
+            raise ParameterError(f"{name}: would be two graphs; write ensembles of one name into folders of their own")
+        if not restart and os.path.lexists(target):
+            raise ParameterError(f"{name}: is there already; name another folder, or replace it with --restart")
+        targets[target] = ensemble, i
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ParameterError(f"{shorten(os.fspath(folder), 200)}: cannot make this folder ({error.strerror})") from None
+    for target, (ensemble, i) in targets.items():
+        write_graph(ensemble.graph(i), target)
+    return len(targets)

@@ -11,9 +11,10 @@ import os
 import signal
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from contextlib import contextmanager
 from typing import Any
 
 from ptcc_certify.batch.rows import Row, certified_row, failed_row, package_version
@@ -28,7 +29,7 @@ ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_
 IDLE = 20
 #: Graphs under way for each worker: while one is computed the next is there.
 AHEAD = 2
-#: Seconds to find a scheduler, and a worker of it.
+#: Seconds to find a scheduler, and to wait for a worker of it when there is none.
 PATIENCE = 20
 
 
@@ -65,42 +66,62 @@ def default_workers() -> int:
 def _on_processes(tasks: Iterator[Task], settings: Settings, workers: int) -> Generator[tuple[Task, Row]]:
     """Compute rows in processes of this machine.
 
-    A process that dies breaks the pool and all that is under way. Those graphs are tried again one at a time, so that
-    the one to blame is found, and the others lose nothing.
+    A process that dies breaks the pool and all that is under way. Those graphs are tried again one at a time in a pool
+    of one process, where nothing else can have died. Chance may kill one there too: only a graph whose process dies
+    twice is to blame.
     """
     try:
+        from multiprocessing import resource_tracker
+
         from joblib.externals.loky import ProcessPoolExecutor
+        from joblib.externals.loky.backend import resource_tracker as loky_tracker
     except ImportError:
         raise ParameterError(f"several workers need joblib; {INSTALL}, or say --workers 1") from None
 
-    def start() -> Any:
-        return ProcessPoolExecutor(workers, timeout=IDLE, initializer=_attend, initargs=(os.getpid(),), env=ONE_THREAD)
+    def start(size: int) -> Any:
+        with _uninterrupted():
+            if os.name == "posix":  # the trackers unblock the signal when they start: they do so before the processes
+                resource_tracker.ensure_running()
+                loky_tracker.ensure_running()
+            return ProcessPoolExecutor(size, timeout=IDLE, initializer=_attend, initargs=(os.getpid(),), env=ONE_THREAD)
 
-    pool = start()
+    def stop() -> None:
+        if pool is not None:
+            pool.shutdown(kill_workers=True)
+
+    pool: Any = None
+    size = 0
     under_way: dict[Future[Row], Task] = {}
     suspects: deque[Task] = deque()
+    deaths: Counter[int] = Counter()
     try:
         while True:
-            broken, room = False, 1 if suspects else AHEAD * workers
+            if not under_way and size != (wanted := 1 if suspects else workers):
+                stop()
+                pool, size = start(wanted), wanted
+            broken, room = False, AHEAD * workers if size == workers else 1
             while len(under_way) < room and not broken:
-                task = suspects.popleft() if suspects else next(tasks, None)
+                own = tasks if size == workers else iter(())
+                task = suspects.popleft() if suspects else next(own, None)
                 if task is None:
                     break
                 try:
-                    under_way[pool.submit(certified_row, task.name, task.payload, settings)] = task
+                    with _uninterrupted():  # processes start with the first graph
+                        future = pool.submit(certified_row, task.name, task.payload, settings)
+                    under_way[future] = task
                 except BrokenExecutor:  # by a graph that is under way, or by one whose row was just taken
                     suspects.append(task)
                     broken = True
             if not under_way and not broken:
                 return
-            alone = len(under_way) == 1 and not broken
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                 task = under_way.pop(future)
                 try:
                     row = future.result()
                 except BrokenExecutor:
                     broken = True
-                    if not alone:
+                    deaths[task.number] += size == 1
+                    if deaths[task.number] < 2:
                         suspects.append(task)
                         continue
                     row = failed_row(task.name, "the process that worked on it died, perhaps for lack of memory")
@@ -108,10 +129,32 @@ def _on_processes(tasks: Iterator[Task], settings: Settings, workers: int) -> Ge
             if broken:
                 suspects.extend(under_way.values())
                 under_way.clear()
-                pool.shutdown(kill_workers=True)
-                pool = start()
+                size = 0  # asks for a new pool
     finally:
-        pool.shutdown(kill_workers=True)
+        stop()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Keep Ctrl-C back while processes start, and raise KeyboardInterrupt afterwards.
+
+    A process that starts inherits the signals that are blocked, and cannot be interrupted before it knows what to do.
+    """
+    if threading.current_thread() is not threading.main_thread():  # which alone is interrupted
+        yield
+        return
+    interrupted = []
+    # Another thread may get the signal, which is blocked in this one only: what Python does about it is done here.
+    before = signal.signal(signal.SIGINT, lambda *_: interrupted.append(True))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if os.name == "posix" else None
+    try:
+        yield
+    finally:
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        if interrupted:
+            raise KeyboardInterrupt
 
 
 def _attend(parent: int) -> None:
@@ -149,25 +192,55 @@ def _on_dask(tasks: Iterator[Task], settings: Settings, scheduler: str) -> Gener
         room, asked = 0, -math.inf
         while True:
             if time.monotonic() > asked + 1:  # workers come and go
-                room, asked = AHEAD * max(sum(client.nthreads().values()), 1), time.monotonic()
+                room, asked = AHEAD * max(_threads(client, where), 1), time.monotonic()
             while len(under_way) < room and (task := next(tasks, None)) is not None:
                 future = client.submit(certified_row, task.name, task.payload, settings, pure=False)
                 under_way[future] = task
                 done.add(future)
             if not under_way:
                 return
+            _wait_for_row(client, done, where)
             future = next(done)
             task = under_way.pop(future)
             try:
                 row = future.result()
             except CancelledError:
-                raise ParameterError(f"{where}: the scheduler was lost; start it again, and the same command") from None
+                raise _lost(where) from None
             except Exception as error:
                 row = failed_row(
                     task.name, f"the worker failed ({type(error).__name__}: {shorten(one_line(str(error)), 200)})"
                 )
             del future  # frees the row on the worker
             yield task, row
+
+
+def _threads(client: Any, where: str) -> int:
+    """Return how many threads the workers of a cluster have."""
+    try:
+        return sum(client.nthreads().values())
+    except OSError:
+        raise _lost(where) from None
+
+
+def _lost(where: str) -> ParameterError:
+    return ParameterError(f"{where}: the scheduler was lost; start it again, and the same command")
+
+
+def _wait_for_row(client: Any, done: Any, where: str) -> None:
+    """Wait until a row is there; refuse to wait for workers that are gone and do not come back."""
+    alive = asked = time.monotonic()
+    while not done.has_ready():
+        time.sleep(0.01)
+        if (now := time.monotonic()) < asked + 1:
+            continue
+        asked = now
+        if _threads(client, where):
+            alive = now
+        elif now > alive + PATIENCE:
+            raise ParameterError(
+                f"{where}: this scheduler has lost all its workers; start some: dask worker {where}, and then the same "
+                "command"
+            )
 
 
 def _refuse_workers(client: Any, where: str) -> None:

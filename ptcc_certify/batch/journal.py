@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NoReturn
 
 from ptcc_certify.batch.rows import COLUMNS, Row, package_version
 from ptcc_certify.batch.settings import Settings
@@ -19,6 +20,8 @@ from ptcc_certify.rationals import shorten
 
 #: What the first line of a journal begins with.
 SCHEMA = "ptcc-batch/1"
+#: No integer of a table is that large.
+LARGEST_INTEGER = 2**63 - 1
 
 
 def journal_path(path: Path) -> Path:
@@ -31,6 +34,8 @@ class Journal:
 
     A batch that is killed leaves whole lines and perhaps part of one, which is dropped. One that was refused before its
     first row leaves nothing.
+
+    ``new`` tells whether there was none before.
     """
 
     def __init__(self, path: Path, chosen: Sequence[Source], settings: Settings, restart: bool):
@@ -47,8 +52,9 @@ class Journal:
 
     def _read(self, header: dict[str, Any], restart: bool) -> None:
         data = self._file.read()
+        self.new = not data
         whole = data.rfind(b"\n") + 1
-        lines = data[:whole].splitlines()
+        lines = data[:whole].split(b"\n")[:-1]
         mark = json.dumps({"schema": SCHEMA}).encode()[:-1]  # how the first line begins, of which a part may be missing
         if data[: len(mark)] != mark[: len(data)]:
             raise ParameterError(f"{self.name}: is no journal of ptcc batch; name another -o")
@@ -61,19 +67,14 @@ class Journal:
         self._refuse_other(self._object(1, lines[0]), header)
         for number, line in enumerate(lines[1:], start=2):
             entry = self._object(number, line)
-            try:
-                place, fingerprint, row = entry["number"], entry["file"], entry["row"]
-                intact = 0 <= place < header["graphs"] and list(row) == list(COLUMNS)
-            except (KeyError, TypeError):
-                intact = False
-            if not intact:
+            if not _intact(entry, header["graphs"]):
                 raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
-            self._rows[place] = fingerprint, row
+            self._rows[entry["number"]] = entry["file"], entry["row"]
 
     def _object(self, number: int, line: bytes) -> dict[str, Any]:
         try:
-            entry = json.loads(line)
-        except ValueError:
+            entry = json.loads(line, parse_constant=_refuse_constant)
+        except (ValueError, RecursionError):
             entry = None
         if isinstance(entry, dict):
             return entry
@@ -114,6 +115,36 @@ class Journal:
         self._file.close()
 
 
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a finite number")
+
+
+def _intact(entry: dict[str, Any], graphs: int) -> bool:
+    """Tell whether an entry is one that a batch wrote: somebody may have edited it."""
+    place, fingerprint, row = entry.get("number"), entry.get("file"), entry.get("row")
+    return (
+        set(entry) == {"number", "file", "row"}
+        and type(place) is int
+        and 0 <= place < graphs
+        and (fingerprint is None or type(fingerprint) is str)
+        and type(row) is dict
+        and list(row) == list(COLUMNS)
+        and type(row["graph"]) is str
+        and all(value is None or _fits(value, COLUMNS[name]) for name, value in row.items())
+    )
+
+
+def _fits(value: Any, kind: type) -> bool:
+    """Tell whether an entry can stand in a column."""
+    if type(value) is not kind:  # a truth value is no integer
+        return False
+    if isinstance(value, str):
+        return not any("\ud800" <= c <= "\udfff" for c in value)
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, int) and abs(value) <= LARGEST_INTEGER
+
+
 def _header(chosen: Sequence[Source], settings: Settings) -> dict[str, Any]:
     """Return what the first line of a journal holds: everything that the rows depend on."""
     digest = hashlib.sha256()
@@ -134,6 +165,8 @@ def _opened_alone(path: Path, name: str) -> IO[bytes]:
     """Open a file to be read and continued, and lock it; the lock ends with the process, however that ends."""
     for _ in range(10):
         try:
+            if path.exists() and not path.is_file():
+                raise ParameterError(f"{name}: is no regular file; remove what is there, or name another -o")
             file = path.open("r+b") if path.exists() else path.open("x+b")
         except (FileExistsError, FileNotFoundError):
             continue  # another process was faster

@@ -3,7 +3,7 @@
 The columns, in this order; an entry that does not apply, or was not proved, is empty:
 
 ==================  =====  ============================================================================================
-graph               text   path, or ``spec.toml#i`` for graph ``i`` of an ensemble
+graph               text   path, or ``spec.toml#i`` for graph ``i`` of an ensemble; control characters as escape codes
 sha256              text   of the canonical edge list (:attr:`SignedDigraph.sha256`)
 nodes               int
 edges               int
@@ -118,7 +118,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
     """
     began = time.perf_counter()
     row: Row = dict.fromkeys(COLUMNS)
-    row["graph"] = _unicode(name)
+    row["graph"] = _printable(name)
     try:
         with _ONE_AT_A_TIME:
             graph = _graph(name, payload, settings)
@@ -134,7 +134,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
 
 def failed_row(name: str, why: str) -> Row:
     """Return the row of a graph of which nothing is known but why."""
-    return dict.fromkeys(COLUMNS) | {"graph": _unicode(name), "seconds": 0.0, "error": why}
+    return dict.fromkeys(COLUMNS) | {"graph": _printable(name), "seconds": 0.0, "error": why}
 
 
 def package_version() -> str:
@@ -156,7 +156,7 @@ def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
         ensemble, i = payload
         return ensemble.graph(i)
     file = io.BytesIO(payload)
-    file.name = name  # its ending tells the format
+    file.name = name if name != "-" else "./-"  # its ending tells the format, and - is not standard input here
     return read_graph(
         file,
         orientation=settings.orientation,
@@ -261,6 +261,6 @@ def _finite(x: float) -> float | None:
     return float(x) if math.isfinite(x) else None
 
 
-def _unicode(name: str) -> str:
-    """Write what is no character in the name of a file as an escape code."""
-    return name.encode("utf-8", "backslashreplace").decode("utf-8")
+def _printable(name: str) -> str:
+    """Write as escape codes what is no character in the name of a file, or would break the line of a table."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import operator
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from ptcc_certify.structure import behaviour_name
 
 #: What a start may be given as.
 Start = str | Sequence[Any] | Mapping[Any, Any] | None
+#: Seeds and numbers of workers are at most this.
+LARGEST_SETTING = 2**64 - 1
 #: How to get the packages that several workers, Dask and Parquet need.
 INSTALL = 'install it with: pip install "ptcc-certify[batch]"'
 
@@ -43,17 +46,22 @@ class Settings:
     undirected: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.protocol, Protocol):
+            raise ParameterError(f"protocol = {shorten(repr(self.protocol))} is none; give a NominalProtocol, say")
         if not self.protocol.prescribed:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         if self.method not in METHODS:
             raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
-        if not isinstance(self.seed, int) or self.seed < 0:
-            raise ParameterError(f"seed = {self.seed} is outside its domain; it must be a natural number")
+        object.__setattr__(self, "seed", whole_number(self.seed, "seed", 0))
         sliding = isinstance(self.protocol, SlidingModeProtocol)
         for name in ("x0", "sigma0"):
             start = getattr(self, name)
             if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
                 raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
+            try:
+                _plain(start)  # refuses what is no number, before the work
+            except NumberError as error:
+                raise ParameterError(f"{name}: {error}") from None
         for name in ("sigma0", "disturbance"):
             if getattr(self, name) is not None and not sliding:
                 raise ParameterError(
@@ -92,6 +100,25 @@ class Settings:
         return as_disturbance(text, n, delta, 2 * float(self.protocol.T), seed)
 
 
+def whole_number(value: Any, name: str, least: int) -> int:
+    """Return a setting that is an integer, NumPy's included, of at least ``least``; refuse anything else."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= LARGEST_SETTING:
+        domain = f"an integer from {least} to {LARGEST_SETTING}"
+        raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
+    return number
+
+
+def _text(value: Any) -> str:
+    try:
+        return shorten(str(value))
+    except ValueError:  # Python writes no integer of more than 4,300 digits
+        return "a number of thousands of digits"
+
+
 def _plain(value: Any) -> Any:
     """Return a setting as JSON takes it."""
     if isinstance(value, Protocol):
@@ -100,6 +127,8 @@ def _plain(value: Any) -> Any:
         return format_exact(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(x) for key, x in value.items()}
+    if isinstance(value, int):
+        format_exact(Fraction(value))  # refuses one that is too long to be written
     if isinstance(value, str | int | None):
         return value
     if hasattr(value, "__len__"):

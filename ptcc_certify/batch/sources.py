@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path
@@ -32,15 +33,23 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself."""
+    """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
+
+    Sources of one ``key`` are one graph; their names may differ, and those of different graphs may be equal.
+    """
 
     name: str
     origin: Origin
+    key: Hashable
 
     def load(self) -> tuple[Any, str]:
         """Return what a worker makes the graph of, and its fingerprint."""
         if isinstance(self.origin, str):
-            data = read_bytes(self.origin, shorten(self.name, 200))
+            name, path = shorten(self.name, 200), Path(self.origin)
+            # Whoever opens a pipe may wait for ever; a path that is missing is told by read_bytes.
+            if os.path.exists(path) and not os.path.isfile(path):  # noqa: PTH110, PTH113 - those of Path may raise
+                raise FormatError(f"{name}: is no regular file; save the graph as one")
+            data = read_bytes(path, name)  # a Path: the file "-" is not standard input
             return data, hashlib.sha256(data).hexdigest()
         if isinstance(self.origin, SignedDigraph):
             return self.origin, self.origin.sha256
@@ -66,21 +75,24 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
     if isinstance(sources, str | os.PathLike | SignedDigraph | Ensemble):
         sources = [sources]
-    found: dict[str, Source] = {}
+    if not isinstance(sources, Iterable):
+        raise ParameterError(f"{shorten(repr(sources))} is no graph; give paths, SignedDigraphs or Ensembles")
+    found: dict[Hashable, Source] = {}
     given = ensembles = 0
     for source in sources:
         if isinstance(source, SignedDigraph):
-            own_sources = [Source(f"graph#{given}", source)]
+            own_sources = [Source(f"graph#{given}", source, ("graph", given))]
             given += 1
         elif isinstance(source, Ensemble):
             ensembles += 1
-            own_sources = _members("ensemble" if ensembles == 1 else f"ensemble{ensembles}", source)
+            name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
+            own_sources = _members(name, source, ("ensemble", ensembles))
         elif isinstance(source, str | os.PathLike):
             own_sources = _named(os.fspath(source), own)
         else:
             raise ParameterError(f"{shorten(repr(source))} is no graph; give paths, SignedDigraphs or Ensembles")
         for one in own_sources:
-            found.setdefault(one.name, one)
+            found.setdefault(one.key, one)
     if not found:
         raise ParameterError("there are no graphs; name files or patterns")
     return list(found.values())
@@ -94,25 +106,32 @@ def _named(text: str, own: Sequence[Path]) -> list[Source]:
     except (OSError, ValueError):  # a name that no file can have
         exists = folder = False
     if exists and not folder:
+        if not path.is_file():
+            raise FormatError(f"{name}: is no regular file; save the graph as one")
         return _file(text)
     if text in GRAPHS:
-        return [Source(text, str(graph_path(text)))]
+        packaged = str(graph_path(text))
+        return [Source(text, packaged, ("file", os.path.realpath(packaged)))]
     if folder:
         raise ParameterError(f"{name}: is a folder; write a pattern such as {Path(name, '*.csv')}")
     if not has_magic(text):
         raise FormatError(f"{name}: no such file; check the path")
     mine = {os.path.realpath(one) for one in own}
     matches = sorted(glob(text, recursive=True))  # noqa: PTH207 - Path.glob takes no absolute patterns
-    files = [one for one in matches if Path(one).is_file() and os.path.realpath(one) not in mine]
+    # Links to nowhere stay: each is a row that tells so.
+    files = [one for one in matches if not os.path.isdir(one) and os.path.realpath(one) not in mine]  # noqa: PTH112
     if not files:
         raise FormatError(f"{name}: no file matches this pattern; check it, and quote it for the shell")
     return [source for one in files for source in _file(one)]
 
 
 def _file(text: str) -> list[Source]:
-    path = os.path.normpath(text)
-    return _members(path, Ensemble.read(path)) if path.lower().endswith(".toml") else [Source(path, path)]
+    """Return what a file, or a link to nowhere, stands for; of ``link/..`` the system knows best what it means."""
+    name, key = re.sub(r"^(?:\./+)+", "", text), ("file", os.path.realpath(text))
+    if name.lower().endswith(".toml") and os.path.isfile(text):  # noqa: PTH113 - Path.is_file may raise
+        return _members(name, Ensemble.read(text), key)
+    return [Source(name, text, key)]
 
 
-def _members(name: str, ensemble: Ensemble) -> list[Source]:
-    return [Source(f"{name}#{i}", (ensemble, i)) for i in range(len(ensemble))]
+def _members(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
+    return [Source(f"{name}#{i}", (ensemble, i), (key, i)) for i in range(len(ensemble))]

@@ -22,6 +22,9 @@ TABLES = (".csv", ".parquet")
 def table_bytes(rows: Sequence[Row], suffix: str) -> bytes:
     """Return a table as CSV or Parquet; an empty entry is an empty field, or null.
 
+    Texts are written as they are: a spreadsheet takes one that begins with ``=`` for a formula, unless it is told to
+    import texts.
+
     Parameters
     ----------
     rows : sequence of dict
@@ -82,12 +85,14 @@ def refuse_table(path: Path, chosen: Sequence[Source], replace: bool) -> None:
         raise ParameterError(f"{name}: the folder does not exist; make it first")
     if path.is_dir():
         raise ParameterError(f"{name}: is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise ParameterError(f"{name}: is no regular file; name another file")
     if any(isinstance(s.origin, str) and os.path.realpath(s.origin) == os.path.realpath(path) for s in chosen):
         raise ParameterError(f"{name}: is one of the graphs; name another file")
     if path.exists() and not _is_table(path):
         raise ParameterError(f"{name}: is there already, and no table of ptcc batch; name another file")
     if path.exists() and not replace:
-        raise ParameterError(f"{name}: is there already; name another file, or replace it with --restart")
+        raise ParameterError(f"{name}: is there already, complete; name another file, or replace it with --restart")
 
 
 def _is_table(path: Path) -> bool:
