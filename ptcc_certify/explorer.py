@@ -510,8 +510,7 @@ def _figure(certificate: Certificate) -> Figure:
     draw += [_draw_decay] if certificate.envelope.members else []
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
-        figure = Figure((width * len(draw), height), dpi=_DPI)
-        figure.set_layout_engine("none")
+        figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
         # Fixed margins in inches, for labels, and for three lines of a legend: finding them takes half the drawing.
         left, right, bottom, top, gap = 0.65, 0.25, 0.42, 0.55, 0.75
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)

@@ -6,6 +6,7 @@ import html
 import sys
 import time
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -365,3 +366,18 @@ def test_responses_are_told(explorer: Explorer, capsys: pytest.CaptureFixture[st
         assert 0 < image <= verdict
     with capsys.disabled():
         print("", *told, sep="\n  ")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("settings", [Settings("fig5a"), Settings("fig5a", kind="sliding-mode", seed=2)])
+def test_no_text_of_the_figure_is_clipped_or_on_another_panel(explorer: Explorer, settings: Settings):
+    view = explorer.view(settings)
+    assert view.png.startswith(b"\x89PNG")
+    figure = view.figure
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    width, height = figure.get_size_inches() * figure.dpi
+    panels = [ax.get_tightbbox(renderer) for ax in figure.axes]
+    for box in panels:
+        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= width + 1 and box.y1 <= height + 1
+    for before, after in pairwise(panels):
+        assert before.x1 <= after.x0 + 1
