@@ -335,6 +335,23 @@ class Envelope:
         """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,)."""
         return self.bound(np.array([float(self.gain.clock_at_remaining(q)) for q in remaining]), x0)
 
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Sequence[Any]) -> np.ndarray:
+        """Bound of ``|x_k - outcome_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+        x0 : (N,) array
+
+        Returns
+        -------
+        (N, M) or (N,) array
+            Infinite where nothing was proved.
+        """
+        clocks = np.array([float(self.gain.clock_at_remaining(q)) for q in np.atleast_1d(remaining)])
+        bounds = self.distance(clocks, x0)
+        return bounds if np.ndim(remaining) else bounds[:, 0]
+
     def distance(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
 

@@ -400,18 +400,12 @@ class Certificate:
         ParameterError
             The certificate has no start.
         """
-        envelope, start = self.envelope, self._known_start()
-        if isinstance(envelope, SlidingEnvelope) and not envelope.direct:
-            return envelope.outcome_distance(np.asarray(remaining, dtype=float), start)
-        return envelope.distance(self._clocks(remaining), start)
+        return self.envelope.outcome_distance(remaining, self._known_start())
 
     def _known_start(self) -> tuple[Fraction, ...]:
         if self.start is None:
             raise ParameterError("the certificate has no start; give x0")
         return self.start
-
-    def _clocks(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        return np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
 
     def best_possible_residual(self, remaining: float) -> float | None:
         """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""

@@ -86,6 +86,16 @@ _limit_options = _options(
 _SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
 #: How many threads linear algebra uses, which NumPy reads when it is loaded.
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_method_option = click.option(
+    "--method",
+    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
+    default="best",
+    show_default=True,
+    help="Lyapunov functions searched beside the paper's.",
+)
+_starts_option = click.option(
+    "--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0."
+)
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
@@ -145,15 +155,9 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 @_protocol_options
 @click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock.")
-@click.option(
-    "--method",
-    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
-    default="best",
-    show_default=True,
-    help="Lyapunov functions searched beside the paper's.",
-)
+@_method_option
 @_limit_options
-@click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
+@_starts_option
 @click.option("--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.")
 @click.option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
 @click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
@@ -465,14 +469,8 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @_protocol_options
 @click.option("--expect", metavar="BEHAVIOUR", help="E.g. stability; exit code 3 if it does not follow for some graph.")
 @click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
-@click.option(
-    "--method",
-    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
-    default="best",
-    show_default=True,
-    help="Lyapunov functions searched beside the paper's.",
-)
-@click.option("--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0.")
+@_method_option
+@_starts_option
 @click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")

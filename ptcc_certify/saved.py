@@ -234,11 +234,7 @@ class SavedCertificate:
         ParameterError
             The certificate has no start.
         """
-        start = self._known_start()
-        if isinstance(self.envelope, SlidingEnvelope) and not self.direct:
-            return self.envelope.outcome_distance(np.asarray(remaining, dtype=float), start)
-        clocks = np.array([float(self.protocol.gain.clock_at_remaining(q)) for q in remaining])
-        return self.envelope.distance(clocks, start)
+        return self.envelope.outcome_distance(remaining, self._known_start())
 
     @property
     def disturbance(self) -> str | None:

@@ -282,7 +282,7 @@ class SlidingEnvelope(Envelope):
         size = sliding_bound(self.protocol, self.sigma0, z) / unit
         return bounds + size, norm + _column_norms(size)
 
-    def outcome_distance(self, remaining: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Sequence[Any]) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
 
         Parameters
@@ -294,6 +294,8 @@ class SlidingEnvelope(Envelope):
         -------
         (N, M) or (N,) array
         """
+        if self.direct:
+            return super().outcome_distance(remaining, x0)
         q = np.atleast_1d(np.asarray(remaining, dtype=float))
         unit = self._unit(np.array([float(x) for x in x0]))
         z, clock = self._instants(q)
