@@ -13,6 +13,8 @@ _EXPORTS = {
     "NoCertificate": "lmi.errors",
     "NotAnHMatrix": "lmi.errors",
     "NotAnMMatrix": "lmi.errors",
+    "OutOfTime": "lmi.errors",
+    "time_limit": "lmi.deadline",
     "DiagonalCertificate": "lmi.certificate",
     "diagonal_margin": "lmi.certificate",
     "diagonal_rate": "lmi.certificate",

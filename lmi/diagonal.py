@@ -19,6 +19,7 @@ import numpy as np
 from lmi.certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.coupling import couple_blocks
+from lmi.deadline import checkpoint, seconds_left
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact import no_diagonal_rate_above, round_to_bits
 from lmi.interior_point import maximise_margin
@@ -33,8 +34,12 @@ _RESOLVED = 100.0
 #: Up to this many rows Clarabel climbs to the best rate, about as fast; above, and on a subspace,
 #: :mod:`lmi.interior_point` does.
 CLARABEL_ROWS = 20
-#: Up to this many rows Clarabel finds the best margin, as the paper does; above, :mod:`lmi.interior_point`.
-CLARABEL_MARGIN_ROWS = 60
+#: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
+#: :mod:`lmi.interior_point`.
+CLARABEL_MARGIN_ROWS = 32
+#: Tolerance of a step, the relative gain that is worth another one, and how many steps there are at most, at a given
+#: condition of a larger matrix.
+_COARSE, _COARSE_GAIN, _COARSE_STEPS = 1e-6, 1e-4, 8
 #: Solvers of the margin that may be asked for by name.
 SOLVERS = ("clarabel", "interior-point", "sdpa")
 #: Share of the smallest block rate that is given up when blocks are coupled.
@@ -87,7 +92,7 @@ def diagonal_lyapunov(
     tolerance : float
         Relative gap asked of the solver.
     solver : {"clarabel", "interior-point", "sdpa"}, optional
-        Margin only; by default Clarabel up to 60 rows and :mod:`lmi.interior_point` above. SDPA needs the package
+        Margin only; by default Clarabel up to 32 rows and :mod:`lmi.interior_point` above. SDPA needs the package
         sdpa-python.
 
     Returns
@@ -237,7 +242,13 @@ def _climb(
     """
     frame, best = _start(A, basis, max_condition, known)
     current = frame
+    # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
+    coarse = max_condition is not None and len(A) > CLARABEL_ROWS
+    least = _COARSE_GAIN if coarse else 1e-7
+    if coarse:
+        tolerance, steps = max(tolerance, _COARSE), min(steps, _COARSE_STEPS)
     for _ in range(steps):
+        checkpoint()
         try:
             omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance)
             proposal = normalised(_positive(omega)) + frame
@@ -250,7 +261,7 @@ def _climb(
         if rate is None or not rate > best:
             break
         gained, current, best = rate - best, proposal, rate
-        if gained <= 1e-7 * abs(best):
+        if gained <= least * abs(best):
             break
     return frame, DiagonalCertificate(current, best)
 
@@ -751,6 +762,8 @@ def coupled_lyapunov(
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
     scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
     fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
+    if n_L + n_F > CLARABEL_MARGIN_ROWS:
+        return _coupled_large(leaders, A_FL / scale, A_F / scale, scale, fixed_top, tolerance)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
         s = cp.Variable() if fixed else cp.Constant(1.0)
@@ -792,6 +805,48 @@ def coupled_lyapunov(
             found.append(_positive(rest[used : used + k]) * unit)
             used += k
     return CoupledCertificate(tuple(found), _positive(Y) * unit if n_F else Y)
+
+
+def _coupled_large(
+    leaders: Sequence[FixedLeader | FreeLeader],
+    A_FL: np.ndarray,
+    A_F: np.ndarray,
+    scale: float,
+    top: float,
+    tolerance: float,
+) -> CoupledCertificate:
+    """Couple blocks by the interior-point method: free leader blocks at their own best margin, all scaled together.
+
+    The blocks are in units of ``scale``, fixed ones have ``top`` as their largest entry. A block of leaders is one
+    weight: ``Pi`` is ``W C + C'W`` with half its decrease on the diagonal of ``C``.
+    """
+    omegas, halves, groups = [], [], []
+    for k, block in enumerate(leaders, start=1):
+        if isinstance(block, FixedLeader):
+            omegas.append(block.omega / top)
+            halves.append(block.decrease / (2 * top * scale))
+        else:
+            found = diagonal_lyapunov(block.A, tolerance=tolerance)
+            omegas.append(found.omega)
+            halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
+        groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))
+    shared, n_L = np.unique(np.concatenate(groups), return_inverse=True)[1], sum(map(len, omegas))
+    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, len(A_F)))], [A_FL, A_F]])
+    own = np.concatenate([shared, shared.max() + 1 + np.arange(len(A_F))])
+    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
+    weights = _positive(solution.omega)
+    if not solution.t > _RESOLVED * tolerance:
+        return _block_by_block(leaders, A_F * scale, top, tolerance)
+    fixed = [i for i, group in enumerate(groups) if not group[0]]
+    starts = np.cumsum([0, *map(len, omegas)])
+    unit = top / weights[starts[fixed[0]]] if fixed else 1.0
+    return CoupledCertificate(
+        tuple(
+            block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
+            for block, omega, start in zip(leaders, omegas, starts, strict=False)
+        ),
+        weights[n_L:] * unit,
+    )
 
 
 def _block_by_block(
@@ -849,13 +904,20 @@ def _solve(
 
     import cvxpy as cp
 
+    checkpoint()
     built, expression = problem(cp)
     options: dict[str, Any] = {}  # SDPA stops where its own precision ends, whatever it is asked for
     if solver == "clarabel":
         options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
+        # The default merge of chordal cliques does not end on some sparse matrices. Small ones need no decomposition.
+        rows = max(c.shape[0] for c in built.constraints if len(c.shape) == 2)
+        options["chordal_decomposition_enable"] = rows > CLARABEL_MARGIN_ROWS
+        options["chordal_decomposition_merge_method"] = "parent_child"
+        options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
         _run(built, solver, options)
+    checkpoint()
     if expression.value is None or not np.isfinite(expression.value).all():
         raise NoCertificate(f"the solver answered {built.status}")
     value = np.atleast_1d(np.asarray(expression.value, dtype=np.float64))

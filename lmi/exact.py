@@ -20,15 +20,17 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Rational
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from lmi.deadline import checkpoint
 from lmi.errors import MatrixError
 
 Rows = Sequence[Sequence[Fraction]]
+IntegerRows = Sequence[Sequence[int]]
 #: Above this many rows a rounded Cholesky factor is tried before the elimination.
 RESIDUAL_ROWS = 20
 #: Above this many rows a looser rate by the residual test is preferred to the elimination.
@@ -188,6 +190,7 @@ def _eliminate(rows: list[list[int]]) -> DefinitenessProof:
     n = len(rows)
     previous = 1
     for k in range(n):
+        checkpoint()
         pivot = rows[k][k]
         if pivot <= 0:
             return DefinitenessProof(False, n, k)
@@ -517,16 +520,16 @@ def prove_margin(S: Rows, guess: float) -> Fraction | None:
     """
     if not guess > 0:
         return None
-    identity = [[Fraction(int(i == j)) for j in range(len(S))] for i in range(len(S))]
+    identity = [[int(i == j) for j in range(len(S))] for i in range(len(S))]
     return prove_generalized_margin(S, identity, guess)
 
 
-def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
+def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess: float) -> Fraction | None:
     """Find a rational ``b``, as near to ``guess`` as proves, with ``S - b Z`` positive definite.
 
     Parameters
     ----------
-    S, Z : n rows of n Fractions
+    S, Z : n rows of n Fractions or ints
         Symmetric.
     guess : float
         What floating point takes for the largest such ``b``; not 0.
@@ -548,19 +551,43 @@ def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
     """
     if not math.isfinite(guess) or guess == 0:
         return None
-    n = len(S)
+    n, both = len(S), cast("tuple[Rows, Rows]", (S, Z))
+    scale = math.lcm(*{x.denominator for M in both for row in M for x in row})
+    whole = [
+        [[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(M)] for M in both
+    ]
 
-    def lowered(b: Fraction) -> list[list[Fraction]]:
-        return [[S[i][j] - b * Z[i][j] for j in range(n)] for i in range(n)]
+    def lowered(b: Fraction) -> list[list[int]]:
+        """Return the lower triangle of ``scale q (S - b Z)``, ``b = p/q``."""
+        p, q = b.as_integer_ratio()
+        return [[q * x - p * z for x, z in zip(*rows, strict=True)] for rows in zip(*whole, strict=True)]
 
     candidates = [b for loss in LOSSES if (b := Fraction(guess - abs(guess) * loss)) * Fraction(guess) > 0]
     if n > RESIDUAL_ROWS:
         # Elimination takes seconds to minutes here: it comes last, after all that the residual test can give.
-        quick = candidates if n > ELIMINATION_ROWS else candidates[:4]
-        for b in quick:
-            if _residual_test(_scaled_lower_triangle(_rationals(lowered(b)))):
+        for b in candidates if n > ELIMINATION_ROWS else candidates[:4]:
+            checkpoint()
+            if _residual_test(lowered(b)):
                 return b
-    return next((b for b in candidates if prove_positive_definite(lowered(b))), None)
+    return next((b for b in candidates if _definite(lowered(b))), None)
+
+
+def _definite(rows: list[list[int]]) -> bool:
+    """Decide the definiteness of a lower triangle in integers."""
+    if len(rows) > RESIDUAL_ROWS and _residual_test(rows):
+        return True
+    return bool(_eliminate(_short(rows)))
+
+
+def _short(rows: list[list[int]]) -> list[list[int]]:
+    """Scale rows and columns alike by powers of two, so that entries of very different size get short."""
+    shift = [(abs(rows[i][i]).bit_length() - 1) // 2 for i in range(len(rows))]
+    top = max(shift, default=0)
+    scaled = [
+        [x << (2 * top - shift[i] - shift[j]) if x else 0 for j, x in enumerate(row)] for i, row in enumerate(rows)
+    ]
+    common = math.gcd(*(x for row in scaled for x in row)) or 1
+    return [[x // common for x in row] for row in scaled]
 
 
 #: Relative amounts by which a float eigenvalue is lowered, one after the other, until the proof succeeds.

@@ -18,7 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.errors import LMIError
+from lmi import deadline
+from lmi.deadline import share_of_time
+from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
@@ -58,6 +60,8 @@ STEPS = (
     "outcome",
     "independent check",
 )
+#: The shares of the time left that the first of them may take.
+SHARES = (0.3, 0.4, 0.8, 0.5)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
@@ -100,7 +104,6 @@ class Certificate:
     enclosed : EnclosedOutcome or None
         The same in proved intervals, where the graph is too large for rationals.
     trajectory : Trajectory or None
-    comparison : Comparison or None
     sharpening : Sharpening
         Sharper Lyapunov functions of the classes that ``method`` names, proved.
     limit : RateLimit or None
@@ -116,6 +119,10 @@ class Certificate:
         Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    time_limit : float
+        Seconds that the searches were given, infinity for no limit.
+    cut_off : tuple of str
+        The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
 
@@ -149,7 +156,6 @@ class Certificate:
     outcome: Outcome | None
     enclosed: EnclosedOutcome | None
     trajectory: Trajectory | None
-    comparison: Comparison | None
     sharpening: Sharpening
     limit: RateLimit | None
     method: str
@@ -158,6 +164,8 @@ class Certificate:
     limits: tuple[Limits, ...]
     delta: Fraction | None
     noise: Fraction | None
+    time_limit: float
+    cut_off: tuple[str, ...]
     notes: tuple[str, ...]
 
     @property
@@ -261,6 +269,13 @@ class Certificate:
             for m in self.sharpening.members
         ]
         return forms
+
+    @cached_property
+    def comparison(self) -> Comparison | None:
+        """The simulated run against the proved bounds; None without a run, or if nothing was proved."""
+        if self.trajectory is None or not (self.envelope.members or isinstance(self.envelope, SlidingEnvelope)):
+            return None
+        return self.envelope.compare(self.trajectory)
 
     @cached_property
     def effort(self) -> Effort | None:
@@ -467,6 +482,7 @@ def certify(
     limits: Sequence[Actuator | Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    time_limit: float | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -499,6 +515,9 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    time_limit : float, optional
+        Seconds of wall time that simulation and searches may take together, each its share of what is left; what is
+        proved by then stands, and ``cut_off`` names what was ended. By default 60, and 1 more for every 1,000 nodes.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -509,8 +528,8 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a start of the wrong length, beyond 1e300 or of thousands of digits, or a
-        disturbance that exceeds ``delta``.
+        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, beyond 1e300 or of
+        thousands of digits, or a disturbance that exceeds ``delta``.
 
     References
     ----------
@@ -552,8 +571,12 @@ ReachingTime(0, 1 before T_r)))
     judged = tuple(_limits(entry, protocol) for entry in limits)
     start = None if x0 is None else _start(structure, x0, "x0")
     manifold, reaching = _reaching(structure, protocol, sigma0)
-    trajectory = comparison = None
+    trajectory = None
     notes: list[str] = []
+    cut_off: list[str] = []
+    seconds = 60 + graph.n_nodes / 1000 if time_limit is None else time_limit
+    if not seconds > 0:
+        raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
     if simulation is None and graph.n_nodes > SIMULATED_NODES:
         notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
         simulation = False
@@ -562,24 +585,31 @@ ReachingTime(0, 1 before T_r)))
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
         source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
         source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
-    if begin is not None:
-        progress(STEPS[0])
-        more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
-        if sliding:
-            more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
-        try:
-            trajectory = simulate(graph, protocol, [float(x) for x in begin], **more)
-        except SimulationError as error:
-            notes.append(f"simulation: {error}")
-    progress(STEPS[1])
     theorem = theorem_for(structure, protocol.kind)
-    V, proof, numerical = _search_and_prove(structure, theorem, notes)
-    progress(STEPS[2])
-    sharpening = _sharpen(structure, protocol, method, instant, notes)
-    if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
-        notes.insert(0, _precision_note(graph))
-    progress(STEPS[3])
-    limit = prove_rate_limit(structure)
+    V, proof, numerical, limit, sharpening = None, RateProof(None, ()), None, None, Sharpening()
+    with deadline.time_limit(seconds):
+        if begin is not None:
+            progress(STEPS[0])
+            more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
+            if sliding:
+                more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
+            with share_of_time(SHARES[0], STEPS[0], cut_off):
+                try:
+                    trajectory = simulate(graph, protocol, [float(x) for x in begin], **more)
+                except SimulationError as error:
+                    notes.append(f"simulation: {error}")
+        progress(STEPS[1])
+        with share_of_time(SHARES[1], STEPS[1], cut_off):
+            V, proof, numerical = _search_and_prove(structure, theorem, notes)
+        progress(STEPS[2])
+        with share_of_time(SHARES[2], STEPS[2], cut_off):
+            sharpening = _sharpen(structure, protocol, method, instant, notes)
+            cut_off += sharpening.cut_off
+        if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
+            notes.insert(0, _precision_note(graph))
+        progress(STEPS[3])
+        with share_of_time(SHARES[3], STEPS[3], cut_off):
+            limit = prove_rate_limit(structure)
     progress(STEPS[4])
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
@@ -612,7 +642,6 @@ ReachingTime(0, 1 before T_r)))
         outcome=result,
         enclosed=enclosed,
         trajectory=trajectory,
-        comparison=comparison,
         sharpening=sharpening,
         limit=limit,
         method=method,
@@ -621,10 +650,10 @@ ReachingTime(0, 1 before T_r)))
         limits=judged,
         delta=spread,
         noise=blur,
+        time_limit=seconds,
+        cut_off=tuple(cut_off),
         notes=tuple(notes),
     )
-    if trajectory is not None and (certificate.envelope.members or sliding):
-        certificate = replace(certificate, comparison=certificate.envelope.compare(trajectory))
     progress(STEPS[5])
     report = certificate.checked
     if report is not None and not report.accepted:
@@ -710,6 +739,8 @@ def _search_and_prove(
         with np.errstate(all="ignore"):
             V = theorem.lyapunov(structure)
             numerical = theorem.rate(structure, V) if V.blocks else None
+    except OutOfTime:
+        raise
     except (LMIError, np.linalg.LinAlgError) as error:
         notes.append(f"no Lyapunov matrix was found: {error}")
         return None, nothing, None

@@ -96,6 +96,12 @@ _method_option = click.option(
 _starts_option = click.option(
     "--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0."
 )
+_time_limit_option = click.option(
+    "--time-limit",
+    type=float,
+    metavar="SECONDS",
+    help="For simulation and searches together.  [default: 60, and 1 more for every 1,000 nodes]",
+)
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
@@ -164,6 +170,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 @click.option(
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
 )
+@_time_limit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @_json_option
 def certify(
@@ -178,6 +185,7 @@ def certify(
     simulation: bool | None,
     initial_bound: str | None,
     max_input: str | None,
+    time_limit: float | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -211,6 +219,7 @@ def certify(
             at=instant,
             simulation=simulation,
             starts=bound,
+            time_limit=time_limit,
             progress=begin,
             **more,
         )

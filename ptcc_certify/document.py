@@ -472,6 +472,8 @@ def _unverified_section(certificate: Certificate) -> dict[str, Any]:
         else None,
         "final_state": floats,
         "simulation": simulation,
+        "time_limit": _finite(certificate.time_limit),
+        "cut_off": list(certificate.cut_off),
         "notes": list(certificate.notes),
     }
 

@@ -163,8 +163,6 @@ class View:
         certificate = self.certificate
         if certificate is None or certificate.trajectory is None:
             return self.refusal
-        if certificate.envelope.members:
-            certificate = replace(certificate, comparison=certificate.envelope.compare(certificate.trajectory))
         return "\n".join(_shown(certificate_lines(certificate, self.settings.graph)))
 
     @cached_property

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -21,7 +21,8 @@ import numpy as np
 
 import lmi
 import lmi.full
-from lmi.errors import LMIError
+from lmi.deadline import checkpoint, share_of_time
+from lmi.errors import LMIError, OutOfTime
 from lmi.exact import prove_generalized_margin
 from lmi.matrices import block_columns
 from ptcc_certify.dominance import DominantMember, dominant_members
@@ -50,13 +51,17 @@ _MATRIX_BITS = 60
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n)."""
+    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n).
+
+    No diagonal matrix has a larger rate than ``upper``.
+    """
 
     kind: str
     rate: float
     condition: float
     log_weights: np.ndarray | None = None
     matrix: np.ndarray | None = None
+    upper: float = math.inf
 
     def log_bound(self, clock: float) -> float:
         """Return the logarithm of the bound of ``||E|| / ||E(0)||`` at a value of the clock."""
@@ -116,12 +121,15 @@ class Sharpening:
         No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
     notes : tuple of str
         What failed.
+    cut_off : tuple of str
+        What the time limit ended.
     """
 
     members: tuple[SharpMember, ...] = ()
     tried: dict[str, float] = field(default_factory=dict)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
+    cut_off: tuple[str, ...] = ()
 
 
 def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Sharpening:
@@ -143,41 +151,51 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
     """
     if method == "paper" or not system.nodes:
         return Sharpening()
-    candidates: list[Candidate] = []
+    results: dict[str, list[Candidate]] = {}
     notes: list[str] = []
-    tried: dict[str, float] = {}
-    limit = None
+    cut_off: list[str] = []
     wanted = [*clocks] if at is None else [*clocks, at]
+    losses = lmi.full.LOSSES if at is None else _FINE_LOSSES
+    # The quickest search first; each takes a share of the time that is left, and leaves some for the proofs.
+    searches = {
+        "perron": (0.2, lambda: _perron_candidates(system)),
+        "full": (0.4, lambda: _full_candidates(system, losses)),
+        "lmi": (0.6, lambda: _lmi_candidates(system, method == "lmi" or at is not None)),
+    }
     with np.errstate(all="ignore"):
-        for kind in ("perron", "lmi", "full"):
+        for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue
-            try:
-                if kind == "lmi":
-                    found, limit = _lmi_candidates(system, method == "lmi" or at is not None)
-                elif kind == "full":
-                    found = _full_candidates(system, lmi.full.LOSSES if at is None else _FINE_LOSSES)
-                else:
-                    found = _perron_candidates(system)
-            except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
-                notes.append(f"class {kind}: {error}")
-                continue
-            if not found:
+            found = results[kind] = []
+            with share_of_time(share, f"class {kind}", cut_off):
+                try:
+                    for candidate in search():
+                        found.append(candidate)
+                except OutOfTime:
+                    raise
+                except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+                    notes.append(f"class {kind}: {error}")
+                    continue
+            if not found and f"class {kind}" not in cut_off:
                 notes.append(f"class {kind}: nothing was found in floating point")
-                continue
-            tried[kind] = max(c.rate for c in found)
-            kept = [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
-            if not any(c.rate > 0 for c in kept):
-                notes.append(f"class {kind}: the rate {tried[kind]:.4g} needs a prefactor above {_HOPELESS:.0e}")
-            candidates += kept
-        proved = []
-        for candidate in choose(candidates, wanted):
-            member = prove_member(system, candidate)
-            if member is None:
-                notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
-            else:
-                proved.append(member)
-    return Sharpening(tuple(_without_hair_splitting(proved)), tried, limit, tuple(notes))
+        every = [c for kind in METHODS for c in results.get(kind, ())]
+        tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
+        candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+        for kind, rate in tried.items():
+            if not any(c.rate > 0 for c in candidates if c.kind == kind):
+                notes.append(f"class {kind}: the rate {rate:.4g} needs a prefactor above {_HOPELESS:.0e}")
+        proved: list[SharpMember] = []
+        with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
+            for candidate in choose(candidates, wanted):
+                checkpoint()
+                member = prove_member(system, candidate)
+                if member is None:
+                    notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
+                else:
+                    proved.append(member)
+    limit = min((c.upper for c in every), default=math.inf)
+    members = tuple(_without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate)))
+    return Sharpening(members, tried, limit if math.isfinite(limit) else None, tuple(notes), tuple(cut_off))
 
 
 def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) -> Sharpening:
@@ -203,9 +221,11 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
         searches = {"lmi": largest} if method == "lmi" else {**searches, "lmi": largest}
     elif method == "lmi":
         notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
+    cut_off: list[str] = []
     for kind, search in searches.items():
+        found: Sequence[DominantMember] = ()
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
                 found = dominant_members(structure, search=search)
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
@@ -216,23 +236,24 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
             members[candidate] = SharpMember(kind, nodes, None, None, m.rate, low, high, float(m.rate), m)
         if found:
             tried[kind] = max(float(m.rate) for m in found)
-    return Sharpening(tuple(members[c] for c in choose(list(members), clocks)), tried, notes=tuple(notes))
+    chosen = sorted(choose(list(members), clocks), key=lambda c: c.rate)
+    return Sharpening(tuple(members[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
-    """Return the best candidate at each clock value, the fastest of a useful prefactor, and the fastest diagonal one.
+    """Return the fastest candidate of a useful prefactor, the best at each clock value, and the fastest diagonal one.
 
     Examples
     --------
     >>> slow, fast = Candidate("perron", 1.0, 1.0), Candidate("full", 2.0, 100.0)
     >>> [c.kind for c in choose([slow, fast], [1.0])]
-    ['perron', 'full']
+    ['full', 'perron']
     """
     if not candidates:
         return []
-    chosen = [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
-    chosen.append(_fastest(useful) if useful else min(candidates, key=lambda c: c.condition))
+    chosen = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
+    chosen += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
         chosen.append(_fastest(diagonal))
@@ -240,7 +261,7 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     for candidate in chosen:
         if not any(candidate is other for other in distinct):
             distinct.append(candidate)
-    return sorted(distinct, key=lambda c: c.rate)
+    return distinct
 
 
 def _fastest(candidates: Sequence[Candidate]) -> Candidate:
@@ -294,56 +315,54 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
 # ---------------------------------------------------------------------- classes
 
 
-def _perron_candidates(system: ErrorSystem) -> list[Candidate]:
-    """Perron vectors of every leader group and of the followers, coupled at several losses."""
+def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
+    """Yield Perron vectors of every leader group and of the followers, coupled at several losses."""
     A, basis = system.matrix, system.basis
     log_weights = np.zeros(len(A))
     for rows, component in zip(system.parts, system.leaders, strict=False):
         graph = system.structure.graph.subgraph(component.nodes)
         p = np.log(left_vector(graph))
         log_weights[rows] = p - p.max()
-    found: list[Candidate] = []
     followers = system.parts[-1] if len(system.parts) > len(system.leaders) else None
     for largest in (None, 1e6, 1e3, 30.0) if followers is not None else (None,):
+        checkpoint()
         if followers is not None:
             block = A[np.ix_(followers, followers)]
             try:
                 log_weights[followers] = lmi.h_matrix_certificate(block, max_condition=largest).log_omega
+            except OutOfTime:
+                raise
             except LMIError:
                 continue
-        found += _coupled("perron", A, system.parts, log_weights, basis)
-    return found
+        yield from _coupled("perron", A, system.parts, log_weights, basis)
 
 
-def _lmi_candidates(system: ErrorSystem, thorough: bool) -> tuple[list[Candidate], float]:
-    """Return the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
+def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
+    """Yield the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
     A, basis = system.matrix, system.basis
     best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
-    found = [_diagonal("lmi", best)]
-    for largest in (_HOPELESS / 1e3, LARGEST_PREFACTOR):
+    yield replace(_diagonal("lmi", best), upper=best.upper)
+    for largest in (LARGEST_PREFACTOR, _HOPELESS / 1e3):
         if best.log_condition > math.log(largest):
             with contextlib.suppress(lmi.NoCertificate):
                 near = lmi.diagonal_lyapunov(
                     A, objective="rate", max_condition=largest, basis=basis, start=best.log_omega
                 )
-                found.append(_diagonal("lmi", near))
+                yield _diagonal("lmi", near)
     if thorough:
-        found += [_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best)]
-    return found, best.upper
+        yield from (_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best))
 
 
-def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> list[Candidate]:
-    """Return full matrices on the error's subspace, continued beyond it."""
+def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[Candidate]:
+    """Yield full matrices on the error's subspace, continued beyond it."""
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
     reduced = A if U is None else U.T @ A @ U
-    found = []
     for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
         P = member.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
             P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)
-        found.append(Candidate("full", member.rate, member.condition, matrix=P))
-    return found
+        yield Candidate("full", member.rate, member.condition, matrix=P)
 
 
 def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:

@@ -87,6 +87,9 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     lines += _rate_lines(certificate)
     lines += _effort_lines(certificate)
     lines += _simulation_lines(certificate)
+    if certificate.cut_off:
+        named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
+        lines.append(_line("cut off", f"{named}; what was proved by then stands"))
     lines += [_line("note", note) for note in certificate.notes[:3]]
     lines.append(_line("verdict", certificate.verdict))
     return lines
