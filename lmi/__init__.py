@@ -25,6 +25,7 @@ _EXPORTS = {
     "is_z_matrix": "lmi.matrices",
     "m_matrix_witness": "lmi.matrices",
     "h_matrix_certificate": "lmi.closed_form",
+    "h_matrix_frontier": "lmi.closed_form",
     "h_matrix_diagonal": "lmi.closed_form",
     "m_matrix_certificate": "lmi.closed_form",
     "perron_certificate": "lmi.closed_form",

@@ -212,6 +212,8 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
     if len(A) == 1:
         rate = 2 * float(A[0, 0])
         return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
+    if len(A) == 2 and basis is None:
+        return _two_rows(A)
     frame, found = _climb(A, None, basis, tolerance)
     if not found.rate > 0:
         return found
@@ -226,6 +228,21 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
             if found.gap <= 1.5 * excess:
                 return found
     return found
+
+
+def _two_rows(A: np.ndarray) -> DiagonalCertificate:
+    """Return the optimum of an irreducible block of two rows: ``B = Omega^1/2 A Omega^-1/2`` with ``|B_12| = |B_21|``.
+
+    If both have one sign, ``B`` is symmetric and nothing beats its smallest eigenvalue; otherwise ``B + B'`` is
+    diagonal and nothing beats its smaller entry.
+    """
+    log_omega = np.array([math.log(abs(A[1, 0])) - math.log(abs(A[0, 1])), 0.0])
+    log_omega -= log_omega.max()
+    Y = np.eye(2)[:, [int(np.argmin(np.diag(A)))]]
+    if A[0, 1] * A[1, 0] > 0:
+        Y = np.exp(-log_omega / 2)[:, None] * np.linalg.eigh(scaled(A, log_omega))[1][:, :1]
+    rate = diagonal_rate(A, log_omega)
+    return DiagonalCertificate(log_omega, rate, max(diagonal_rate_limit(A, Y), rate), (Y,))
 
 
 def _climb(

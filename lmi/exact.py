@@ -214,7 +214,7 @@ def _rationals(S: Rows) -> list[list[Fraction]]:
     if any(len(row) != n for row in S):
         raise MatrixError("the matrix is not square")
     try:
-        rows = [[x if type(x) is Fraction else _rational(x) for x in row] for row in S]
+        rows = [[x if type(x) is Fraction or type(x) is int else _rational(x) for x in row] for row in S]
     except (TypeError, ValueError, OverflowError):
         raise MatrixError("the matrix has an entry that is not a finite real number") from None
     if any(rows[i][j] != rows[j][i] for i in range(n) for j in range(i)):
@@ -482,15 +482,28 @@ def _integer_rows(S: Rows) -> tuple[list[list[int]], list[int], int]:
 
     Scaling rows and columns alike keeps definiteness and keeps entries of very different size short.
     """
-    n = len(S)
-    shift = [0] * n
-    for i in range(n):
-        size = abs(S[i][i])
-        if size:
-            shift[i] = (size.denominator.bit_length() - size.numerator.bit_length()) // 2
-    scaled = [[S[i][j] * Fraction(2) ** (shift[i] + shift[j]) for j in range(i + 1)] for i in range(n)]
-    scale = math.lcm(*(value.denominator for row in scaled for value in row))
-    return [[value.numerator * (scale // value.denominator) for value in row] for row in scaled], shift, scale
+    scale = math.lcm(*{x.denominator for row in S for x in row})
+    whole = [[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(S)]
+    rows, shift, power = _equilibrated(whole)
+    return rows, shift, scale << power
+
+
+def _equilibrated(rows: list[list[int]]) -> tuple[list[list[int]], list[int], int]:
+    """Return the lower triangle of ``2^(power + shift_i + shift_j) S_ij`` in integers, ``shift`` and ``power``."""
+    shift = [-((abs(rows[i][i]).bit_length() - 1) // 2) for i in range(len(rows))]
+    places = [[shift[i] + other for other in shift[: i + 1]] for i in range(len(rows))]
+    zeros = (
+        place + (x & -x).bit_length() - 1
+        for xs, ps in zip(rows, places, strict=True)
+        for x, place in zip(xs, ps, strict=True)
+        if x
+    )
+    power = max(0, -min(zeros, default=0))
+    scaled = [
+        [x << place + power if place + power >= 0 else x >> -place - power for x, place in zip(xs, ps, strict=True)]
+        for xs, ps in zip(rows, places, strict=True)
+    ]
+    return scaled, shift, power
 
 
 def prove_margin(S: Rows, guess: float) -> Fraction | None:
@@ -553,9 +566,7 @@ def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess
         return None
     n, both = len(S), cast("tuple[Rows, Rows]", (S, Z))
     scale = math.lcm(*{x.denominator for M in both for row in M for x in row})
-    whole = [
-        [[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(M)] for M in both
-    ]
+    whole = [[[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(M)] for M in both]
 
     def lowered(b: Fraction) -> list[list[int]]:
         """Return the lower triangle of ``scale q (S - b Z)``, ``b = p/q``."""
@@ -576,18 +587,7 @@ def _definite(rows: list[list[int]]) -> bool:
     """Decide the definiteness of a lower triangle in integers."""
     if len(rows) > RESIDUAL_ROWS and _residual_test(rows):
         return True
-    return bool(_eliminate(_short(rows)))
-
-
-def _short(rows: list[list[int]]) -> list[list[int]]:
-    """Scale rows and columns alike by powers of two, so that entries of very different size get short."""
-    shift = [(abs(rows[i][i]).bit_length() - 1) // 2 for i in range(len(rows))]
-    top = max(shift, default=0)
-    scaled = [
-        [x << (2 * top - shift[i] - shift[j]) if x else 0 for j, x in enumerate(row)] for i, row in enumerate(rows)
-    ]
-    common = math.gcd(*(x for row in scaled for x in row)) or 1
-    return [[x // common for x in row] for row in scaled]
+    return bool(_eliminate(_equilibrated(rows)[0]))
 
 
 #: Relative amounts by which a float eigenvalue is lowered, one after the other, until the proof succeeds.

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isqrt
 from operator import mul
 from typing import Any
 
 from ptcc_certify.sparse_definite import dense_definite
+from ptcc_certify.spectral_line import characteristic
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the factor, one after the other, until the proof succeeds.
@@ -127,6 +128,16 @@ class Standard:
                     continue
         return None
 
+    def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
+        """Return ``det(x I - A)`` of a sparse integer matrix, the leading coefficient first.
+
+        Examples
+        --------
+        >>> Standard().characteristic([{0: 1, 1: 2}, {0: 3, 1: 4}])
+        [1, -5, -2]
+        """
+        return characteristic(rows)
+
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
         """Return the first ``k`` for which ``(d_k'x)^2 < c_k x'S x`` is not proved for all ``x``; None if all are.
 
@@ -177,6 +188,11 @@ class Flint(Standard):
             return super().definite(S)
         coefficients = self.flint.fmpz_mat([list(row) for row in S]).charpoly().coeffs()  # constant term first
         return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
+
+    def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
+        """Return the characteristic polynomial; see :meth:`Standard.characteristic`."""
+        dense = [[row.get(j, 0) for j in range(len(rows))] for row in rows]
+        return [int(c) for c in reversed(self.flint.fmpz_mat(dense).charpoly().coeffs())]
 
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
         """Return the first form that exceeds its bound, by exact solutions; see :meth:`Standard.bounded`."""

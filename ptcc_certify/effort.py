@@ -422,7 +422,7 @@ def _bounded(
     components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
     balanced = [sorted(c.nodes) for c in structure.closed_components if c.balanced]
     still_parts = {k for k, nodes in enumerate(components) if nodes in balanced}
-    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k)
+    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k, arithmetic().characteristic)
     return place in ("beyond", "on"), "spectrum"
 
 

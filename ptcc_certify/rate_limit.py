@@ -22,7 +22,7 @@ from ptcc_certify.error_system import rounded_matrix
 from ptcc_certify.lemmas import EXACT_NODES, component_blocks, single_followers
 from ptcc_certify.rationals import format_exact
 from ptcc_certify.structure import Structure
-from ptcc_certify.theorems.base import Matrix, multiply
+from ptcc_certify.theorems.base import Matrix, integer_matrix, integer_rows
 
 #: Relative amounts by which ``c`` lies above the smallest real part, one after the other, until the proof succeeds.
 _GAPS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1)
@@ -113,7 +113,6 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
 def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateLimit | None:
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
-    n = len(nodes)
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]
     floats = np.array([[float(x) for x in row] for row in B])
     try:
@@ -131,11 +130,10 @@ def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> R
     except (np.linalg.LinAlgError, ValueError, OverflowError, ZeroDivisionError):
         return None
     vectors = tuple(tuple(round_to_bits(float(x), _VECTOR_BITS) for x in column) for column in directions.T[:dimension])
-    HB = multiply(form, B)
-    if not prove_positive_definite([[HB[i][j] + HB[j][i] for j in range(n)] for i in range(n)]):
+    H, X = integer_matrix(form)[0], integer_matrix(vectors)[0]
+    HB = H * integer_matrix(B)[0]
+    if not prove_positive_definite(integer_rows(HB + HB.transpose())):
         return None
-    columns = [list(column) for column in zip(*vectors, strict=True)]
-    below = multiply([list(v) for v in vectors], multiply(form, columns))
-    if not prove_positive_definite([[-x for x in row] for row in below]):
+    if not prove_positive_definite(integer_rows(-(X * H * X.transpose()))):
         return None
     return RateLimit(2 * c, nodes, form, vectors)

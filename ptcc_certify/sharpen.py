@@ -323,18 +323,14 @@ def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
         graph = system.structure.graph.subgraph(component.nodes)
         p = np.log(left_vector(graph))
         log_weights[rows] = p - p.max()
-    followers = system.parts[-1] if len(system.parts) > len(system.leaders) else None
-    for largest in (None, 1e6, 1e3, 30.0) if followers is not None else (None,):
-        checkpoint()
-        if followers is not None:
-            block = A[np.ix_(followers, followers)]
-            try:
-                log_weights[followers] = lmi.h_matrix_certificate(block, max_condition=largest).log_omega
-            except OutOfTime:
-                raise
-            except LMIError:
-                continue
+    if len(system.parts) == len(system.leaders):
         yield from _coupled("perron", A, system.parts, log_weights, basis)
+        return
+    followers = system.parts[-1]
+    with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
+        for found in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
+            log_weights[followers] = found.log_omega
+            yield from _coupled("perron", A, system.parts, log_weights, basis)
 
 
 def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:

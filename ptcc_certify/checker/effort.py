@@ -131,7 +131,7 @@ class EffortCheck(LyapunovCheck):
                     seen[w] = True
         balanced = [group for group, gauge in zip(self.closed, self.gauges, strict=True) if gauge is not None]
         still = {k for k, nodes in enumerate(components) if nodes in balanced}
-        return nonzero_spectrum_beyond(rows, self.digraph.unit, components, still, line)
+        return nonzero_spectrum_beyond(rows, self.digraph.unit, components, still, line, self.exact.characteristic)
 
     # ------------------------------------------------------------------ starts and constants
 

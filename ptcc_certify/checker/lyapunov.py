@@ -66,8 +66,9 @@ class LyapunovCheck(OutcomeCheck):
 
     def _margin(self, S: Sequence[Sequence[Fraction]], m: Fraction) -> bool:
         """Tell whether ``S - m I > 0`` is proved."""
-        n = len(S)
-        return self.exact.definite(integers([[S[i][j] - m * (i == j) for j in range(n)] for i in range(n)])[0])
+        rows, scale = integers(S)
+        p, q = (m * scale).as_integer_ratio()
+        return self.exact.definite([[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(rows)])
 
     # ------------------------------------------------------------------ the paper's own certificate
 
