@@ -60,8 +60,9 @@ STEPS = (
     "outcome",
     "independent check",
 )
-#: The shares of the time left that the first of them may take.
-SHARES = (0.3, 0.4, 0.8, 0.5)
+#: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
+#: of the time then left that the first of the steps may take.
+SEARCHING, SHARES = 0.7, (0.3, 0.4, 0.8, 1.0)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
@@ -516,8 +517,9 @@ def certify(
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     time_limit : float, optional
-        Seconds of wall time that simulation and searches may take together, each its share of what is left; what is
-        proved by then stands, and ``cut_off`` names what was ended. By default 60, and 1 more for every 1,000 nodes.
+        Seconds of wall time. Simulation and searches may take 70 % together, each its share of what is left; what is
+        proved by then stands and is checked, and ``cut_off`` names what was ended. By default 60, and 1 more for every
+        1,000 nodes.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -587,7 +589,7 @@ ReachingTime(0, 1 before T_r)))
         source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical, limit, sharpening = None, RateProof(None, ()), None, None, Sharpening()
-    with deadline.time_limit(seconds):
+    with deadline.time_limit(SEARCHING * seconds):
         if begin is not None:
             progress(STEPS[0])
             more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
