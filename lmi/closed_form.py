@@ -24,6 +24,8 @@ ELIMINATION_ROWS = 3000
 LOSS = 5e-7
 #: The shares of ``lambda_min`` tried under a bound on the condition; above 1 the shift is negative.
 LOSSES = np.geomspace(LOSS, 10.0, 15)
+#: Above this many rows only so many of them, the best, are improved.
+FEW_ROWS, MOST_TIGHTENED = 40, 4
 EPS = float(np.finfo(float).eps)
 
 
@@ -171,8 +173,10 @@ class _ClosedForm:
         if best.log_condition <= limit:
             return best
         if self._log_u is None and self._log_v is None:
-            tried = (_tightened(self.A, _shrunk(self.A, self._at(loss), limit)) for loss in LOSSES)
-            best = max(tried, key=lambda one: one.rate)
+            shrunk = [_shrunk(self.A, self._at(loss), limit) for loss in LOSSES]
+            if self.A.shape[0] > FEW_ROWS:
+                shrunk = sorted(shrunk, key=lambda one: one.rate)[-MOST_TIGHTENED:]
+            best = max((_tightened(self.A, one) for one in shrunk), key=lambda one: one.rate)
         if best.log_condition > limit or best.rate <= 0:
             raise NoCertificate(f"no positive rate was found with a condition of at most {max_condition:.6g}")
         return best

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
-#: Up to this many rows Clarabel climbs to the best rate, about as fast; above, and on a subspace,
+#: Up to this many rows Clarabel climbs to the best rate; above, on a subspace, and in the blocks of a larger matrix,
 #: :mod:`lmi.interior_point` does.
 CLARABEL_ROWS = 20
 #: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
@@ -183,7 +183,7 @@ def _rate_optimum(
     parts = irreducible_blocks(A)
     bases = [None if basis is None else block_columns(basis, part) for part in parts]
     blocks = [
-        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance))
+        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance, len(A) <= CLARABEL_MARGIN_ROWS))
         for part, b in zip(parts, bases, strict=True)
         if b is None or b.shape[1]
     ]
@@ -207,14 +207,16 @@ def _rate_optimum(
     return DiagonalCertificate(coupled, diagonal_rate(A, coupled, basis), limit[2].upper, witness)
 
 
-def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> DiagonalCertificate:
+def _with_upper(
+    A: np.ndarray, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
+) -> DiagonalCertificate:
     """Return the optimum of an irreducible block with a dual bound on all diagonal rates."""
     if len(A) == 1:
         rate = 2 * float(A[0, 0])
         return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
     if len(A) == 2 and basis is None:
         return _two_rows(A)
-    frame, found = _climb(A, None, basis, tolerance)
+    frame, found = _climb(A, None, basis, tolerance, clarabel=clarabel)
     if not found.rate > 0:
         return found
     # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
@@ -222,7 +224,7 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
     attempts.append((found.log_omega, tolerance / 100))
     for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
         for log_omega, accuracy in attempts:
-            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy):
+            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy, clarabel):
                 if (upper := diagonal_rate_limit(A, Y)) < found.upper:
                     found = replace(found, upper=max(upper, found.rate), witness=(Y,))
             if found.gap <= 1.5 * excess:
@@ -252,10 +254,12 @@ def _climb(
     tolerance: float,
     steps: int = 40,
     known: np.ndarray | None = None,
+    clarabel: bool = True,
 ) -> tuple[np.ndarray, DiagonalCertificate]:
     """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative.
 
-    ``known`` is a diagonal to start from besides.
+    ``known`` is a diagonal to start from besides; without ``clarabel`` a small matrix is left to
+    :mod:`lmi.interior_point` too.
     """
     frame, best = _start(A, basis, max_condition, known)
     current = frame
@@ -267,7 +271,7 @@ def _climb(
     for _ in range(steps):
         checkpoint()
         try:
-            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance)
+            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance, clarabel)
             proposal = normalised(_positive(omega)) + frame
         except NoCertificate:
             break
@@ -330,6 +334,7 @@ def _step(
     basis: np.ndarray | None,
     max_condition: float | None,
     tolerance: float,
+    clarabel: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0``, ``Omega_0`` the current matrix.
 
@@ -348,7 +353,7 @@ def _step(
     if basis is not None:
         tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * basis)[0]
 
-    if n > CLARABEL_ROWS or tail is not None:
+    if n > CLARABEL_ROWS or tail is not None or not clarabel:
         C = S - np.diag(b / 2 * square_unit)
         found = maximise_margin(C, weight, tail, tolerance, np.exp(frame), max_condition)
         return found.omega, unit[:, None] * _dual_rows(found.X, tail)
@@ -375,14 +380,14 @@ def _dual_rows(X: np.ndarray, tail: np.ndarray | None) -> np.ndarray:
 
 
 def _dual_factors(
-    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float
+    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
 ) -> list[np.ndarray]:
     """Return matrices ``Y`` such that ``X = Y Y'`` may show that no diagonal rate exceeds ``b``; in the original rows.
 
     Rows in which the solver left noise are cleared at several levels: a row of zeros meets its condition.
     """
     try:
-        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance)
+        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance, clarabel)
     except NoCertificate:
         return []
     unit = np.sqrt(np.diag(scaled(A, frame))) if (np.diag(A) > 0).all() else np.ones(len(A))
@@ -843,7 +848,7 @@ def _coupled_large(
             omegas.append(block.omega / top)
             halves.append(block.decrease / (2 * top * scale))
         else:
-            found = diagonal_lyapunov(block.A, tolerance=tolerance)
+            found = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
             omegas.append(found.omega)
             halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
         groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))

@@ -12,13 +12,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lmi import deadline
+from lmi.apart import apart
 from lmi.deadline import share_of_time
 from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
@@ -42,7 +43,7 @@ from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
 from ptcc_certify.rationals import as_fraction, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
-from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
+from ptcc_certify.sharpen import APART_NODES, DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
 from ptcc_certify.simulation import PAST, simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.sliding_simulation import rounding_slack
@@ -739,7 +740,8 @@ def _search_and_prove(
         return None, nothing, None
     try:
         with np.errstate(all="ignore"):
-            V = theorem.lyapunov(structure)
+            search = partial(_searched, theorem, structure)
+            (V,) = apart(search) if n > APART_NODES else search()
             numerical = theorem.rate(structure, V) if V.blocks else None
     except OutOfTime:
         raise
@@ -761,6 +763,10 @@ def _search_and_prove(
     if proof.failed:
         notes.append(proof.failed)
     return V, proof, numerical
+
+
+def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
+    return [theorem.lyapunov(structure)]
 
 
 def _instant(at: Any, protocol: Protocol) -> Fraction:

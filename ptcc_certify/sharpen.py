@@ -16,11 +16,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
 import lmi
 import lmi.full
+from lmi.apart import apart
 from lmi.deadline import checkpoint, share_of_time
 from lmi.errors import LMIError, OutOfTime
 from lmi.exact import prove_generalized_margin
@@ -36,6 +38,8 @@ METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
 #: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
 SEARCHED_GROUP = (300, 2000)
+#: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
+APART_NODES = 40
 #: The member with the largest rate is chosen among those with at most this prefactor.
 LARGEST_PREFACTOR = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
@@ -169,7 +173,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
             found = results[kind] = []
             with share_of_time(share, f"class {kind}", cut_off):
                 try:
-                    for candidate in search():
+                    for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
                         found.append(candidate)
                 except OutOfTime:
                     raise
@@ -226,7 +230,7 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
         found: Sequence[DominantMember] = ()
         try:
             with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
-                found = dominant_members(structure, search=search)
+                found = list(apart(partial(dominant_members, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue

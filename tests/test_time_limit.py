@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -13,6 +16,7 @@ import pytest
 from bad_inputs import ptcc
 
 import lmi
+from lmi.apart import apart
 from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify import NominalProtocol, ParameterError, SignedDigraph, certify, check, sharpen, simulate
 from ptcc_certify.certificate import STEPS
@@ -92,6 +96,79 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
     assert cert.cut_off == ("class lmi",)
     assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.sharpening.tried)
     assert check(cert.to_dict()).accepted
+
+
+HOLDS = """
+import ctypes, sys
+from ptcc_certify import NominalProtocol, SignedDigraph, certify, sharpen
+
+def holds(system, thorough):
+    yield from ()
+    ctypes.PyDLL(None).sleep(600)  # the interpreter is held: no other thread, no handler of a signal runs
+
+sharpen._lmi_candidates = holds
+ring = SignedDigraph.from_edges([(i, (i + 1) % 50, 1 if i else -1) for i in range(50)])
+print("began", flush=True)
+cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, time_limit=float(sys.argv[1]))
+print(cert.verdict, cert.cut_off)
+"""
+linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux only")
+
+
+@linux
+def test_a_solver_that_holds_the_interpreter_is_ended_at_the_limit():
+    run = subprocess.run([sys.executable, "-c", HOLDS, "12"], capture_output=True, text=True, timeout=300, check=True)
+    assert run.stdout.splitlines() == ["began", "certified ('class lmi',)"]
+
+
+@linux
+def test_a_solver_that_holds_the_interpreter_is_ended_by_an_interrupt():
+    run = subprocess.Popen(
+        [sys.executable, "-c", HOLDS, "600"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert run.stdout is not None and run.stdout.readline() == "began\n"
+    time.sleep(4)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode != 0 and "KeyboardInterrupt" in err
+
+
+def test_work_apart_hands_over_values_errors_and_its_end():
+    assert list(apart(lambda: [{"a": np.arange(3)}, 2]))[1] == 2
+
+    def fails() -> Iterator[int]:
+        yield 1
+        raise lmi.NoCertificate("none")
+
+    found = []
+    with pytest.raises(lmi.NoCertificate, match="none"):
+        for value in apart(fails):
+            found.append(value)
+    assert found == [1]
+
+
+@linux
+def test_the_death_of_a_process_is_told():
+    def dies() -> Iterator[int]:
+        yield 1
+        os._exit(3)
+
+    with pytest.raises(lmi.LMIError, match="without an answer"):
+        list(apart(dies))
+
+
+@linux
+def test_what_came_before_the_limit_is_kept():
+    found = []
+
+    def slow() -> Iterator[int]:
+        yield 1
+        time.sleep(600)
+
+    with time_limit(2), pytest.raises(lmi.OutOfTime):
+        for value in apart(slow):
+            found.append(value)
+    assert found == [1]
 
 
 def test_without_a_limit_nothing_is_cut_off():
