@@ -4,9 +4,9 @@
 
 ``certify`` with everything: best method, CVODES run, independent check; default gains, ``rho2 kappa = 2``, a start
 drawn at random. Each graph in a process of its own, which is ended after ``--cap`` seconds; CPU seconds are those of
-the one call and its processes, without imports. Bound over true: the energy of the input, and the largest deviation of
-an agent from its final state at T/2, by matrix exponentials. ``--before`` compares with the JSON of an earlier run, such as one of
-another version (PYTHONPATH) on the same machine.
+the one call and its processes, without imports. Bound over true: the energy of the input, and the largest deviation
+of an agent from its final state at T/2, by matrix exponentials. ``--before`` compares with the JSON of an earlier
+run, such as one of another version (PYTHONPATH) on the same machine.
 """
 
 from __future__ import annotations
