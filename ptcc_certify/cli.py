@@ -47,7 +47,11 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _reading_options = _options(
-    click.option("--edges", type=click.Choice(["information", "listens"]), help="Row a,b: flows a -> b, or a listens."),
+    click.option(
+        "--edges",
+        type=click.Choice(["information", "listens"]),
+        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
+    ),
     click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
     click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),

@@ -67,13 +67,13 @@ def certify_many(
         matches has an error. A file that is named several times, in whatever way or through links, has one row, under
         the first of its names. Paths are read as they are written, and a leading ``./`` is left out of names.
     protocol : NominalProtocol or SlidingModeProtocol
-    x0 : "random", str, sequence of numbers, mapping or None
+    x0 : "random", str, sequence of numbers, mapping, pandas Series or None
         ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
         and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
         an error.
     seed : int
         Of random starts and telegraph signals.
-    sigma0 : "random", str, sequence of numbers, mapping or None
+    sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
         Sliding mode: the sliding variables at 0, like ``x0``; None: 0.
     disturbance : str, optional
         Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the adversary by default.

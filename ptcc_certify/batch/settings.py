@@ -13,6 +13,7 @@ from typing import Any, Literal
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import by_label
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction, format_exact, shorten
 from ptcc_certify.sharpen import METHODS
@@ -56,6 +57,8 @@ class Settings:
         sliding = isinstance(self.protocol, SlidingModeProtocol)
         for name in ("x0", "sigma0"):
             start = getattr(self, name)
+            if (labelled := by_label(start, name)) is not None:
+                object.__setattr__(self, name, start := labelled)
             if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
                 raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
             try:
