@@ -387,6 +387,8 @@ def design(
 ) -> int:
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
+    The numbers printed are exact, and the last line is the command that proves them again with exit code 0.
+
     Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
     from ptcc_certify.gain_design import INFEASIBLE, MET
@@ -413,12 +415,19 @@ def design(
         found.certificate.save(output)
     if curve:
         _save_curve(found, curve)
+    command = _certify_command(found, graph, read)
     if as_json:
-        _print_json(found.to_dict())
+        _print_json(found.to_dict() | {"command": command})
     else:
         _print(found.lines())
         if output and found.certificate is not None:
             click.echo(f"written    {output}")
+        if command is not None:
+            again = " (give it the graph again, on standard input)" if graph == "-" else ""
+            click.echo(f"to prove it again{again}:\n{command}")
+        elif found.protocol is not None:
+            why = "certify finds other functions for these gains, which prove less"
+            click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
     return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
 
 
@@ -809,6 +818,22 @@ def _input_code(certificate: Certificate, most: Fraction | None) -> int:
         return REFUTED_EXPECTATION
     click.echo("undecided: no such peak is proved, and none is excluded", err=True)
     return UNDECIDED
+
+
+def _certify_command(found: Design, graph: str, read: dict[str, Any]) -> str | None:
+    """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
+    import shlex
+
+    options = found.certify_options
+    if options is None:
+        return None
+    flags = [] if read["edges"] is None else ["--edges", read["edges"]]
+    flags += [] if read["duplicates"] == "refuse" else ["--duplicates", read["duplicates"]]
+    flags += [f"--{name.replace('_', '-')}" for name in ("drop_self_loops", "undirected") if read[name]]
+    given = [*flags, *options]
+    if graph.startswith("-") and graph != "-":
+        return shlex.join(["ptcc", "certify", *given, "--", graph])
+    return shlex.join(["ptcc", "certify", graph, *given])
 
 
 @contextmanager
