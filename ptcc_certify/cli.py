@@ -10,7 +10,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -104,7 +106,7 @@ _time_limit_option = click.option(
     "--time-limit",
     type=float,
     metavar="SECONDS",
-    help="For simulation and searches together.  [default: 60, and 1 more for every 1,000 nodes]",
+    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
 )
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
@@ -494,6 +496,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @_method_option
 @_starts_option
 @click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@_time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
@@ -519,8 +522,9 @@ def batch(
     weight_decades, undirected); several may be given. Every graph has a random start of its own, unless --x0 is given.
 
     Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
-    missing, and with files that have changed. Whatever goes wrong with one graph becomes the column error of its row.
-    Without -o the table is printed as CSV when it is complete.
+    missing, and with files that have changed; the list of graphs may have changed too. FILE then has the rows so far.
+    Whatever goes wrong with one graph becomes the column error of its row. Without -o the table is printed as CSV when
+    it is complete, or with the rows so far when it ends before.
 
     Exit code 0: every graph certified, and what was asked of them holds. Otherwise the table is there too, and the
     code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
@@ -544,14 +548,14 @@ def batch(
     if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out")
     protocol = _protocol(kind, {**dict.fromkeys(_LIMITS), **options}, ())
-    done = total = 0
-    with _counting() as show:
+    total = 0
+    with _counting() as show, _interrupted_by_term():
 
         def progress(*counts: int) -> None:
-            nonlocal done, total
+            nonlocal total
             if output and total == 0 and counts[0]:
                 click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
-            done, total, _ = counts
+            total = counts[1]
             show(*counts)
 
         try:
@@ -559,7 +563,7 @@ def batch(
                 pattern,
                 protocol,
                 **{name: options[name] for name in ("x0", "seed", "sigma0", "disturbance", "method", "simulation")},
-                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected")},
+                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected", "time_limit")},
                 orientation=options["edges"],
                 initial_bound=bound,
                 expect=expected,
@@ -570,10 +574,14 @@ def batch(
                 restart=restart,
                 progress=progress,
             )
-        except KeyboardInterrupt:
-            kept = f"{done} of {total} rows are kept, the same command{' without --restart' * restart} goes on"
-            click.echo(f"ptcc: interrupted; {kept if output and total else 'nothing is kept'}", err=True)
-            return INTERRUPTED
+        except BaseException as error:
+            found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+            if found or stopped:
+                kept = _kept(found, total, output, restart)
+                click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
+            if stopped:
+                return INTERRUPTED
+            raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
     else:
@@ -858,12 +866,41 @@ def _counting() -> Iterator[Callable[[int, int, int], None]]:
         yield show
 
 
+@contextmanager
+def _interrupted_by_term() -> Iterator[None]:
+    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():  # which alone handles signals
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
+    """Tell, after a batch ended before its time, which rows there are and how it goes on; print them without a file."""
+    from ptcc_certify.batch import table_bytes
+
+    if not rows:
+        return "nothing is kept"
+    if output is None:
+        click.echo(table_bytes(rows, ".csv").decode(), nl=False, color=True)
+        return f"{len(rows)} of {total} rows are printed; with -o FILE.csv the same command could go on"
+    missing = f"{total - len(rows)} are missing, and the same command{' without --restart' * restart} goes on"
+    return f"{len(rows)} of {total} rows are kept, in {output} too; {missing}"
+
+
 def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)
     refuted = sum(row["asked"] == "refuted" for row in rows)
     undecided = sum(row["verdict"] == "undecided" or row["asked"] == "undecided" for row in rows)
+    cut_off = sum(row["cut_off"] is not None for row in rows)
+    if cut_off:
+        click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
     said = (
         (violated, "violated: the simulated run exceeds the proved bound; please report", VIOLATED),
         (refuted, "refuted: what was asked does not hold", REFUTED_EXPECTATION),
