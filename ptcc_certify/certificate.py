@@ -23,7 +23,7 @@ from lmi.apart import apart
 from lmi.deadline import share_of_time
 from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
-from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
+from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member, remaining_part
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.disturbance import as_disturbance
@@ -403,7 +403,7 @@ class Certificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.norm_bound(remaining, self._known_start())
 
@@ -415,7 +415,7 @@ class Certificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.outcome_distance(remaining, self._known_start())
 
@@ -425,10 +425,16 @@ class Certificate:
         return self.start
 
     def best_possible_residual(self, remaining: float) -> float | None:
-        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""
+        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical).
+
+        Raises
+        ------
+        ParameterError
+            ``remaining`` is not from 0 to 1.
+        """
         if self.spectral_rate is None:
             return None
-        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining) / 2)
+        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining_part(remaining)) / 2)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``, without side files."""
@@ -495,10 +501,12 @@ def certify(
         Any signed digraph, disconnected ones included.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
-    x0 : sequence of N numbers or mapping of label to number, optional
-        The start, in node order or by label. Without it there is no final state and no simulation.
-    sigma0 : sequence of N numbers or mapping of label to number, optional
-        Sliding mode: ``sigma(0)``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
+    x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        The start, in node order, or by label where there are labels. Without it there is no final state and no
+        simulation.
+    sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
+        outcome.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
     simulation : bool, optional
@@ -531,8 +539,8 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, beyond 1e300 or of
-        thousands of digits, or a disturbance that exceeds ``delta``.
+        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, with other labels
+        than the nodes, beyond 1e300 or of thousands of digits, or a disturbance that exceeds ``delta``.
 
     References
     ----------

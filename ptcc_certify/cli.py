@@ -10,7 +10,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -47,7 +49,11 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _reading_options = _options(
-    click.option("--edges", type=click.Choice(["information", "listens"]), help="Row a,b: flows a -> b, or a listens."),
+    click.option(
+        "--edges",
+        type=click.Choice(["information", "listens"]),
+        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
+    ),
     click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
     click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
@@ -100,7 +106,7 @@ _time_limit_option = click.option(
     "--time-limit",
     type=float,
     metavar="SECONDS",
-    help="For simulation and searches together.  [default: 60, and 1 more for every 1,000 nodes]",
+    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
 )
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
@@ -383,6 +389,8 @@ def design(
 ) -> int:
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
+    The numbers printed are exact, and the last line is the command that proves them again with exit code 0.
+
     Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
     from ptcc_certify.gain_design import INFEASIBLE, MET
@@ -409,12 +417,19 @@ def design(
         found.certificate.save(output)
     if curve:
         _save_curve(found, curve)
+    command = _certify_command(found, graph, read)
     if as_json:
-        _print_json(found.to_dict())
+        _print_json(found.to_dict() | {"command": command})
     else:
         _print(found.lines())
         if output and found.certificate is not None:
             click.echo(f"written    {output}")
+        if command is not None:
+            again = " (give it the graph again, on standard input)" if graph == "-" else ""
+            click.echo(f"to prove it again{again}:\n{command}")
+        elif found.protocol is not None:
+            why = "certify finds other functions for these gains, which prove less"
+            click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
     return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
 
 
@@ -481,6 +496,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @_method_option
 @_starts_option
 @click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@_time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
@@ -506,8 +522,9 @@ def batch(
     weight_decades, undirected); several may be given. Every graph has a random start of its own, unless --x0 is given.
 
     Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
-    missing, and with files that have changed. Whatever goes wrong with one graph becomes the column error of its row.
-    Without -o the table is printed as CSV when it is complete.
+    missing, and with files that have changed; the list of graphs may have changed too. FILE then has the rows so far.
+    Whatever goes wrong with one graph becomes the column error of its row. Without -o the table is printed as CSV when
+    it is complete, or with the rows so far when it ends before.
 
     Exit code 0: every graph certified, and what was asked of them holds. Otherwise the table is there too, and the
     code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
@@ -531,14 +548,14 @@ def batch(
     if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out")
     protocol = _protocol(kind, {**dict.fromkeys(_LIMITS), **options}, ())
-    done = total = 0
-    with _counting() as show:
+    total = 0
+    with _counting() as show, _interrupted_by_term():
 
         def progress(*counts: int) -> None:
-            nonlocal done, total
+            nonlocal total
             if output and total == 0 and counts[0]:
                 click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
-            done, total, _ = counts
+            total = counts[1]
             show(*counts)
 
         try:
@@ -546,7 +563,7 @@ def batch(
                 pattern,
                 protocol,
                 **{name: options[name] for name in ("x0", "seed", "sigma0", "disturbance", "method", "simulation")},
-                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected")},
+                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected", "time_limit")},
                 orientation=options["edges"],
                 initial_bound=bound,
                 expect=expected,
@@ -557,10 +574,14 @@ def batch(
                 restart=restart,
                 progress=progress,
             )
-        except KeyboardInterrupt:
-            kept = f"{done} of {total} rows are kept, the same command{' without --restart' * restart} goes on"
-            click.echo(f"ptcc: interrupted; {kept if output and total else 'nothing is kept'}", err=True)
-            return INTERRUPTED
+        except BaseException as error:
+            found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+            if found or stopped:
+                kept = _kept(found, total, output, restart)
+                click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
+            if stopped:
+                return INTERRUPTED
+            raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
     else:
@@ -807,6 +828,22 @@ def _input_code(certificate: Certificate, most: Fraction | None) -> int:
     return UNDECIDED
 
 
+def _certify_command(found: Design, graph: str, read: dict[str, Any]) -> str | None:
+    """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
+    import shlex
+
+    options = found.certify_options
+    if options is None:
+        return None
+    flags = [] if read["edges"] is None else ["--edges", read["edges"]]
+    flags += [] if read["duplicates"] == "refuse" else ["--duplicates", read["duplicates"]]
+    flags += [f"--{name.replace('_', '-')}" for name in ("drop_self_loops", "undirected") if read[name]]
+    given = [*flags, *options]
+    if graph.startswith("-") and graph != "-":
+        return shlex.join(["ptcc", "certify", *given, "--", graph])
+    return shlex.join(["ptcc", "certify", graph, *given])
+
+
 @contextmanager
 def _counting() -> Iterator[Callable[[int, int, int], None]]:
     """Show on a terminal how many of many rows are done, how many have an error, and how long the rest will take."""
@@ -829,12 +866,41 @@ def _counting() -> Iterator[Callable[[int, int, int], None]]:
         yield show
 
 
+@contextmanager
+def _interrupted_by_term() -> Iterator[None]:
+    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():  # which alone handles signals
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
+    """Tell, after a batch ended before its time, which rows there are and how it goes on; print them without a file."""
+    from ptcc_certify.batch import table_bytes
+
+    if not rows:
+        return "nothing is kept"
+    if output is None:
+        click.echo(table_bytes(rows, ".csv").decode(), nl=False, color=True)
+        return f"{len(rows)} of {total} rows are printed; with -o FILE.csv the same command could go on"
+    missing = f"{total - len(rows)} are missing, and the same command{' without --restart' * restart} goes on"
+    return f"{len(rows)} of {total} rows are kept, in {output} too; {missing}"
+
+
 def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)
     refuted = sum(row["asked"] == "refuted" for row in rows)
     undecided = sum(row["verdict"] == "undecided" or row["asked"] == "undecided" for row in rows)
+    cut_off = sum(row["cut_off"] is not None for row in rows)
+    if cut_off:
+        click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
     said = (
         (violated, "violated: the simulated run exceeds the proved bound; please report", VIOLATED),
         (refuted, "refuted: what was asked does not hold", REFUTED_EXPECTATION),

@@ -19,6 +19,7 @@ import numpy as np
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.definite import arithmetic
 from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.input_bounds import (
     Form,
     InputBounds,
@@ -33,6 +34,7 @@ from ptcc_certify.input_bounds import (
     root_above,
     rounded,
 )
+from ptcc_certify.io import by_label, in_node_order
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction, nearest_float, writable
@@ -247,13 +249,15 @@ def starts_within(structure: Structure, bound: Any) -> Starts:
     return Starts((Fraction(0),) * n, (R,) * n)
 
 
-def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
+def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
     """Return all starts with ``low_k <= x_k(0) <= high_k``.
 
     Parameters
     ----------
-    low, high : sequences of N numbers
+    low, high : sequences of N numbers, mappings of label to number or pandas Series
         Ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
 
     Returns
     -------
@@ -262,7 +266,7 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     Raises
     ------
     ParameterError
-        The lengths differ, or a lower end exceeds its upper end.
+        The lengths differ, a lower end exceeds its upper end, or labels are not those of the nodes.
     NumberError
         An end is not a number of the exact grammar.
 
@@ -270,7 +274,12 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     --------
     >>> box([0, 1], [2, 1])
     Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
+    True
     """
+    low, high = _unlabelled(low, graph, "low"), _unlabelled(high, graph, "high")
     if len(low) != len(high):
         raise ParameterError(f"a box of {len(low)} lower and {len(high)} upper ends; give one of each for every agent")
     ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
@@ -279,14 +288,16 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     return Starts(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
 
 
-def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
+def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> Starts:
     """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
 
     Parameters
     ----------
-    center : sequence of N numbers
-    axes : sequence of sequences of N numbers
+    center : sequence of N numbers, mapping of label to number or pandas Series
+    axes : sequence of vectors like ``center``
         One semi-axis or more; they need not be orthogonal.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
 
     Returns
     -------
@@ -295,7 +306,7 @@ def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
     Raises
     ------
     ParameterError
-        There is no axis, or one of another length than ``center``.
+        There is no axis, one of another length than ``center``, or labels are not those of the nodes.
     NumberError
         A number is not of the exact grammar.
 
@@ -304,11 +315,21 @@ def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
     >>> ellipsoid([0, 0], [[1, 0], [0, 2]]).axes
     ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
     """
-    middle = tuple(as_fraction(x, "center") for x in center)
-    vectors = tuple(tuple(as_fraction(x, "axes") for x in axis) for axis in axes)
+    if by_label(axes, "axes") is not None:
+        raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
+    middle = tuple(as_fraction(x, "center") for x in _unlabelled(center, graph, "center"))
+    vectors = tuple(tuple(as_fraction(x, "axes") for x in _unlabelled(axis, graph, "axes")) for axis in axes)
     if not vectors or any(len(axis) != len(middle) for axis in vectors):
         raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
     return Starts(middle, axes=vectors)
+
+
+def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
+    if graph is not None:
+        return in_node_order(values, graph, name)
+    if by_label(values, name) is not None:
+        raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
+    return values
 
 
 # ---------------------------------------------------------------------- bounds

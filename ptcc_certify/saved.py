@@ -202,7 +202,7 @@ class SavedCertificate:
         Parameters
         ----------
         remaining : (M,) array_like
-            ``1 - t/T`` at the instants, in (0, 1].
+            ``1 - t/T`` at the instants, in [0, 1].
 
         Returns
         -------
@@ -212,7 +212,7 @@ class SavedCertificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.norm_bound(remaining, self._known_start())
 
@@ -222,7 +222,7 @@ class SavedCertificate:
         Parameters
         ----------
         remaining : (M,) array_like
-            ``1 - t/T`` at the instants, in (0, 1].
+            ``1 - t/T`` at the instants, in [0, 1].
 
         Returns
         -------
@@ -232,7 +232,7 @@ class SavedCertificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.outcome_distance(remaining, self._known_start())
 

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+import shlex
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bad_inputs import BAD_INPUTS, BadInput, Run, listing, ptcc, write
+from generators import all_classes, random_graph
 from scipy.linalg import expm
 
 from ptcc_certify.bounds import Envelope
@@ -674,6 +676,59 @@ def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
     assert ptcc(*asked, "--shortest-deadline", "--curve", "d.png").code == 0 and Path("d.png").stat().st_size > 5000
     data = json.loads(ptcc(*asked, "--shortest-deadline", "--input-norm", "2", "--json").out)
     assert data["verdict"] == "met" and data["input_norm"] == 2 and Fraction(data["peak"]) <= 10
+
+
+def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
+    rng, capped = np.random.default_rng(1), 0
+    graphs = [*GRAPHS]
+    for seed in range(0, 45, 9):
+        _, kwargs = all_classes()[seed]
+        write_graph(random_graph(rng, n=8, **{k: v for k, v in kwargs.items() if k != "n"}).graph, f"r{seed}.csv")
+        graphs.append(f"r{seed}.csv")
+    tasks = [("--shortest-deadline",), ("--shortest-deadline", "--input-norm", "2"), ("--deadline", "20/3")]
+    tasks += [("--shortest-deadline", "--residual", "4"), ("--deadline", "4.1", "--residual", "0.01")]
+    for graph, task in zip(graphs, tasks * 3, strict=False):
+        asked = ("design", graph, "--max-input", "50", "--initial-bound", "2.3", *task)
+        found = one_object(ptcc(*asked, "--json").out)
+        word, *command = shlex.split(found["command"])
+        assert word == "ptcc" and command[:2] == ["certify", graph]
+        again = ptcc(*command, "--json", "--no-simulation")
+        assert again.code == 0, (asked, command, again.err)
+        proved = one_object(again.out)
+        assert proved["protocol"] == {k: found["protocol"][k] for k in proved["protocol"]}
+        effort = proved["effort"]
+        if found["gain_cap"] is None:
+            agents = max(map(Fraction, effort["peak"]["agents"].values()))
+            peak = Fraction(effort["peak"]["norm"]) if found["input_norm"] else agents
+            assert peak == Fraction(found["peak"]) <= 50
+        else:
+            (entry,) = effort["residual"]
+            assert max(map(Fraction, entry["agents"].values())) == Fraction(found["residual"])
+            assert Fraction(found["residual"]) <= Fraction(found["asked"]["residual"])
+            assert Fraction(entry["largest"]) == Fraction(found["peak"]) <= 50
+            capped += 1
+    assert capped
+    run = ptcc(*asked)
+    assert run.out.splitlines()[-2:] == ["to prove it again:", found["command"]]
+
+
+def test_the_command_that_design_prints_is_one_for_a_shell(folder: Path):
+    name = "it's a $graph; -rf.csv"
+    Path(name).write_text("a,b,-1\nb,a,-1\nb,b,2\na,b,-1\n")
+    reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
+    task = ("--max-input", "10", "--initial-bound", "1", "--shortest-deadline")
+    command = ptcc("design", name, *reading, *task).out.splitlines()[-1]
+    program = f"{shlex.quote(sys.executable)} -m ptcc_certify.cli"
+    shown = subprocess.run(["sh", "-c", command.replace("ptcc", program, 1)], capture_output=True, text=True)
+    assert shown.returncode == 0 and "certified" in shown.stdout, shown
+    assert all(flag in command for flag in reading)
+    Path("-g.csv").write_text("a,b,1\nb,a,-1\n")
+    assert ptcc(*shlex.split(ptcc("design", *task, "--", "-g.csv").out.splitlines()[-1])[1:]).code == 0
+    edges = b"a,b,1\nb,a,1\n"
+    run = ptcc("design", "-", "--undirected", *task, stdin=b"a,b,1\n")
+    assert "to prove it again (give it the graph again, on standard input):" in run.out
+    assert ptcc(*shlex.split(run.out.splitlines()[-1])[1:], stdin=b"a,b,1\n").code == 0
+    assert ptcc("design", "-", *task, stdin=edges).out.splitlines()[-1].startswith("ptcc certify - --T ")
 
 
 # ---------------------------------------------------------------------- examples, cite, imports

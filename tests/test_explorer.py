@@ -321,7 +321,7 @@ def test_graphs_that_are_too_large_are_refused():
 
 
 def test_a_graph_without_edges_stays_where_it_is():
-    view = Explorer(ptcc.SignedDigraph.from_matrix([[0, 0], [0, 0]])).view(Settings(GIVEN))
+    view = Explorer(ptcc.SignedDigraph.from_matrix([[0, 0], [0, 0]], orientation="listens")).view(Settings(GIVEN))
     assert "there is nothing to decay" in view.text
     assert view.png.startswith(PNG)
 

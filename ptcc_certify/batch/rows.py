@@ -35,6 +35,7 @@ reaching_time       float  sliding mode: when the last sliding variable is prove
 worst_ratio         float  numerical: largest simulated ``sqrt(V)`` over its bound
 bound_kept          bool   numerical: whether the simulated run exceeds no bound
 obligations         int    statements proved
+cut_off             text   the searches that the time limit ended, which a row of more time may do better
 note                text   what kept the verdict from certified, and other remarks
 seconds             float  that the row took
 error               text   why there is no certificate, in one line; empty if there is one
@@ -96,6 +97,7 @@ COLUMNS: dict[str, type] = {
     "worst_ratio": float,
     "bound_kept": bool,
     "obligations": int,
+    "cut_off": str,
     "note": str,
     "seconds": float,
     "error": str,
@@ -118,7 +120,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
     """
     began = time.perf_counter()
     row: Row = dict.fromkeys(COLUMNS)
-    row["graph"] = _printable(name)
+    row["graph"] = printable(name)
     try:
         with _ONE_AT_A_TIME:
             graph = _graph(name, payload, settings)
@@ -134,7 +136,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
 
 def failed_row(name: str, why: str) -> Row:
     """Return the row of a graph of which nothing is known but why."""
-    return dict.fromkeys(COLUMNS) | {"graph": _printable(name), "seconds": 0.0, "error": why}
+    return dict.fromkeys(COLUMNS) | {"graph": printable(name), "seconds": 0.0, "error": why}
 
 
 def package_version() -> str:
@@ -179,6 +181,7 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
         method=settings.method,
         simulation=settings.simulation,
         starts=settings.initial_bound,
+        time_limit=settings.time_limit,
         **more,
     )
 
@@ -222,6 +225,7 @@ def _columns(certificate: Certificate, settings: Settings) -> Row:
         "worst_ratio": None if seen is None else _finite(seen.worst_ratio),
         "bound_kept": None if seen is None else not seen.violated,
         "obligations": len(certificate.obligations),
+        "cut_off": one_line("; ".join(certificate.cut_off)) or None,
         "note": one_line("; ".join(certificate.notes)) or None,
     }
 
@@ -261,6 +265,6 @@ def _finite(x: float) -> float | None:
     return float(x) if math.isfinite(x) else None
 
 
-def _printable(name: str) -> str:
+def printable(name: str) -> str:
     """Write as escape codes what is no character in the name of a file, or would break the line of a table."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in name)
