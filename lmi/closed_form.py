@@ -233,14 +233,18 @@ def h_matrix_frontier(A: Any, conditions: Sequence[float | None]) -> Iterator[Di
     conditions : sequence of float or None
         None for no limit.
 
-    Yields
-    ------
-    DiagonalCertificate
+    Returns
+    -------
+    iterator of DiagonalCertificate
 
     Raises
     ------
-    NotAnHMatrix, NoCertificate, MatrixError
-        As :func:`h_matrix_certificate`, at the first condition that fails.
+    NotAnHMatrix
+        As :func:`h_matrix_certificate`.
+    NoCertificate
+        At the first condition within which no positive rate was found.
+    MatrixError
+        ``A`` is not real, finite and square, or a condition is below 1.
 
     References
     ----------

@@ -22,6 +22,10 @@ def time_limit(seconds: float) -> Iterator[None]:
     seconds : float
         Of wall time; infinity for no limit.
 
+    Returns
+    -------
+    context manager
+
     Raises
     ------
     OutOfTime

@@ -527,8 +527,8 @@ def certify(
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     time_limit : float, optional
         Seconds of wall time. Simulation and searches may take 70 % together, each its share of what is left; what is
-        proved by then stands and is checked, and ``cut_off`` names what was ended. By default 60, and 1 more for every
-        1,000 nodes.
+        proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
+        more for every 1,000 nodes.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
