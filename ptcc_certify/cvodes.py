@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 import re
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -72,8 +75,9 @@ def interruptible() -> Iterator[None]:
         return handler
 
     signal.signal(signal.SIGINT, recorded(previous))
+    said = io.StringIO()  # CasADi tells in words of its own that it was interrupted
     try:
-        with _alarm(recorded(lambda *_: checkpoint())):
+        with contextlib.redirect_stderr(said), _alarm(recorded(lambda *_: checkpoint())):
             yield
     except Exception:
         if raised:
@@ -84,6 +88,8 @@ def interruptible() -> Iterator[None]:
             raise raised[0]
     finally:
         signal.signal(signal.SIGINT, previous)
+        if not raised and said.getvalue():
+            sys.stderr.write(said.getvalue())
 
 
 @contextmanager
