@@ -334,7 +334,7 @@ def test_a_graph_without_edges_and_a_start_at_rest_stay():
         ([1, 2, 3, 4, 5, float("nan")], "agent 6 is nan"),
         ([1, 2, 3, float("inf"), 5, 6], "agent 4 is inf"),
         ([1, 2, 3, 4, 5, 6j], "real numbers"),
-        (["a"] * 6, "real numbers"),
+        (["a"] * 6, "not a number"),
         ([True] * 6, "real numbers"),
         ([1, 2, 3, 4, 5, None], "x0"),
         ([1, 2, 3, 4, 5, 10**400], "x0"),
