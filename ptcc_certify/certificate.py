@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path
@@ -40,9 +40,10 @@ from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
+from ptcc_certify.rate_limit import RateLimit, mean_limit, optimality_ratio, prove_rate_limit
 from ptcc_certify.rationals import as_fraction, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
+from ptcc_certify.rounding import down
 from ptcc_certify.sharpen import APART_NODES, DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
 from ptcc_certify.simulation import PAST, simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
@@ -50,6 +51,7 @@ from ptcc_certify.sliding_simulation import rounding_slack
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
 from ptcc_certify.trajectory import Trajectory
+from ptcc_certify.verdict import MANY_DECADES, Assessment, Expectations, assess
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 #: What :func:`certify` does, in this order.
@@ -70,8 +72,6 @@ SEARCH_NODES = 150
 SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
 #: A simulated end state is settled when it is this near to the outcome, relative to the start.
 SETTLED = 1e-6
-#: From so many decades between weights on, they are named as the reason that nothing was proved.
-MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
 
@@ -109,7 +109,7 @@ class Certificate:
     sharpening : Sharpening
         Sharper Lyapunov functions of the classes that ``method`` names, proved.
     limit : RateLimit or None
-        A proved bound that no rate exceeds.
+        The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.
     method : str
     at : Fraction or None
         Instant for which the bound was optimised, in units of time.
@@ -127,6 +127,8 @@ class Certificate:
         The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
+    expectations : Expectations
+        What is asked besides; what became of it is part of ``assessment``.
 
     References
     ----------
@@ -140,7 +142,7 @@ class Certificate:
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
     >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
     ('certified', 'bipartite consensus', '1.1')
-    >>> cert.outcome, bool(cert.rate <= cert.rate_limit), cert.checked.accepted
+    >>> cert.outcome, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
     (Outcome(1=1, 2=-1), True, True)
     """
 
@@ -169,6 +171,7 @@ class Certificate:
     time_limit: float
     cut_off: tuple[str, ...]
     notes: tuple[str, ...]
+    expectations: Expectations = field(default_factory=Expectations)
 
     @property
     def graph(self) -> SignedDigraph:
@@ -246,7 +249,7 @@ class Certificate:
                 found.append(Obligation("distance", of))
         if self.limit is not None:
             witness = self.limit.witness(self.graph.labels)
-            found.append(Obligation("rate-limit", "rates", {"limit": self.limit.value}, witness))
+            found.append(Obligation(self.limit.kind, "rates", {"limit": self.limit.value}, witness))
         if self.reaching is not None:
             found.append(Obligation("sliding-bound", "protocol"))
             if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
@@ -289,7 +292,7 @@ class Certificate:
             self.protocol,
             self.forms,
             rate=self.rate,
-            limit=None if self.limit is None else self.limit.value,
+            limit=self.upper_bound,
             start=self.start,
             starts=self.starts,
             sigma0=self.sigma0,
@@ -329,12 +332,27 @@ class Certificate:
         """``certified`` if rate and outcome were proved and the independent check accepts it, else ``undecided``."""
         return CERTIFIED if self.checked is not None and self.checked.accepted else UNDECIDED
 
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The graded verdict: whether the bound says something by the deadline, and what became of expectations."""
+        return assess(self)
+
     @property
-    def tightness(self) -> float | None:
-        """Proved rate over spectral rate, at most 1."""
-        if self.rate is None or not self.spectral_rate:
+    def longest_way(self) -> float | None:
+        """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
+        if self.start is None or self.outcome is None:
             return None
-        return float(self.rate) / self.spectral_rate
+        return float(np.abs(np.array([float(x) for x in self.start]) - self.outcome.values).max())
+
+    @property
+    def upper_bound(self) -> Fraction | None:
+        """The proved upper bound on the decay rate, per unit of the clock: no Lyapunov function exceeds it."""
+        return None if self.limit is None else self.limit.value
+
+    @property
+    def optimality_ratio(self) -> float | None:
+        """Proved rate over its proved upper bound, rounded down; at most 1."""
+        return optimality_ratio(self.rate, self.upper_bound)
 
     @property
     def rounding_loss(self) -> float | None:
@@ -352,14 +370,6 @@ class Certificate:
     def direct(self) -> bool:
         """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
         return not any(self.sigma0 or ())
-
-    @cached_property
-    def rate_limit(self) -> Fraction | None:
-        """An exact upper bound of every rate, proved: the better of ``limit`` and twice the mean nonzero eigenvalue."""
-        r = self.graph.n_nodes - len(self.influence.balanced)
-        trace = sum((abs(self.graph.exact_weight(i)) for i in range(self.graph.n_edges)), Fraction(0))
-        known = [2 * trace / r] if r else []
-        return min([*known, *([self.limit.value] if self.limit else [])], default=None)
 
     @cached_property
     def envelope(self) -> Envelope:
@@ -471,7 +481,7 @@ class Certificate:
         return certificate_html(self)
 
     def __repr__(self) -> str:
-        rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
+        rate = "none" if self.rate is None else down(self.rate)
         said = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
         return f"Certificate({said}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
@@ -491,6 +501,7 @@ def certify(
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
+    expectations: Expectations | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -529,6 +540,8 @@ def certify(
         Seconds of wall time. Simulation and searches may take 70 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
         more for every 1,000 nodes.
+    expectations : Expectations, optional
+        What is asked besides: a behaviour, a rate, a bound of the input. It decides nothing but the ``assessment``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -619,6 +632,7 @@ ReachingTime(0, 1 before T_r)))
         if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
             notes.insert(0, _precision_note(graph))
         progress(STEPS[3])
+        limit = mean_limit(structure)  # which stands if time runs out
         with share_of_time(SHARES[3], STEPS[3], cut_off):
             limit = prove_rate_limit(structure)
     progress(STEPS[4])
@@ -664,6 +678,7 @@ ReachingTime(0, 1 before T_r)))
         time_limit=seconds,
         cut_off=tuple(cut_off),
         notes=tuple(notes),
+        expectations=expectations or Expectations(),
     )
     progress(STEPS[5])
     report = certificate.checked
@@ -813,9 +828,7 @@ def _sharpen(
 
 def _precision_note(graph: SignedDigraph) -> str:
     """Tell how far apart the weights lie, where no rate was proved."""
-    sizes = [abs(graph.exact_weight(i)) for i in range(graph.n_edges)]
-    ratio = max(sizes) / min(sizes)
-    decades = len(str(ratio.numerator // ratio.denominator)) - 1
+    decades = graph.weight_decades
     if decades < MANY_DECADES:
         return "no rate was proved"
     return f"no rate was proved; the weights span {decades} decades, which may be too many for float64"

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.structure import Structure
 
-OK, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 2, 3, 4
-VIOLATED = REJECTED = 1
+OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.verdict has them too
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
@@ -159,7 +158,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
         _print_json(structure_document(structure))
     else:
         _print(structure_lines(structure, graph))
-    return _refuted(structure, expected)
+    return OK if expected is None else _judged_behaviour(structure, expected)
 
 
 @cli.command()
@@ -200,11 +199,13 @@ def certify(
     from ptcc_certify.certificate import STEPS
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.summary import certificate_lines
+    from ptcc_certify.verdict import Expectations
 
-    expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
-    bound, most = _number(initial_bound, "--initial-bound"), _number(max_input, "--max-input")
+    instant, bound = _number(at, "--at"), _number(initial_bound, "--initial-bound")
+    most = _number(max_input, "--max-input")
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
+    expected = Expectations(_behaviour(expect), _number(min_rate, "--min-rate"), most)
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
@@ -226,18 +227,22 @@ def certify(
             simulation=simulation,
             starts=bound,
             time_limit=time_limit,
+            expectations=expected,
             progress=begin,
             **more,
         )
     if output:
         certificate.save(output)
+    found = certificate.assessment
     if as_json:
         _print_json(certificate.to_dict())
+        if found.exit_code:
+            click.echo(f"verdict    {found.text}", err=True)
     else:
         _print(certificate_lines(certificate, graph))
         if output:
             click.echo(f"written    {output}")
-    return _exit_code(certificate, expected, wanted) or _input_code(certificate, most)
+    return found.exit_code
 
 
 @cli.command()
@@ -447,13 +452,15 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     """
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.paper_figures import Run, paper_figures, results_csv, tightness
+    from ptcc_certify.paper_figures import Run, paper_figures, results_csv
+    from ptcc_certify.rounding import down
+    from ptcc_certify.verdict import Expectations, worst_code
 
-    chosen, code, runs = select(name), OK, []
+    chosen, codes, runs = select(name), [], []
     if output:
         _make_folder(output)
     click.echo(
-        f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}"
+        f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'optimality':>12}{'worst':>8}"
         f"{'reached':>10}{'proved by':>11}{'T_r':>5}  {'final state':<14}verdict"
     )
     for example, graph_name, reported in chosen:
@@ -463,16 +470,17 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             example.x0.split(","),
             sigma0=example.sigma0 and example.sigma0.split(","),
             disturbance=example.disturbance,
+            expectations=Expectations(reported),
         )
         claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
         assert claim is not None
         click.echo(
             f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-            f"{int((rate or 0) * 10_000) / 10_000:>9.4f}{tightness(certificate) or 0:>11.4f}"
+            f"{down(rate or Fraction(0)):>9}{down(certificate.optimality_ratio or 0.0, 4):>12}"
             f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  "
-            f"{_ends(certificate):<14}{certificate.verdict}"
+            f"{_ends(certificate):<14}{certificate.assessment.word}"
         )
-        code = max(code, _exit_code(certificate, reported, None))
+        codes.append(certificate.assessment.exit_code)
         if output:
             stem = Path(output) / (graph_name if example.sigma0 is None else f"{graph_name}_sliding")
             certificate.save(f"{stem}.json")
@@ -484,7 +492,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
         for title, figure in paper_figures(runs).items():
             save_figure(figure, Path(output) / f"{title}.{suffix}")
         write_atomically(Path(output) / "examples.csv", results_csv(runs))
-    return code
+    return worst_code(codes)
 
 
 @cli.command()
@@ -704,7 +712,7 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 def _reached(certificate: Certificate) -> str:
     """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
     from ptcc_certify.paper_figures import reaching_times
-    from ptcc_certify.summary import up
+    from ptcc_certify.rounding import up
 
     last, proved, deadline = reaching_times(certificate)
     if isinstance(last, str):
@@ -713,12 +721,16 @@ def _reached(certificate: Certificate) -> str:
 
 
 def _ends(certificate: Certificate) -> str:
-    """Return the outcome in a few letters: 0, a common size, or the largest."""
+    """Return the outcome in a few letters: 0, a common size, or the largest, rounded up."""
+    from ptcc_certify.rounding import near, up
+
     if certificate.outcome is None:
         return "-"
-    sizes = {abs(float(x)) for x in certificate.outcome.final_state}
-    largest = f"{max(sizes):.5g}"
-    return largest if sizes == {0} else f"+-{largest}" if len(sizes) == 1 else f"|x| <= {largest}"
+    sizes = {abs(Fraction(x)) for x in certificate.outcome.final_state}
+    largest = max(sizes)
+    return (
+        near(largest, 5) if sizes == {0} else f"+-{near(largest, 5)}" if len(sizes) == 1 else f"|x| <= {up(largest, 5)}"
+    )
 
 
 def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
@@ -772,60 +784,16 @@ def _number(text: str | None, option: str) -> Fraction | None:
         raise ParameterError(f"{option}: {error}") from None
 
 
-def _refuted(structure: Structure, expected: str | None) -> int:
-    if expected is None:
-        return OK
-    if structure.holds(expected):
-        if len(structure.components) > 1:
-            click.echo(f"note: {expected} holds in each of the components by itself", err=True)
-        return OK
-    click.echo(f"refuted: {expected} does not follow for this graph", err=True)
-    return REFUTED_EXPECTATION
+def _judged_behaviour(structure: Structure, expected: str) -> int:
+    from ptcc_certify.verdict import MET, judge_behaviour
 
-
-def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fraction | None) -> int:
-    if certificate.comparison is not None and certificate.comparison.violated:
-        click.echo("violated: the simulated run exceeds the proved bound; please report this graph", err=True)
-        return VIOLATED
-    if code := _refuted(certificate.structure, expected):
-        return code
-    code = OK if certificate.verdict == "certified" else UNDECIDED
-    if min_rate is None or certificate.constant:
-        return code
-    if certificate.rate is not None and certificate.rate >= min_rate:
-        return code
-    limit = certificate.rate_limit
-    if limit is not None and min_rate > limit:
-        click.echo(f"refuted: no rate of this graph exceeds {float(limit):.6g} (proved)", err=True)
+    answer = judge_behaviour(structure, expected)
+    if answer.status != MET:
+        click.echo(f"{answer.status}: {answer}", err=True)
         return REFUTED_EXPECTATION
-    click.echo("undecided: no such rate is proved, and none is excluded", err=True)
-    return UNDECIDED
-
-
-def _input_code(certificate: Certificate, most: Fraction | None) -> int:
-    """Return the exit code of --max-input; with limits of the gain, of the input under these."""
-    effort = certificate.effort
-    if most is None or certificate.constant:
-        return OK
-    if effort is not None and certificate.limits:
-        proved = [entry.largest for entry in effort.residual]
-        if len(proved) == len(certificate.limits) and all(x is not None and x <= most for x in proved):
-            return OK
-    elif effort is not None and effort.peak is not None and effort.peak.largest <= most:
-        return OK
-    if effort is not None and effort.first is not None:
-        p = certificate.protocol
-        gain = p.rho1 + p.rho2 * p.kappa / p.T
-        caps = [limits.gain_cap for limits in certificate.limits if limits.gain_cap is not None]
-        first = effort.first * min([Fraction(1), *(cap / gain for cap in caps)])
-        if first > most:
-            click.echo(f"refuted: the input is up to {float(first):.6g} at the start (proved)", err=True)
-            return REFUTED_EXPECTATION
-    if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
-        click.echo("refuted: from some of these starts the input grows without limit (proved)", err=True)
-        return REFUTED_EXPECTATION
-    click.echo("undecided: no such peak is proved, and none is excluded", err=True)
-    return UNDECIDED
+    if len(structure.components) > 1:
+        click.echo(f"note: {expected} holds in each of the components by itself", err=True)
+    return OK
 
 
 def _certify_command(found: Design, graph: str, read: dict[str, Any]) -> str | None:
@@ -894,23 +862,25 @@ def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: b
 
 def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
+    from ptcc_certify.verdict import OPEN, REFUTED, exit_code
+
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)
-    refuted = sum(row["asked"] == "refuted" for row in rows)
-    undecided = sum(row["verdict"] == "undecided" or row["asked"] == "undecided" for row in rows)
+    refuted = sum(row["asked"] == REFUTED for row in rows)
+    undecided = sum(row["verdict"] == "undecided" or row["asked"] == OPEN for row in rows)
     cut_off = sum(row["cut_off"] is not None for row in rows)
     if cut_off:
         click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
     said = (
-        (violated, "violated: the simulated run exceeds the proved bound; please report", VIOLATED),
-        (refuted, "refuted: what was asked does not hold", REFUTED_EXPECTATION),
-        (undecided, "undecided", UNDECIDED),
-        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}", UNDECIDED),
+        (violated, "violated: the simulated run exceeds the proved bound; please report"),
+        (refuted, "refuted: what was asked does not hold"),
+        (undecided, "undecided, or what was asked is left open"),
+        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}"),
     )
-    for count, text, _ in said:
+    for count, text in said:
         if count:
             click.echo(f"note: {count} of {len(rows)} graphs: {text}", err=True)
-    return next((code for count, _, code in said if count), OK)
+    return exit_code(bool(violated), bool(refuted), bool(undecided or failed))
 
 
 def _refuse_output(output: str | None, graph: str) -> None:

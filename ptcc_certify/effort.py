@@ -416,8 +416,17 @@ def bound_effort(
         residual=tuple(entry for entry in entries if entry is not None),
         longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
         disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
-        first=None if sliding or region.axes else (gain.rho1 + gain.k / gain.T) * max(map(region.largest, bounds.rows)),
+        first=first_input(structure, protocol, region),
     )
+
+
+def first_input(structure: Structure, protocol: Protocol, region: Starts) -> Fraction | None:
+    """Return ``sup max_k |u_k(0)|``, exactly; None in sliding mode, for an ellipsoid, for a large graph."""
+    n = structure.graph.n_nodes
+    if isinstance(protocol, SlidingModeProtocol) or region.axes or n > INPUT_NODES or not structure.graph.n_edges:
+        return None
+    gain = _prescribed(protocol)
+    return (gain.rho1 + gain.k / gain.T) * max(map(region.largest, structure.graph.exact_rows(range(n))))
 
 
 def _prescribed(protocol: Protocol) -> PrescribedGain:
@@ -430,7 +439,7 @@ def _bounded(
     """Decide whether the input stays bounded for every start, and by what."""
     if still or (rate is not None and rate * k >= 2):
         return True, "rate"
-    if limit is not None and limit * k <= 2:
+    if limit is not None and limit * k < 2:
         return False, "limit"
     graph = structure.graph
     if graph.n_nodes > LARGEST:

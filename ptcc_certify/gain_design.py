@@ -38,7 +38,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -55,6 +54,7 @@ from ptcc_certify.input_bounds import BITS, InputBounds, Linear, PrescribedGain
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.rationals import format_exact, nearest_float, short_exact, shorten
+from ptcc_certify.rounding import down, float_up, up
 from ptcc_certify.structure import Structure, analyse
 
 if TYPE_CHECKING:
@@ -188,10 +188,10 @@ class Design:
 
     @property
     def ratio(self) -> float | None:
-        """Shortest certified deadline over the shortest possible one, at least 1."""
+        """Shortest certified deadline over the shortest possible one, rounded up; at least 1."""
         if not self.product or not self.lower_product:
             return None
-        return float(self.product / self.lower_product)
+        return float_up(self.product / self.lower_product)
 
     @cached_property
     def worst(self) -> WorstStart | None:
@@ -208,6 +208,8 @@ class Design:
 
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
         """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
+
+        Peaks are rounded up, what no gains can undercut is rounded down.
 
         The gains for a deadline ``T`` are those of ``protocol`` with ``rho1 T`` kept.
 
@@ -228,9 +230,12 @@ class Design:
         array([1.5 , 0.75])
         """
         T = np.array([float(parameter("a deadline", t)) for t in deadlines])
+        known = (self.product, math.inf), (self.lower_product, -math.inf)
         certified, lower = (
-            np.full(T.shape, math.nan if x is None else nearest_float(x)) / T
-            for x in (self.product, self.lower_product)
+            np.full(T.shape, math.nan)
+            if x is None
+            else np.nextafter(np.nextafter(nearest_float(x), towards) / T, towards)
+            for x, towards in known
         )
         return TradeOff(T, certified, lower)
 
@@ -269,19 +274,15 @@ class Design:
         if self.limits is not None and self.limits.gain_cap is not None:
             found.append(("", f"gain capped at {short_exact(self.limits.gain_cap)}, which acts from 0 on"))
         if self.peak is not None:
-            found.append(("peak input", f"{_short(self.peak, ROUND_CEILING)} at most"))
+            found.append(("peak input", f"{up(self.peak)} at most"))
         if self.residual is not None:
-            left = (
-                f"{_short(self.residual, ROUND_CEILING)} at most"
-                if self.residual
-                else "none, every agent is at its outcome"
-            )
+            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its outcome"
             found.append(("left at the deadline", left))
         if self.shortest_certified is not None:
-            found.append(("shortest deadline", f"{_short(self.shortest_certified, ROUND_CEILING, DIGITS)} certified"))
+            found.append(("shortest deadline", f"{up(self.shortest_certified, DIGITS)} certified"))
         if self.shortest_possible is not None:
-            times = "" if self.ratio is None else f", {self.ratio:.3g} times shorter"
-            found.append(("", f"{_short(self.shortest_possible, ROUND_FLOOR)} at least, whatever the gains{times}"))
+            times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
+            found.append(("", f"{down(self.shortest_possible)} at least, whatever the gains{times}"))
         width = max(len(name) for name, _ in found)
         return [f"{name:<{width}}  {text}" for name, text in found]
 
@@ -320,7 +321,7 @@ class Design:
         if self.limits is not None and self.limits.gain_cap is not None:
             cap = f", gain_cap={short_exact(self.limits.gain_cap)}"
         gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
-        return f"Design({self.verdict}, {gains}, peak {_short(self.peak, ROUND_CEILING)})"
+        return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"
 
 
 class Option(NamedTuple):
@@ -509,7 +510,7 @@ def _lower_product(base: Certificate, bounds: InputBounds, residual: Fraction | 
             way = _largest_below(bounds.starts, row) - (residual or 0)
             if way > best:
                 best, why = way, f"the way of agent {shorten(label)} to its outcome"
-    limit = base.rate_limit
+    limit = base.upper_bound
     if residual is None and limit and _has_inner_points(bounds.starts):
         for heard, label in zip(bounds.rows, labels, strict=True):
             first = 2 / limit * _largest_below(bounds.starts, heard)
@@ -719,16 +720,15 @@ def _missed(asked: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
     U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
     if T is not None and shortest is not None and shortest > T:
-        least, times = (_short(x, ROUND_FLOOR) for x in (shortest, shortest / T))
+        least, times = map(down, (shortest, shortest / T))
         text = f"no gains meet a deadline below {least}, {times} times the one asked for"
         return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
     if asked.peak is None or asked.product is None:
         return asked
     if asked.peak <= U:
         return replace(asked, binding="the residual is not proved")
-    peak, times, later = (_short(x, ROUND_CEILING) for x in (asked.peak, asked.peak / U, asked.product / U))
-    over = f"the certified peak is {peak}, {times} times max_input"
-    return replace(asked, binding=f"{over}; from T = {later} on it is met")
+    over = f"the certified peak is {up(asked.peak)}, {up(asked.peak / U)} times max_input"
+    return replace(asked, binding=f"{over}; from T = {up(asked.product / U)} on it is met")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -755,11 +755,5 @@ def _decimal(x: Fraction, up: bool = False) -> Fraction:
     return Fraction(math.ceil(scaled) if up else round(scaled)) / unit
 
 
-def _short(x: Fraction, rounding: str, digits: int = 6) -> str:
-    """Write a nonnegative rational with a few digits, rounded up or down."""
-    value = Context(prec=digits, rounding=rounding).divide(Decimal(x.numerator), Decimal(x.denominator))
-    return f"{float(value):.{digits}g}" if not x or 1e-300 < value < Decimal("1e300") else f"{value.normalize():g}"
-
-
 def _percent(part: Fraction, whole: Fraction) -> str:
-    return f"{_short(100 * part / whole, ROUND_CEILING, 4)}% of max_input"
+    return f"{up(100 * part / whole, 4)}% of max_input"

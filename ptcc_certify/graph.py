@@ -415,6 +415,13 @@ class SignedDigraph:
         """Return the weight of edge number ``edge`` exactly."""
         return self._weights.fraction(edge)
 
+    @cached_property
+    def weight_decades(self) -> int:
+        """How many powers of ten lie between the smallest and the largest size of a weight; 0 without edges."""
+        sizes = {abs(self._weights.fraction(int(i))) for i in np.unique(self._weights.table, return_index=True)[1]}
+        ratio = max(sizes) / min(sizes) if sizes else Fraction(1)
+        return len(str(ratio.numerator // ratio.denominator)) - 1
+
     def weight_table(self) -> tuple[np.ndarray | None, int]:
         """Return int64 numerators or float64 weights, in the order of the edges, and what divides them.
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ptcc_certify.disturbance import Adversary, Disturbance
 from ptcc_certify.errors import SimulationError
+from ptcc_certify.rounding import down, near, up
 
 if TYPE_CHECKING:
     from ptcc_certify.protocols import SlidingModeProtocol
@@ -88,8 +89,8 @@ class ReachingTime:
 
     def __repr__(self) -> str:
         if self.z is None:
-            return f"ReachingTime(T_r = {float(self.deadline):.6g})"
-        return f"ReachingTime({self.time:.6g}, {self.remaining:.3g} before T_r)"
+            return f"ReachingTime(T_r = {near(self.deadline)})"
+        return f"ReachingTime({up(Fraction(self.time))}, {down(self.remaining, 3)} before T_r)"
 
 
 def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:

@@ -46,6 +46,9 @@ LARGEST_PREFACTOR = 1e6
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
 _FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
+#: A bound is useful where it leaves this share of the error. One more candidate is taken for that, if all others need
+#: so many times more of the clock: it costs a proof, and tells which gains make a bound useful.
+USEFUL, _LATE = 0.01, 1.5
 #: Rates that differ by less, relatively, are the same.
 _SAME_RATE = 1e-6
 #: Beyond this prefactor a diagonal matrix is of no use to anybody.
@@ -247,6 +250,8 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
     """Return the fastest candidate of a useful prefactor, the best at each clock value, and the fastest diagonal one.
 
+    Besides, unless one of these is nearly as early, the one that first leaves a hundredth of the error.
+
     Examples
     --------
     >>> slow, fast = Candidate("perron", 1.0, 1.0), Candidate("full", 2.0, 100.0)
@@ -261,11 +266,20 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
         chosen.append(_fastest(diagonal))
+    if decaying := [c for c in candidates if c.rate > 0]:
+        first = min(decaying, key=_useful_from)
+        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
+            chosen.append(first)
     distinct: list[Candidate] = []
     for candidate in chosen:
         if not any(candidate is other for other in distinct):
             distinct.append(candidate)
     return distinct
+
+
+def _useful_from(candidate: Candidate) -> float:
+    """Return the clock value from which on a decaying candidate leaves the useful share."""
+    return (math.log(candidate.condition) - 2 * math.log(USEFUL)) / candidate.rate
 
 
 def _fastest(candidates: Sequence[Candidate]) -> Candidate:

@@ -273,8 +273,8 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...]):
         assert row["verdict"] == said["verdict"] == "certified"
         rate, limit = Fraction(said["rates"]["certified"]), Fraction(said["rates"]["limit"])
         assert Fraction(row["rate"]) <= rate <= Fraction(math.nextafter(row["rate"], math.inf))
-        assert Fraction(row["rate_limit"]) >= limit or row["rate_limit"] >= row["rate"]
-        assert Fraction(row["tightness"]) <= rate / Fraction(row["rate_limit"]) * (1 + Fraction(1, 10**15))
+        assert Fraction(math.nextafter(row["upper_bound"], 0)) < limit <= Fraction(row["upper_bound"])
+        assert Fraction(row["optimality_ratio"]) <= rate / Fraction(row["upper_bound"]) * (1 + Fraction(1, 10**15))
         assert Fraction(row["paper_rate"]) <= Fraction(said["rates"]["paper"])
         assert row["obligations"] == len(said["proof"])
         assert row["worst_ratio"] == said["unverified"]["simulation"]["worst_ratio"]
@@ -531,9 +531,9 @@ def test_no_name_of_a_file_breaks_a_table():
     ("options", "code", "column"),
     [
         ((), 0, ["", ""]),
-        (("--expect", "stability"), 3, ["holds", "refuted"]),
-        (("--expect", "bipartite-containment"), 3, ["refuted", "holds"]),
-        (("--min-rate", "1e-6"), 0, ["holds", "holds"]),
+        (("--expect", "stability"), 3, ["met", "refuted"]),
+        (("--expect", "bipartite-containment"), 3, ["refuted", "met"]),
+        (("--min-rate", "1e-6"), 0, ["met", "met"]),
         (("--min-rate", "1000"), 3, ["refuted", "refuted"]),
     ],
 )
@@ -544,12 +544,12 @@ def test_the_exit_code_is_that_of_the_worst_row(options: tuple[str, ...], code: 
     assert bool(run.err) == bool(code)
 
 
-def test_a_rate_that_is_neither_proved_nor_excluded_is_undecided():
+def test_a_rate_that_is_neither_proved_nor_excluded_is_left_open():
     (row,) = quickly("fig1b")
-    between = (row["rate"] + row["rate_limit"]) / 2
+    between = (row["rate"] + row["upper_bound"]) / 2
     run = ptcc("batch", "fig1b", "-o", "t.csv", "--min-rate", str(between), *QUICK)
     assert run.code == 4 and "1 of 1 graphs: undecided" in run.err
-    assert [row["asked"] for row in read_csv("t.csv")] == ["undecided"]
+    assert [row["asked"] for row in read_csv("t.csv")] == ["left open"]
 
 
 def test_without_a_file_the_table_is_printed():

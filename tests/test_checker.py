@@ -778,8 +778,9 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
     data, files = with_side_files(with_factors(large(name, 5, slides)))
     stops, passed = judge(data, 23, 0, False, files)
     assert sum(stops.values()) > 20
-    # Of the paper's function nothing is proved there.
-    assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT + r"|paper\.blocks", path)] == []
+    # Of the paper's function nothing is proved there, and voices may be known less well than they are.
+    allowed = OF_ITS_OWN_RIGHT + r"|paper\.blocks|outcome\.influence\.components\.\d+\.voices\.\d+\.(mid|radius)"
+    assert [path for path in passed if not re.match(allowed, path)] == []
 
 
 # ---------------------------------------------------------------------- factors of leader groups
@@ -992,6 +993,7 @@ OWN = {
     "ptcc_certify.enclosure",
     "ptcc_certify.errors",
     "ptcc_certify.input_bounds",
+    "ptcc_certify.rounding",
     "ptcc_certify.sparse_definite",
     "ptcc_certify.spectral_line",
 }

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short, shown
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import (
     Form,
@@ -22,6 +22,7 @@ from ptcc_certify.input_bounds import (
     peak_above,
     root_above,
 )
+from ptcc_certify.rounding import down, up
 from ptcc_certify.spectral_line import nonzero_spectrum_beyond, tractable
 
 KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
@@ -81,7 +82,7 @@ class EffortCheck(LyapunovCheck):
                 step = self.open(kind, "effort", ["z"], witness=True)
                 least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
                 need(exact(said[key]) >= least, "the bound is not proved")
-                self.done(f"at most {shown(exact(said[key]))}")
+                self.done(f"at most {up(exact(said[key]))}")
         for k, entry in enumerate(entries(said["residual"], "residual")):
             self._limited(entry, f"effort.residual[{k}]", said["peak"], bounds)
         self._disturbed(said["disturbed"], bounds)
@@ -110,7 +111,7 @@ class EffortCheck(LyapunovCheck):
             holds = not self.moving or (best is not None and exact(best) * k >= 2)
             need(said["bounded"] and holds, "no rate proves that the input stays bounded")
         elif by == "limit":
-            below = limit is not None and exact(limit) * k <= 2
+            below = limit is not None and exact(limit) * k < 2
             need(not said["bounded"] and below, "no limit of rates proves that the input grows")
         else:
             need(by == "spectrum", "another proof")
@@ -180,7 +181,7 @@ class EffortCheck(LyapunovCheck):
                 forms.append((row, q * p))
             failed = self.exact.bounded(P, forms)
             need(failed is None, f"the constant of agent {short(self.labels[failed or 0])} is not proved")
-            self.done(f"at most {shown(max(found[-1] or []))}")
+            self.done(f"at most {up(max(found[-1] or []))}")
         return found
 
     # ------------------------------------------------------------------ peak
@@ -204,7 +205,7 @@ class EffortCheck(LyapunovCheck):
         least = bounds.bound(peak_above, None, self._member(witness["norm"]), step["z"])
         least += root_above(sum((x * x for x in own), Fraction(0)))
         need(exact(said["norm"]) >= least, "the peak of the norm is not proved")
-        self.done(f"at most {shown(max(claimed))}, norm {shown(exact(said['norm']))}")
+        self.done(f"at most {up(max(claimed))}, norm {up(exact(said['norm']))}")
 
     def _own(self) -> list[Fraction]:
         """Return what the sliding-mode protocol adds to the input of every agent at most."""
@@ -277,7 +278,7 @@ class EffortCheck(LyapunovCheck):
             need(noise["norm"] >= bounds.root_constant(k, None) * left + whole, "what is left by noise is not proved")
             largest = exact(said["largest"]) + top * max(each)
             need(noise["largest"] >= largest, "the largest input under noise is not proved")
-        self.done(f"||E|| at most {shown(exact(said['norm']))} at the deadline")
+        self.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
 
     def _growth(self, form: Form, growth: Fraction) -> None:
         """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
@@ -324,4 +325,4 @@ class EffortCheck(LyapunovCheck):
             for label, x, row in zip(self.labels, drift, self.projection(), strict=True):
                 moved = delta * self.gain.T * sum(map(abs, row.values()), Fraction(0))
                 need(x >= moved, f"the drift of agent {short(label)} is not proved")
-        self.done(f"for every disturbance within {shown(delta)}")
+        self.done(f"for every disturbance within {down(delta)}")

@@ -28,6 +28,10 @@ OBLIGATIONS = {
     "prefactor": ("lowest I < P < highest I", "Rayleigh quotient"),
     "distance": ("(x_k - (Q x)_k)^2 <= c_k V for every agent, ||x - Q x||^2 <= c V", "Schur complement"),
     "rate-limit": ("H B + B'H > 0, B = A - (limit/2) I, H negative on the vectors", "inertia of Lyapunov equations"),
+    "rate-mean": (
+        "limit = 2 trace(A)/r, A the block of L of a strong component, r of whose eigenvalues are not 0",
+        "the least real part is not above the mean",
+    ),
     "sliding-bound": ("mu1 > delta, mu2, mu3 > 0, so the bound holds and sigma = 0 from T_r on", "Proposition 1"),
     "reaching-time": ("|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at z_k", "comparison with the adversary"),
     "input-threshold": (

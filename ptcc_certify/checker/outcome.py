@@ -18,11 +18,11 @@ from ptcc_certify.checker.reading import (
     need,
     same,
     short,
-    shown,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.enclosure import decay_integrals_below
+from ptcc_certify.rounding import up
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
@@ -138,7 +138,7 @@ class OutcomeCheck(StructureCheck):
         elif start is None:
             self.done("influence of leader groups")
         else:
-            self.done(f"enclosed, radius at most {shown(widest)}")
+            self.done(f"enclosed, radius at most {up(widest)}")
 
     def projection(self) -> list[dict[int, Fraction]]:
         """Return the rows of ``Q``, which are exact."""
