@@ -48,8 +48,8 @@ KEPT_BITS, INSTANT_BITS = 40, 24
 LATEST = 5_000
 #: Bounds below are raised to this, so that they can be written.
 LEAST = Fraction(1, 2**1200)
-#: By how much constants of full matrices are raised until they are proved.
-RAISES = (1e-9, 1e-6, 1e-3, 1.0)
+#: By how much constants of full matrices are raised, so that they are quick to prove.
+RAISE = Fraction(1, 2**30)
 
 Of = Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction]
 
@@ -462,28 +462,16 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     matrix = form.matrix or ()
     scale = math.lcm(*(x.denominator for row in matrix for x in row))
     P = [[int(x * scale) for x in row] for row in matrix]
-    top = max(abs(x) for row in P for x in row)
-    try:
-        inverse = np.linalg.inv(np.array([[x / top for x in row] for row in P]))
-    except np.linalg.LinAlgError:
+    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
+    if above is None:
         return None
-    place = {v: i for i, v in enumerate(form.nodes)}
-    exact = arithmetic()
-    for raise_ in RAISES:
-        sizes = np.abs(np.diag(inverse)) * (1 + raise_)
-        if not np.isfinite(sizes).all():
-            return None
-        try:
-            c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
-        except OverflowError:
-            return None
-        asked = []
-        for v, i in place.items():
-            p, q = (c[v] / scale).as_integer_ratio()
-            asked.append(([q * (j == i) for j in range(len(P))], q * p))
-        if exact.bounded(P, asked) is None:
-            return tuple(c)
-    return None
+    constants = [Fraction(0)] * n
+    try:
+        for v, value in zip(form.nodes, above, strict=True):
+            constants[v] = _kept(value * scale * (1 + RAISE))
+    except OverflowError:
+        return None
+    return tuple(constants)
 
 
 def _kept(x: Fraction) -> Fraction:
