@@ -28,8 +28,8 @@ FLINT_ROWS = 24
 FLINT_BITS = 40_000
 #: Above this many rows NumPy, where it is installed, forms factor and remainder, or solves.
 NUMPY_ROWS = 24
-#: Bits of entries up to which python-flint multiplies large matrices.
-LONGEST = 8_192
+#: Bits of all entries up to which python-flint multiplies large matrices.
+LONGEST = 500_000_000
 #: Bits of an inverse factor in floats, and how near it takes a matrix to the identity: ``2^-CONGRUENCE``.
 FLOAT_BITS, CONGRUENCE = 53, 30
 
@@ -239,11 +239,12 @@ class Flint(Standard):
             found = np.linalg.inv(np.linalg.cholesky(T)).T
         except np.linalg.LinAlgError:
             return None
-        if max(longest(S), longest(D)) > LONGEST or not np.isfinite(found).all():
-            return None
-        power = FLOAT_BITS - int(np.frexp(np.abs(found).max())[1])
         # Y = 2^-power U found, U diagonal, in integers: columns of S and D are multiplied by U first
         up = [max(halves) - half for half in halves]
+        bits = len(S) * longest(S) + len(D) * longest(D) + 2 * (len(S) + len(D)) * max(up)
+        if bits * len(S) > LONGEST or not np.isfinite(found).all():
+            return None
+        power = FLOAT_BITS - int(np.frexp(np.abs(found).max())[1])
         Y = matrix([[int(x) for x in row] for row in np.ldexp(found, power).tolist()])
         SU = matrix([[x << i + j for x, j in zip(row, up, strict=True)] for row, i in zip(S, up, strict=True)])
         G = [[int(x) for x in row] for row in (Y.transpose() * (SU * Y)).tolist()]
@@ -276,7 +277,7 @@ def floats(rows: Rows) -> tuple[Any, int]:
     --------
     >>> array, power = floats([[1, 2], [3, 10**400]])
     >>> [round(x * 2.0 ** (power - 1328), 3) for x in array[1].tolist()]
-    [0.0, 1.628]
+    [0.0, 1.707]
     """
     np = importlib.import_module("numpy")
     power = max(longest(rows) - 1000, 0)

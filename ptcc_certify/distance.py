@@ -30,10 +30,10 @@ from ptcc_certify.structure import Structure
 KEPT_BITS = 40
 #: How near a factor in floats must take a form to the identity for constants of agents, and for that of the norm.
 NEAR, FAR = 2.0**-30, 2.0**-12
-#: Below this a float may have lost digits.
-LEAST = Fraction(1, 2**900)
-#: By how much constants are raised, relatively, which covers the rounding of floats, and that of the norm besides.
-RAISE, NORM_RAISE = Fraction(1, 2**24), Fraction(1, 2**22)
+#: Below this squares of floats may have lost digits.
+LEAST = 2.0**-900
+#: By how much constants are raised, relatively, so that they are quick to prove; that of the norm instead.
+RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
 
 Integers = list[list[int]]
 
@@ -167,7 +167,7 @@ class OutcomeGeometry:
         return _rows(rows.transpose() * moved), Fraction(scale * unit**2)
 
     def _mean_form(self, p: Sequence[Fraction]) -> tuple[Integers, Fraction]:
-        """Return ``Z = G (P - p p' / p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``; and the scale."""
+        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``, and the scale."""
         (weights,), scale = _over_one_scale([p])
         (gauge,), total = (c.gauge or () for c in self._influence.balanced), sum(weights)
         Z = [
@@ -193,16 +193,18 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
     ``F > 0`` is not proved.
     """
     moved, power, apart = _factored(F, D)
-    values = [Fraction(x) * Fraction(4) ** power for x in (moved**2).sum(axis=1).tolist()]
-    if apart > NEAR or any(x < LEAST and any(d) for x, d in zip(values, D, strict=True)):
+    unit, sizes = Fraction(4) ** power, (moved**2).sum(axis=1).tolist()
+    if apart <= NEAR and all(x > LEAST or not any(d) for x, d in zip(sizes, D, strict=True)):
+        values = [Fraction(x) * unit * (1 + Fraction(64 * apart)) for x in sizes]
+    else:
         proved = arithmetic().above(F, D)
         if proved is None:
             return None
         values = proved
     norm = sum(values, Fraction(0))
     if apart <= FAR:
-        raised = 1 + max(NORM_RAISE, Fraction(8 * apart))
-        norm = min(norm, Fraction(float(np.linalg.norm(moved, 2))) ** 2 * Fraction(4) ** power * raised)
+        raised = 1 + max(NORM_RAISE, Fraction(64 * apart))
+        norm = min(norm, Fraction(float(np.linalg.norm(moved, 2))) ** 2 * unit * raised)
     return [x * (1 + RAISE) for x in (*values, norm)]
 
 
@@ -216,5 +218,5 @@ def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
         return np.zeros_like(rows), 0, math.inf
     with np.errstate(all="ignore"):
         moved = np.ldexp(rows, [-half for half in halves]) @ Z
-        apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max())
-    return (moved, power, apart) if np.isfinite(moved).all() else (np.zeros_like(rows), 0, math.inf)
+        apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
+    return (moved, power, apart) if np.isfinite((moved**2).sum()) else (np.zeros_like(rows), 0, math.inf)

@@ -405,7 +405,8 @@ def bound_effort(
     if own is not None:
         peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
     ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
-    entries = [_limited(bounds, usable, entry, distances, peak, noise) for entry in limits]
+    cap = None if influence is None or not influence.exact or not limits else largest_deviation(region, influence)
+    entries = [_limited(bounds, usable, entry, distances, cap, peak, noise) for entry in limits]
     return Effort(
         **effort,
         starts=starts,
@@ -552,15 +553,49 @@ def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) 
         return None
 
 
+def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+
+    Parameters
+    ----------
+    starts : Starts
+    influence : Influence
+        ``Q`` in rationals.
+
+    Returns
+    -------
+    Fraction
+        Exact for a point or a box, rounded up for an ellipsoid.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.outcomes import influence
+    >>> from ptcc_certify.structure import analyse
+    >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
+    >>> largest_deviation(Starts([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
+    Fraction(2, 1)
+    """
+    rows = []
+    for v in range(len(starts.center)):
+        row = {j: -Fraction(x) for j, x in influence.row(v).items()}
+        rows.append(row | {v: row.get(v, Fraction(0)) + 1})
+    return max(map(starts.largest, rows))
+
+
 def _limited(
     bounds: InputBounds,
     members: Sequence[int],
     limits: Limits,
     distances: Sequence[Sequence[Fraction] | None],
+    cap: Fraction | None,
     peak: Peak | None,
     noise: Fraction | None,
 ) -> Limited | None:
-    """Bound what is left at the deadline under limits of the gain; None if nothing is certified."""
+    """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
+
+    Unless the input is held no agent is farther from its outcome than ``cap``, the largest deviation at the start.
+    """
     gain = bounds.gain
     top = limits.largest_gain(gain)
     if top is None:
@@ -577,7 +612,10 @@ def _limited(
             norm = _kept(bounds.root_constant(k, None) * left)
             if found is None or norm < found.norm:
                 known = distances[k] if k < len(distances) else None
-                agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
+                sizes = [root_above(c) * left for c in known or ()]
+                if cap is not None and limits.sample_period is None:
+                    sizes = [min(x, cap) for x in sizes]
+                agents = None if known is None else tuple(map(_kept, sizes))
                 largest = None
                 if limits.sample_period is None:
                     largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
