@@ -51,7 +51,7 @@ _SAME_RATE = 1e-6
 #: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
 LARGEST_ENTRY = 2.0
 #: By what factor one more member must improve the bound of deviations at some instant.
-WORTH_A_MEMBER = 1.5
+WORTH_A_MEMBER = 1.25
 #: Beyond this prefactor a diagonal matrix is of no use to anybody.
 _HOPELESS = 1e15
 _MATRIX_BITS = 60
@@ -208,9 +208,10 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
             extra = None if near is None else prove_member(system, near)
     limit = min((c.upper for c in every), default=math.inf)
     members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate))
-    if extra is not None:  # it stands for no rate: the largest one is that of a member which is small in E
-        largest = max(m.rate for m in members) * (1 - Fraction(_SAME_RATE))
-        members.append(replace(extra, rate=min(extra.rate, largest)))
+    if extra is not None:  # the largest rate, and its prefactor, stay those of a member that is small in E
+        fastest = max(members, key=lambda m: (m.rate, -m.prefactor))
+        if extra.rate < fastest.rate or extra.prefactor >= fastest.prefactor:
+            members.append(replace(extra, rate=min(extra.rate, fastest.rate)))
     least = limit if math.isfinite(limit) else None
     return Sharpening(tuple(members), tried, least, tuple(notes), tuple(cut_off))
 
@@ -335,12 +336,14 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
 def _for_deviations(
     system: ErrorSystem, candidates: Sequence[Candidate], chosen: Sequence[Candidate], clocks: Sequence[float]
 ) -> Candidate | None:
-    """Return the matrix that bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
+    """Return, as a matrix in ``E``, what bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
 
     ``d`` obeys the equation of ``E``, ``d' = -gain A d``, and ``E = -A d``: a good Lyapunov matrix ``P`` in ``E`` is
     one for ``d`` too, namely ``A^-T P A^-1`` in ``E``. Judged by the bound of the largest entry of ``d`` at the clock
     values, from entries at random.
     """
+    if not any(c.kind == "full" for c in candidates):
+        return None
     A, U = system.matrix, np.eye(len(system.nodes)) if system.basis is None else system.basis
     own = U.T @ A @ U
     own /= np.abs(own).max()  # the scale is immaterial
