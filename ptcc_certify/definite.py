@@ -287,11 +287,13 @@ def floats(rows: Rows) -> tuple[Any, int]:
 def unit_diagonal(S: Rows) -> tuple[Any, list[int]]:
     """Return ``T_ij = 2^(-h_i - h_j) S_ij`` in floats, its diagonal between 1/4 and 1, and ``h``.
 
+    Entries of ``S`` that are smaller than the largest one by 300 decades are lost.
+
     Examples
     --------
-    >>> T, halves = unit_diagonal([[4, 1], [1, 10**400]])
-    >>> T.tolist()[0], halves
-    ([0.25, 0.0], [2, 665])
+    >>> T, halves = unit_diagonal([[4, 1], [1, 9]])
+    >>> T.tolist(), halves
+    ([[0.25, 0.0625], [0.0625, 0.5625]], [2, 2])
     """
     np = importlib.import_module("numpy")
     halves = [(S[i][i].bit_length() + 1) // 2 for i in range(len(S))]
