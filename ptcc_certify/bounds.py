@@ -16,7 +16,7 @@ from ptcc_certify.distance import DistanceBound
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain import Gain
-from ptcc_certify.outcomes import exact_start, influence
+from ptcc_certify.outcomes import Influence, exact_start, influence
 from ptcc_certify.rationals import shorten
 from ptcc_certify.sharpen import SharpMember
 from ptcc_certify.structure import Structure
@@ -443,6 +443,9 @@ class Envelope:
     def distance(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
 
+        The least of ``sqrt(c_k e^(-rate s) V(0))`` over the members, and never more than ``max_j |x_j(0) - (Q x0)_j|``:
+        ``x - Q x`` obeys the same equation as ``x``, and ``e^(-L s)`` does not expand the largest entry.
+
         Parameters
         ----------
         clock : (M,) array or float
@@ -479,13 +482,26 @@ class Envelope:
                     size = np.nan_to_num(constants(m.distance) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
                 bounds.append(_grown(size, m.rate, clock))
         if bounds:
-            return np.minimum.reduce(bounds)
+            most = self._largest_deviation(x0)
+            if len(bounds[0]) < len(x0):  # of the norm, which has N such entries
+                most *= math.sqrt(len(x0)) * (1 + 1e-15)
+            return np.minimum(np.minimum.reduce(bounds), most)
         return np.full((len(x0), *clock.shape), 0.0 if self._still else np.inf)
 
     @cached_property
     def _still(self) -> bool:
         """Whether no agent moves: every one is where it ends."""
         return not ErrorSystem(self.structure).nodes
+
+    @cached_property
+    def _influence(self) -> Influence:
+        return influence(self.structure)
+
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - (Q x0)_k|``, rounded up."""
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply(start)
+        return float_above(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
 
     @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
@@ -577,12 +593,12 @@ class Envelope:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
-        worst, matrix = 0.0, influence(self.structure)
+        worst = 0.0
         for column in range(states.shape[1]):
             x = states[:, column]
             size = self._unit(x[:, 0])
             bounds, start = self._distance_bounds(trajectory, x, size)
-            final, _ = matrix.apply(start)
+            final, _ = self._influence.apply(start)
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
             norm = np.linalg.norm(excess, axis=0)

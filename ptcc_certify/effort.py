@@ -48,8 +48,8 @@ KEPT_BITS, INSTANT_BITS = 40, 24
 LATEST = 5_000
 #: Bounds below are raised to this, so that they can be written.
 LEAST = Fraction(1, 2**1200)
-#: By how much constants of full matrices are raised until they are proved.
-RAISES = (1e-9, 1e-6, 1e-3, 1.0)
+#: By how much constants of full matrices are raised, so that they are quick to prove.
+RAISE = Fraction(1, 2**30)
 
 Of = Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction]
 
@@ -405,7 +405,8 @@ def bound_effort(
     if own is not None:
         peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
     ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
-    entries = [_limited(bounds, usable, entry, distances, peak, noise) for entry in limits]
+    cap = None if influence is None or not influence.exact or not limits else largest_deviation(region, influence)
+    entries = [_limited(bounds, usable, entry, distances, cap, peak, noise) for entry in limits]
     return Effort(
         **effort,
         starts=starts,
@@ -471,28 +472,16 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     matrix = form.matrix or ()
     scale = math.lcm(*(x.denominator for row in matrix for x in row))
     P = [[int(x * scale) for x in row] for row in matrix]
-    top = max(abs(x) for row in P for x in row)
-    try:
-        inverse = np.linalg.inv(np.array([[x / top for x in row] for row in P]))
-    except np.linalg.LinAlgError:
+    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
+    if above is None:
         return None
-    place = {v: i for i, v in enumerate(form.nodes)}
-    exact = arithmetic()
-    for raise_ in RAISES:
-        sizes = np.abs(np.diag(inverse)) * (1 + raise_)
-        if not np.isfinite(sizes).all():
-            return None
-        try:
-            c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
-        except OverflowError:
-            return None
-        asked = []
-        for v, i in place.items():
-            p, q = (c[v] / scale).as_integer_ratio()
-            asked.append(([q * (j == i) for j in range(len(P))], q * p))
-        if exact.bounded(P, asked) is None:
-            return tuple(c)
-    return None
+    constants = [Fraction(0)] * n
+    try:
+        for v, value in zip(form.nodes, above, strict=True):
+            constants[v] = _kept(value * scale * (1 + RAISE))
+    except OverflowError:
+        return None
+    return tuple(constants)
 
 
 def _kept(x: Fraction) -> Fraction:
@@ -573,15 +562,49 @@ def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) 
         return None
 
 
+def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+
+    Parameters
+    ----------
+    starts : Starts
+    influence : Influence
+        ``Q`` in rationals.
+
+    Returns
+    -------
+    Fraction
+        Exact for a point or a box, rounded up for an ellipsoid.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.outcomes import influence
+    >>> from ptcc_certify.structure import analyse
+    >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
+    >>> largest_deviation(Starts([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
+    Fraction(2, 1)
+    """
+    rows = []
+    for v in range(len(starts.center)):
+        row = {j: -Fraction(x) for j, x in influence.row(v).items()}
+        rows.append(row | {v: row.get(v, Fraction(0)) + 1})
+    return max(map(starts.largest, rows))
+
+
 def _limited(
     bounds: InputBounds,
     members: Sequence[int],
     limits: Limits,
     distances: Sequence[Sequence[Fraction] | None],
+    cap: Fraction | None,
     peak: Peak | None,
     noise: Fraction | None,
 ) -> Limited | None:
-    """Bound what is left at the deadline under limits of the gain; None if nothing is certified."""
+    """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
+
+    Unless the input is held no agent is farther from its outcome than ``cap``, the largest deviation at the start.
+    """
     gain = bounds.gain
     top = limits.largest_gain(gain)
     if top is None:
@@ -598,7 +621,10 @@ def _limited(
             norm = _kept(bounds.root_constant(k, None) * left)
             if found is None or norm < found.norm:
                 known = distances[k] if k < len(distances) else None
-                agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
+                sizes = [root_above(c) * left for c in known or ()]
+                if cap is not None and limits.sample_period is None:
+                    sizes = [min(x, cap) for x in sizes]
+                agents = None if known is None else tuple(map(_kept, sizes))
                 largest = None
                 if limits.sample_period is None:
                     largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))

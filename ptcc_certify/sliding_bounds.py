@@ -31,6 +31,7 @@ from ptcc_certify.bounds import (
     Member,
     as_exact,
     clock_values,
+    float_above,
     remaining_part,
 )
 from ptcc_certify.errors import ParameterError
@@ -301,7 +302,22 @@ class SlidingEnvelope(Envelope):
                 bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
                 norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
         size = sliding_bound(self.protocol, self.sigma0, z) / unit
-        return bounds + size, norm + _column_norms(size)
+        bounds, norm = bounds + size, norm + _column_norms(size)
+        if any(m.distance is not None for m in self.members):
+            most = self._largest_deviation(x0) / unit * (1 + 1e-15)
+            bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
+        return bounds, norm
+
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - outcome_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
+
+        ``x - outcome`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
+        expand the largest entry.
+        """
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply([x - sigma for x, sigma in zip(start, self.sigma0, strict=True)])
+        gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
+        return float_above(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
 
     def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.

@@ -114,8 +114,7 @@ def _rate_lines(certificate: Certificate) -> list[str]:
     lines += _class_lines(certificate)
     lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     lines += _distance_lines(certificate)
-    balls = not certificate.direct or any(m.distance is not None for m in certificate.envelope.members)
-    arithmetic = "exact or ball arithmetic" if balls else "exact arithmetic"
+    arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
     said = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"
     report = certificate.checked
     if report is not None:

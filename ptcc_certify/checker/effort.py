@@ -264,8 +264,10 @@ class EffortCheck(LyapunovCheck):
             distance = self.data["lyapunov"]["members"][k]["distance"]
             need(distance is not None, "distances without constants")
             roots = map(root_above, self._each(distance["agents"], "agents"))
+            most = None if period is not None else self._largest_deviation(bounds.starts)
             for label, x, root in zip(self.labels, self._each(said["agents"], "agents"), roots, strict=True):
-                need(x >= root * left, f"what is left of agent {short(label)} is not proved")
+                kept = most is not None and x >= most
+                need(kept or x >= root * left, f"what is left of agent {short(label)} is not proved")
         need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
         if said["largest"] is not None:
             ends = [top * max(bounds.held)] + ([exact(peak["largest"])] if peak is not None else [])
@@ -279,6 +281,11 @@ class EffortCheck(LyapunovCheck):
             largest = exact(said["largest"]) + top * max(each)
             need(noise["largest"] >= largest, "the largest input under noise is not proved")
         self.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
+
+    def _largest_deviation(self, starts: Starts) -> Fraction:
+        """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
+        rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(self.projection())]
+        return max(map(starts.largest, rows))
 
     def _growth(self, form: Form, growth: Fraction) -> None:
         """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
