@@ -35,7 +35,7 @@ from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.gain import parameter
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.input_bounds import Form
+from ptcc_certify.input_bounds import Form, PrescribedGain
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
@@ -293,12 +293,42 @@ class Certificate:
             start=self.start,
             starts=self.starts,
             sigma0=self.sigma0,
+            reaching=None if self.reaching is None else [r.z for r in self.reaching],
             influence=self.influence,
             distances=[None if m.distance is None else m.distance.agents for m in self.envelope.members],
             limits=self.limits,
             delta=self.delta,
             noise=self.noise,
         )
+
+    @cached_property
+    def input_range(self) -> tuple[Fraction | float, Fraction | None]:
+        """Proved bounds of the largest ``|u_k|`` of all agents, starts, noise and disturbances that were asked about.
+
+        Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
+        attained or approached: at the start, or where noise meets the largest gain, without a limit an infinite one.
+        The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
+        under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` grows no further where the gain rests.
+        """
+        effort = self.effort
+        if effort is None:
+            return Fraction(0), None
+        gain = PrescribedGain(self.protocol.T, self.protocol.rho1, self.protocol.rho2 * self.protocol.kappa)
+        tops = [top for entry in self.limits if (top := entry.largest_gain(gain)) is not None]
+        share = min([Fraction(1), *(top / (gain.rho1 + gain.k / gain.T) for top in tops)])
+        least: Fraction | float = (effort.first or Fraction(0)) * share
+        if self.noise is not None and not self.constant:
+            rows = self.graph.exact_rows(range(self.graph.n_nodes))
+            heard = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
+            least = max(least, 2 * heard * self.noise * min(tops)) if tops else math.inf
+        if self.limits:
+            known = [e.largest if self.noise is None else e.noisy_largest for e in effort.residual]
+            most = None if len(known) < len(self.limits) or None in known else max(x for x in known if x is not None)
+        else:
+            most = None if effort.peak is None or self.noise is not None else effort.peak.largest
+        if most is not None and self.delta is not None:
+            most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
+        return least, most
 
     @cached_property
     def worst_start(self) -> WorstStart | None:
@@ -520,6 +550,7 @@ def certify(
         ``||X(0)||_inf <= R``.
     limits : sequence of Actuator
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
         Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
     noise : number, optional
