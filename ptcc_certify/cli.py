@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import signal
 import sys
@@ -803,24 +804,19 @@ def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fractio
 
 
 def _input_code(certificate: Certificate, most: Fraction | None) -> int:
-    """Return the exit code of --max-input; with limits of the gain, of the input under these."""
+    """Return the exit code of --max-input: of the input under all that the command says of limits, noise and delta."""
     effort = certificate.effort
     if most is None or certificate.constant:
         return OK
-    if effort is not None and certificate.limits:
-        proved = [entry.largest for entry in effort.residual]
-        if len(proved) == len(certificate.limits) and all(x is not None and x <= most for x in proved):
-            return OK
-    elif effort is not None and effort.peak is not None and effort.peak.largest <= most:
+    least, proved = certificate.input_range
+    if proved is not None and proved <= most:
         return OK
-    if effort is not None and effort.first is not None:
-        p = certificate.protocol
-        gain = p.rho1 + p.rho2 * p.kappa / p.T
-        caps = [limits.gain_cap for limits in certificate.limits if limits.gain_cap is not None]
-        first = effort.first * min([Fraction(1), *(cap / gain for cap in caps)])
-        if first > most:
-            click.echo(f"refuted: the input is up to {float(first):.6g} at the start (proved)", err=True)
-            return REFUTED_EXPECTATION
+    if least > most:
+        first = effort is not None and effort.first is not None and effort.first >= least
+        size = f"up to {float(least):.6g}" if least < math.inf else "without limit"
+        where = "at the start" if first else "by noise alone"
+        click.echo(f"refuted: the input is {size} {where} (proved)", err=True)
+        return REFUTED_EXPECTATION
     if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
         click.echo("refuted: from some of these starts the input grows without limit (proved)", err=True)
         return REFUTED_EXPECTATION
