@@ -296,6 +296,7 @@ class Certificate:
             start=self.start,
             starts=self.starts,
             sigma0=self.sigma0,
+            reaching=None if self.reaching is None else [r.z for r in self.reaching],
             influence=self.influence,
             distances=[None if m.distance is None else m.distance.agents for m in self.envelope.members],
             limits=self.limits,
@@ -531,6 +532,7 @@ def certify(
         ``||X(0)||_inf <= R``.
     limits : sequence of Actuator
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
         Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
     noise : number, optional

@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.checker import MANY_COMPONENTS, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, digest
 from ptcc_certify.dominance import DominantMember
-from ptcc_certify.effort import Peak, effort_section, peak_witness
+from ptcc_certify.effort import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
 from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
@@ -596,6 +596,8 @@ def obligation_section(obligation: Obligation, certificate: Certificate, out: Wr
     witness = obligation.witness
     if isinstance(witness, DominantMember):
         witness = _dominance_witness(witness, out)
+    elif isinstance(witness, EnergyIntegral):
+        witness = energy_witness(witness, format_exact)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, certificate.graph.labels, format_exact)
     elif isinstance(witness, EnclosedOutcome):

@@ -8,7 +8,9 @@ parameters are chosen, in floating point.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -18,18 +20,22 @@ import numpy as np
 
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.definite import arithmetic
+from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.input_bounds import (
+    LAST_PERIODS,
     Form,
     InputBounds,
     Limits,
+    Of,
     PrescribedGain,
+    Reaching,
+    Rows,
     Starts,
-    decay_above,
     energy_above,
+    integral_above,
     length_above,
-    limited_rate,
     peak_above,
     root_above,
     rounded,
@@ -51,7 +57,11 @@ LEAST = Fraction(1, 2**1200)
 #: By how much constants of full matrices are raised, so that they are quick to prove.
 RAISE = Fraction(1, 2**30)
 
-Of = Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction]
+#: Periods below this share of ``T`` are not tried; how often the interval of the longest one is halved, and which
+#: shares of it are proved, one after the other, until one is.
+SHORTEST_SHARE, PERIOD_STEPS, PERIOD_SHARES = 1e-12, 12, (0.999, 0.99, 0.9, 0.5)
+#: Bits of the matrices that bound the energy, and by how much these exceed what solves the equations.
+MATRIX_BITS, EXCESSES = 48, (1e-6, 1e-4, 1e-2)
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,20 @@ class Witness:
     value: Fraction
     member: int
     z: Fraction
+
+
+@dataclass(frozen=True)
+class EnergyIntegral:
+    """A bound of the energy from two Lyapunov equations, ``L'W + W L - c W >= m I`` with ``c = 0`` and ``c = 1/k``.
+
+    ``p`` says how the gain is split between them, see :func:`ptcc_certify.input_bounds.integral_above`; ``matrices``
+    are the two ``W``, in integers, and ``least`` the two ``m``.
+    """
+
+    value: Fraction
+    p: Fraction
+    matrices: tuple[Rows, Rows]
+    least: tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True)
@@ -136,14 +160,17 @@ class Effort:
         ``c_k`` of every member with a full matrix, ``e_k^2 <= c_k V``.
     peak : Peak or None
         None: not bounded, or not proved.
-    energy, path_length : Witness or None
-        Bounds of ``int ||u||^2 dt`` and ``int ||u|| dt`` (of the nominal part).
+    energy : EnergyIntegral, Witness or None
+        Bound of ``int ||u||^2 dt`` (of the nominal part).
+    path_length : Witness or None
+        Bound of ``int ||u|| dt`` (of the nominal part).
     sliding : SlidingPart or None
         Bounds of the sliding part of the input; None under the nominal protocol, or if ``sigma(0)`` is not known.
     residual : tuple of Limited
         Of those limits under which something is certified.
     longest_period : Fraction or None
-        Where sampling is not certified: a period, with the same largest gain, up to which it would be.
+        Where sampling is not certified, ``||E||`` being proved to be no larger at the deadline than at first: a period
+        with which it would be, near to the longest one.
     disturbed : Disturbed or None
         What disturbances within ``delta`` add under the nominal protocol; None if none was given.
     first : Fraction or None
@@ -176,7 +203,7 @@ class Effort:
     starts: Starts | None
     constants: tuple[tuple[Fraction, ...] | None, ...]
     peak: Peak | None = None
-    energy: Witness | None = None
+    energy: Witness | EnergyIntegral | None = None
     path_length: Witness | None = None
     sliding: SlidingPart | None = None
     residual: tuple[Limited, ...] = ()
@@ -198,7 +225,10 @@ class Effort:
         if self.peak is not None:
             found.append(Obligation("input-peak", "effort", {"z": self.peak.norm_how.z}, self.peak))
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
-            if bound is not None:
+            if isinstance(bound, EnergyIntegral):
+                numbers = {"p": bound.p, "m0": bound.least[0], "m1": bound.least[1]}
+                found.append(Obligation(kind, "effort", numbers, bound))
+            elif bound is not None:
                 found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
         for k, entry in enumerate(self.residual):
             witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
@@ -345,6 +375,7 @@ def bound_effort(
     start: Sequence[Fraction] | None = None,
     starts: Starts | None = None,
     sigma0: Sequence[Fraction] | None = None,
+    reaching: Sequence[Fraction | None] | None = None,
     influence: Influence | None = None,
     distances: Sequence[Sequence[Fraction] | None] = (),
     limits: Sequence[Limits] = (),
@@ -364,6 +395,8 @@ def bound_effort(
     start, starts
         ``X(0)``, or a set of starts instead.
     sigma0 : sequence of Fraction or None
+    reaching : sequence of (Fraction or None), optional
+        Proved reaching times ``ln(T_r/(T_r - t))`` of the agents; without them, and for None, ``T_r``.
     influence : Influence, optional
         ``Q``, for the drift under disturbances.
     distances : sequence
@@ -387,18 +420,8 @@ def bound_effort(
         return Effort(**effort, starts=None, constants=(None,) * len(forms))
     constants = tuple(None if f is None or f.matrix is None else _proved_constants(f, n) for f in forms)
     region = starts or Starts(tuple(center))
-    if sigma0 is not None:
-        moved = tuple(x - s for x, s in zip(region.center, sigma0, strict=True))
-        region = Starts(moved, region.radius, region.axes)
-    bounds = InputBounds(
-        structure.graph.exact_rows(range(n)),
-        gain,
-        forms,
-        constants,
-        region,
-        [abs(s) for s in sigma0 or ()] if any(sigma0 or ()) else (),
-        protocol.T_s if isinstance(protocol, SlidingModeProtocol) else Fraction(0),
-    )
+    driven = _reaching(protocol, sigma0, reaching)
+    bounds = InputBounds(structure.graph.exact_rows(range(n)), gain, forms, constants, region, driven)
     usable = [k for k, f in enumerate(forms) if f is not None and f.rate > 0 and _usable(bounds, k)]
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None
@@ -406,16 +429,17 @@ def bound_effort(
         peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
     ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
     cap = None if influence is None or not influence.exact or not limits else largest_deviation(region, influence)
+    energies = (_integral(structure, bounds), _least(bounds, energy_above, ample))
     entries = [_limited(bounds, usable, entry, distances, cap, peak, noise) for entry in limits]
     return Effort(
         **effort,
         starts=starts,
         constants=constants,
         peak=peak,
-        energy=_least(bounds, energy_above, ample),
+        energy=min((e for e in energies if e is not None), key=lambda e: e.value, default=None),
         path_length=_least(bounds, length_above, usable),
         residual=tuple(entry for entry in entries if entry is not None),
-        longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
+        longest_period=_longest_period(bounds, usable, limits, entries),
         disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
         first=first_input(structure, protocol, region),
     )
@@ -498,6 +522,78 @@ def _kept(x: Fraction) -> Fraction:
     return value
 
 
+def _reaching(
+    protocol: Protocol, sigma0: Sequence[Fraction] | None, times: Sequence[Fraction | None] | None
+) -> Reaching | None:
+    """Return how the sliding variables move; None if they do not."""
+    if not isinstance(protocol, SlidingModeProtocol) or not any(sigma0 or ()):
+        return None
+    last = [None] if times is None else [z for z, s in zip(times, sigma0 or (), strict=True) if s]
+    return Reaching(
+        sigma0 or (),
+        protocol.T_r,
+        protocol.T_s,
+        protocol.mu2,
+        protocol.mu3 * protocol.kappa,
+        protocol.mu1 + protocol.delta,
+        None if None in last else max(z for z in last if z is not None),
+    )
+
+
+def _integral(structure: Structure, bounds: InputBounds) -> EnergyIntegral | None:
+    """Bound the energy by two Lyapunov equations; None if it is infinite, or floats do not solve them well enough."""
+    if bounds.reaching is not None:
+        return None
+    gain = bounds.gain
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a singular equation: what comes of it is judged by its remainder
+            system = ErrorSystem(structure)
+            (first, m0), (second, m1) = (_lyapunov(system, c) for c in (0.0, nearest_float(1 / gain.k)))
+        even, grown = bounds.largest_form(first) / m0, bounds.largest_form(second) / m1
+        # The best p is ln(grown / even).
+        most = gain.rho1 * gain.T / gain.k
+        wanted = max(_log(grown) - _log(even), 0.0) if even and grown else 0.0
+        p = min(rounded(Fraction(wanted), INSTANT_BITS), most)
+        return EnergyIntegral(_kept(integral_above(gain, even, grown, p)), p, (first, second), (m0, m1))
+    except (np.linalg.LinAlgError, ValueError, OverflowError):
+        return None
+
+
+def _lyapunov(system: ErrorSystem, c: float) -> tuple[Rows, Fraction]:
+    """Return ``W`` in integers and ``m`` with ``A'W + W A - c W > m I`` on the subspace of ``E``, near to equality.
+
+    The remainder is formed in floats, after rounding; what these may be off by is left between it and ``m``, so that
+    the independent check proves it.
+
+    Raises
+    ------
+    ValueError
+        Floats do not find such a ``W > 0``.
+    """
+    from scipy.linalg import solve_continuous_lyapunov
+
+    A, basis = system.matrix, system.basis
+    B = np.eye(len(A)) if basis is None else basis
+    inner = B.T @ A @ B - c / 2 * np.eye(B.shape[1])
+    W = B @ solve_continuous_lyapunov(inner.T, np.eye(B.shape[1])) @ B.T
+    order = np.argsort(system.nodes)
+    W, A, B = W[np.ix_(order, order)], A[np.ix_(order, order)], B[order]
+    top = float(np.abs(W).max())
+    if not 0 < top < 1e100:
+        raise ValueError("the equation is not solved")
+    unit = 2.0 ** (MATRIX_BITS - math.ceil(math.log2(top)))
+    W = np.round((W + W.T) / 2 * unit) / unit
+    least = [float(np.linalg.eigvalsh(B.T @ S @ B)[0]) for S in (W, W @ A + A.T @ W - c * W)]
+    size = float(np.linalg.norm(W))
+    noise = 100 * len(A) * 2.0**-52 * size * np.array([1.0, 2 * float(np.linalg.norm(A)) + c])
+    for excess in EXCESSES:
+        if least[0] > noise[0] and least[1] - noise[1] > 1 - excess:
+            rows = [[Fraction(int(x)) for x in row] for row in (W * unit).tolist()]
+            return rows, rounded(Fraction(unit * (1 - excess)), INSTANT_BITS)
+    raise ValueError("the equation is not solved well enough")
+
+
 def _usable(bounds: InputBounds, k: int) -> bool:
     try:
         bounds.constant(k)
@@ -513,7 +609,9 @@ def _log(x: Fraction) -> float:
 
 
 def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
-    """Return ``z`` where what is held meets what decays: the instant that serves the bounds best."""
+    """Return ``z`` where what is held meets what decays, the instant that serves the bounds best; 0 while driven."""
+    if bounds.reaching is not None:
+        return 0.0
     held = bounds.held_norm if agent is None else bounds.held[agent]
     start = bounds.root_constant(k, agent) * bounds.start(k)
     if not held or not start:
@@ -530,16 +628,21 @@ def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
 
 
 def _best(bounds: InputBounds, of: Of, agent: int | None, members: Sequence[int]) -> Witness | None:
-    """Return the bound of the member whose decay takes over first, which is the least peak."""
-    found = sorted((_crossing(bounds, agent, k), bounds.root_constant(k, agent) * bounds.start(k), k) for k in members)
-    for z, _, k in found:
+    """Return the bound of the member whose decay takes over first, which is the least peak; the least while driven."""
+    found: Witness | None = None
+    order = sorted((_crossing(bounds, agent, k), bounds.root_constant(k, agent) * bounds.start(k), k) for k in members)
+    for z, _, k in order:
         if z <= LATEST:
             instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
             try:
-                return Witness(_kept(bounds.bound(of, agent, k, instant)), k, instant)
+                own = Witness(_kept(bounds.bound(of, agent, k, instant)), k, instant)
             except (ValueError, OverflowError):
                 continue
-    return None
+            if found is None or own.value < found.value:
+                found = own
+            if bounds.reaching is None:
+                break
+    return found
 
 
 def _least(bounds: InputBounds, of: Of, members: Sequence[int]) -> Witness | None:
@@ -604,6 +707,7 @@ def _limited(
     """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
 
     Unless the input is held no agent is farther from its outcome than ``cap``, the largest deviation at the start.
+    With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at first.
     """
     gain = bounds.gain
     top = limits.largest_gain(gain)
@@ -612,13 +716,14 @@ def _limited(
     clock = limits.clock_below(gain)
     found: Limited | None = None
     for k in members:
-        form = bounds.form(k)
         growth = Fraction(0) if limits.sample_period is None else step_growth(bounds, k)
-        if growth is None or (rate := limited_rate(form.rate, growth, limits, gain)) <= 0:
+        if growth is None:
             continue
-        left = decay_above(rate / 2 * clock) * bounds.start(k)
         try:
+            left = bounds.share(k, limits, clock, growth) * bounds.start(k)
             norm = _kept(bounds.root_constant(k, None) * left)
+            if limits.sample_period is not None and norm > bounds.first:
+                continue
             if found is None or norm < found.norm:
                 known = distances[k] if k < len(distances) else None
                 sizes = [root_above(c) * left for c in known or ()]
@@ -629,7 +734,7 @@ def _limited(
                 if limits.sample_period is None:
                     largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
                 found = Limited(limits, clock, k, growth, norm, agents, largest)
-        except OverflowError:
+        except (ValueError, OverflowError):
             continue
     if found is None or noise is None or limits.sample_period is not None:
         return found
@@ -650,12 +755,64 @@ def _with_noise(bounds: InputBounds, members: Sequence[int], found: Limited, top
     return result
 
 
-def _longest_period(bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits]) -> Fraction | None:
-    """Return the largest ``rate / (growth largest_gain)``, rounded down; None if nothing else limits the gain."""
-    tops = [Limits(entry.gain_cap, entry.stop_before).largest_gain(bounds.gain) for entry in limits]
-    growths = [(bounds.form(k).rate, step_growth(bounds, k)) for k in members]
-    found = [rate / (m * top) for rate, m in growths if m for top in tops if top is not None]
-    return rounded(max(found), INSTANT_BITS) if found else None
+def _longest_period(
+    bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits], found: Sequence[Limited | None]
+) -> Fraction | None:
+    """Return a period of four digits with which all is certified that is not, near to the longest; None if none is."""
+    failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
+    if not failed or any(entry.sample_period is None for entry in failed) or not bounds.first:
+        return None
+    growths = [(k, m) for k in members if (m := step_growth(bounds, k)) is not None]
+    sizes = {k: _log(bounds.root_constant(k, None) * bounds.start(k)) - _log(bounds.first) for k, _ in growths}
+
+    def excess(limits: Limits, period: float) -> float:
+        logs = (sizes[k] + _log_share(bounds.gain, limits, period, bounds.form(k).rate, m) for k, m in growths)
+        return min(logs, default=math.inf)
+
+    def proved(limits: Limits, period: Fraction) -> bool:
+        sampled = replace(limits, sample_period=period)
+        with contextlib.suppress(ValueError, OverflowError):
+            for k, m in growths:
+                left = bounds.share(k, sampled, Fraction(0), m) * bounds.start(k)
+                if _kept(bounds.root_constant(k, None) * left) <= bounds.first:
+                    return True
+        return False
+
+    longest: list[Fraction] = []
+    for entry in failed:
+        high = nearest_float(entry.sample_period or bounds.gain.T)
+        shortest = SHORTEST_SHARE * nearest_float(bounds.gain.T)
+        low = high / 2
+        while low >= shortest and excess(entry, low) > 0:
+            high, low = low, low / 2
+        for _ in range(PERIOD_STEPS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if excess(entry, middle) <= 0 else (low, middle)
+        for share in PERIOD_SHARES:
+            period = Fraction(f"{low * share:.3e}")
+            if low >= shortest and proved(entry, period):
+                longest.append(period)
+                break
+        else:
+            return None
+    return min(longest)
+
+
+def _log_share(gain: PrescribedGain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
+    """Return the logarithm of the bound of ``sqrt(V)`` over ``sqrt(V(0))`` if the gain is held, in floating point."""
+    T, rho1, k, b, m = map(nearest_float, (gain.T, gain.rho1, gain.k, rate, growth))
+    cap = math.inf if limits.gain_cap is None else nearest_float(limits.gain_cap)
+    end = T - nearest_float(limits.stop_before or Fraction(0))
+    count = math.ceil(end / period * (1 - 1e-12))
+    first = max(count - LAST_PERIODS, 0)
+    # Before the last periods the gain changes little from one to the next: they are counted by the thousand.
+    edges = np.unique(np.append(np.geomspace(1, first + 1, 1000).astype(np.int64), 1)) - 1 if first else np.array([0])
+    starts = np.append(first - edges[::-1], np.arange(first + 1, count))
+    times = np.diff(starts, append=count)
+    at = starts * period
+    eta = np.minimum(rho1 + k / (T - at), cap) * np.minimum(period, end - at)
+    with np.errstate(all="ignore"):
+        return float(np.sum(times * np.log(np.maximum(1 - eta * b + eta**2 * m, 1e-300))) / 2)
 
 
 def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
@@ -863,3 +1020,9 @@ def peak_witness(peak: Peak, labels: Sequence[str], text: Callable[[Fraction], s
     """Return what proves the peaks: a member and an instant for every agent, and for the norm."""
     agents = {label: [how.member, text(how.z)] for label, how in zip(labels, peak.how, strict=True)}
     return {"agents": agents, "norm": peak.norm_how.member}
+
+
+def energy_witness(energy: EnergyIntegral, text: Callable[[Fraction], str]) -> dict[str, list[list[str]]]:
+    """Return the lower triangles of the matrices that prove the energy."""
+    first, second = ([[text(x) for x in row[: i + 1]] for i, row in enumerate(W)] for W in energy.matrices)
+    return {"W0": first, "W1": second}

@@ -23,7 +23,18 @@ from ptcc_certify.checker import CheckReport, check, read
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.vectors import Numbers, SideFiles, beside
 from ptcc_certify.distance import DistanceBound
-from ptcc_certify.effort import Disturbed, Effort, Limited, Limits, Peak, SlidingPart, Starts, Witness, first_input
+from ptcc_certify.effort import (
+    Disturbed,
+    Effort,
+    EnergyIntegral,
+    Limited,
+    Limits,
+    Peak,
+    SlidingPart,
+    Starts,
+    Witness,
+    first_input,
+)
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graph import SignedDigraph, Weights
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
@@ -619,7 +630,7 @@ class _Reader:
             starts=self._starts(said["starts"]),
             constants=tuple(map(by_agent, said["constants"])),
             peak=self._peak(said["peak"]),
-            energy=self._witness(said["energy"], "input-energy"),
+            energy=self._energy(said["energy"]),
             path_length=self._witness(said["path_length"], "input-length"),
             sliding=None if sliding is None else SlidingPart(sliding["bounded"], by_agent(sliding["agents"])),
             residual=tuple(self._limited(k, entry) for k, entry in enumerate(said["residual"])),
@@ -641,6 +652,15 @@ class _Reader:
             return None
         step = self.steps[kind, "effort"]
         return Witness(exact(said), step["witness"], exact(step["numbers"]["z"]))
+
+    def _energy(self, said: str | None) -> Witness | EnergyIntegral | None:
+        step = self.steps.get(("input-energy", "effort"))
+        if said is None or step is None or not isinstance(step["witness"], dict):
+            return self._witness(said, "input-energy")
+        rows = [step["witness"][key] for key in ("W0", "W1")]
+        first, second = (triangle(lower, len(lower)) for lower in rows)
+        p, m0, m1 = (exact(step["numbers"][key]) for key in ("p", "m0", "m1"))
+        return EnergyIntegral(exact(said), p, (first, second), (m0, m1))
 
     def _peak(self, said: Document | None) -> Peak | None:
         if said is None:

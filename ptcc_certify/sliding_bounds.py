@@ -191,7 +191,7 @@ class SlidingEnvelope(Envelope):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
         kept = bool((trajectory.reaching_z <= certain + late).all())
         z = self._z(trajectory)
-        bound, size = sliding_bound(self.protocol, self.sigma0, z), np.abs(sigma0).max(initial=0.0)
+        bound, size = sliding_bound(self.protocol, self.sigma0, z, self.reaching), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(excess > 0, excess / bound, 0.0)
@@ -242,7 +242,7 @@ class SlidingEnvelope(Envelope):
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = sliding_bound(self.protocol, self.sigma0, knots) / unit
+        size = sliding_bound(self.protocol, self.sigma0, knots, self.reaching) / unit
         forcing = _column_norms(B @ size)
         s = self._clock_at(knots)
         step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
@@ -301,7 +301,7 @@ class SlidingEnvelope(Envelope):
             with np.errstate(invalid="ignore", over="ignore"):
                 bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
                 norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
-        size = sliding_bound(self.protocol, self.sigma0, z) / unit
+        size = sliding_bound(self.protocol, self.sigma0, z, self.reaching) / unit
         bounds, norm = bounds + size, norm + _column_norms(size)
         if any(m.distance is not None for m in self.members):
             most = self._largest_deviation(x0) / unit * (1 + 1e-15)

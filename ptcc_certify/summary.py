@@ -207,7 +207,7 @@ def _effort_lines(certificate: Certificate) -> list[str]:
     if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
         lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
     if effort.longest_period is not None:
-        lines.append(_line("limited", f"not certified with this period; up to {down(effort.longest_period, 4)} it is"))
+        lines.append(_line("limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"))
     elif len(effort.residual) < len(certificate.limits):
         lines.append(_line("limited", "nothing is certified under these limits"))
     if effort.disturbed is not None:

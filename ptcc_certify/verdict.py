@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptcc_certify.bounds import Envelope
+from ptcc_certify.input_bounds import PrescribedGain
 from ptcc_certify.lemmas import EXACT_NODES
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.rounding import down, near, up
@@ -262,29 +263,49 @@ def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> 
 
 
 def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> Answer:
-    """Tell whether every input is proved to stay within so much; with limits of the gain, the input under these."""
+    """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
     effort, what = certificate.effort, f"|u_k| <= {near(most)}"
     if certificate.constant:
         return Answer(MET, what)
-    proved: list[Fraction | None] = [None]
-    if effort is not None and certificate.limits:
-        proved = [entry.largest for entry in effort.residual]
-        proved += [None] * (len(certificate.limits) - len(effort.residual))
-    elif effort is not None and effort.peak is not None:
-        proved = [effort.peak.largest]
-    known = [x for x in proved if x is not None]
-    if len(known) == len(proved) and max(known) <= most:
+    least, proved = input_range(certificate)
+    if proved is not None and proved <= most:
         return Answer(MET, what)
-    if effort is not None and effort.first is not None:
-        p = certificate.protocol
-        gain = p.rho1 + p.rho2 * p.kappa / p.T
-        caps = [limits.gain_cap for limits in certificate.limits if limits.gain_cap is not None]
-        first = effort.first * min([Fraction(1), *(cap / gain for cap in caps)])
-        if first > most:
-            return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    if least > most:
+        first = effort is not None and effort.first is not None and effort.first >= least
+        size = f"up to {down(least)}" if least < math.inf else "without limit"
+        return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by noise alone'}, proved")
     if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
         return Answer(REFUTED, what, "from some of these starts it grows without limit, proved")
-    return Answer(OPEN, what, f"proved: {up(max(known))}" if len(known) == len(proved) else "no bound is proved")
+    return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
+
+
+def input_range(certificate: Certificate | SavedCertificate) -> tuple[Fraction | float, Fraction | None]:
+    """Return proved bounds of the largest ``|u_k|`` over all agents, starts, noise and disturbances asked about.
+
+    Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
+    attained or approached: at the start, or where noise meets the largest gain, without a limit an infinite one.
+    The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
+    under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` grows no further where the gain rests.
+    """
+    effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
+    if effort is None:
+        return Fraction(0), None
+    gain = PrescribedGain(p.T, p.rho1, p.rho2 * p.kappa)
+    tops = [top for entry in certificate.limits if (top := entry.largest_gain(gain)) is not None]
+    share = min([Fraction(1), *(top / (gain.rho1 + gain.k / gain.T) for top in tops)])
+    least: Fraction | float = (effort.first or Fraction(0)) * share
+    if certificate.noise is not None:
+        rows = graph.exact_rows(range(graph.n_nodes))
+        heard = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
+        least = max(least, 2 * heard * certificate.noise * min(tops)) if tops else math.inf
+    if certificate.limits:
+        known = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
+        most = None if len(known) < len(certificate.limits) or None in known else max(x for x in known if x is not None)
+    else:
+        most = None if effort.peak is None or certificate.noise is not None else effort.peak.largest
+    if most is not None and certificate.delta is not None:
+        most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
+    return least, most
 
 
 def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:

@@ -307,7 +307,11 @@ class Recheck:
             ("input-constants", f"lyapunov.members[{k}]", []) for k, c in enumerate(said["constants"]) if c is not None
         ]
         kinds = {"peak": "input-peak", "energy": "input-energy", "path_length": "input-length"}
-        return steps + [(kind, "effort", ["z"]) for key, kind in kinds.items() if said[key] is not None]
+        for key, kind in kinds.items():
+            if said[key] is not None:
+                integral = any(s["kind"] == kind and "p" in s["numbers"] for s in self.data["proof"])
+                steps.append((kind, "effort", ["p", "m0", "m1"] if integral else ["z"]))
+        return steps
 
     def digest(self) -> None:
         said = {key: value for key, value in self.data.items() if key not in ("digest", "unverified")}

@@ -262,7 +262,7 @@ SAMPLE = (("1.1", False), ("1.2", True), ("2.1 K>=2", False), ("2.1 K=1", True),
 #: witnesses, constants that have a little slack, how the file was read. Only the digest tells that it was changed.
 OF_ITS_OWN_RIGHT = (
     r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle|protocol\.|initial_state|sigma0"
-    r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.([bmz]|growth))"
+    r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.([bmpz]|m0|m1|growth))"
     r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal|nodes$))"
     r"|effort\.(constants|energy|path_length|peak\.(agents|norm)|sliding\.agents)"
 )

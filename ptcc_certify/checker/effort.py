@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short, triangle
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import (
     Form,
     InputBounds,
     Limits,
     PrescribedGain,
+    Reaching,
     Starts,
-    decay_above,
     energy_above,
+    integral_above,
     length_above,
-    limited_rate,
     peak_above,
     root_above,
 )
@@ -62,13 +63,18 @@ class EffortCheck(LyapunovCheck):
         """Return what bounds the input over the starts."""
         integers([starts.center, starts.radius, *starts.axes])  # refused where they have no moderate denominator
         rows = [{j: Fraction(x, self.digraph.unit) for j, x in self.digraph.row(v).items()} for v in range(self.n)]
-        if not self.is_sliding:
-            return InputBounds(rows, self.gain, self.forms, constants, starts)
-        sigma0 = list(self._by_agent(self.data["sigma0"], "sigma0"))
-        center = [x - s for x, s in zip(starts.center, sigma0, strict=True)]
-        sizes = [abs(s) for s in sigma0] if any(sigma0) else []
-        starts = Starts(center, starts.radius, starts.axes)
-        return InputBounds(rows, self.gain, self.forms, constants, starts, sizes, self.gains["T_s"])
+        return InputBounds(
+            rows, self.gain, self.forms, constants, starts, self._reaching() if self.is_sliding else None
+        )
+
+    def _reaching(self) -> Reaching | None:
+        """Return how the sliding variables move, by the reaching times that were verified; None if they do not."""
+        g, sigma0 = self.gains, list(self._by_agent(self.data["sigma0"], "sigma0"))
+        if not any(sigma0):
+            return None
+        times = [z for z, s in zip(self.data["reaching_time"]["z"].values(), sigma0, strict=True) if s]
+        last = None if None in times else max(map(exact, times))
+        return Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], g["mu1"] + g["delta"], last)
 
     def _sized(self, said: Mapping[str, Any], bounds: InputBounds) -> None:
         """Verify how large the input gets."""
@@ -79,13 +85,65 @@ class EffortCheck(LyapunovCheck):
         ):
             self.at = f"effort.{key}"
             if said[key] is not None:
-                step = self.open(kind, "effort", ["z"], witness=True)
-                least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
+                if kind == "input-energy" and isinstance(self._next().get("witness"), dict):
+                    least = self._integral(bounds)
+                else:
+                    step = self.open(kind, "effort", ["z"], witness=True)
+                    least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
                 need(exact(said[key]) >= least, "the bound is not proved")
                 self.done(f"at most {up(exact(said[key]))}")
         for k, entry in enumerate(entries(said["residual"], "residual")):
             self._limited(entry, f"effort.residual[{k}]", said["peak"], bounds)
         self._disturbed(said["disturbed"], bounds)
+
+    def _integral(self, bounds: InputBounds) -> Fraction:
+        """Verify two Lyapunov inequalities, ``L'W + W L - c W > m I`` on the range of ``L``; return what they bound."""
+        step = self.open("input-energy", "effort", ["p", "m0", "m1"], witness=True)
+        said = fields(step["witness"], ("W0", "W1"), "the witness")
+        need(bounds.reaching is None, "sliding variables move")
+        self._bounded_size(self.n)
+        found = []
+        for key, m, c in (("W0", step["m0"], Fraction(0)), ("W1", step["m1"], 1 / self.gain.k)):
+            rows = triangle(said[key], len(self.moving))
+            W, scale = integers(rows)
+            forms = [self._remainder(W, m * scale, c)] + ([W] if c else [])  # W0 > 0 need not be known: E tends to 0
+            for S in forms:
+                need(m > 0 and self.exact.definite(self._on_range(S)), f"the inequality of {key} is not proved")
+            found.append(bounds.largest_form(rows) / m)
+        even, grown = found
+        return integral_above(self.gain, even, grown, step["p"])
+
+    def _remainder(self, W: Sequence[Sequence[int]], m: Fraction, c: Fraction) -> list[list[int]]:
+        """Return ``W L + L'W - c W - m I`` on the nodes that listen, times a positive integer."""
+        place, n, unit = {v: i for i, v in enumerate(self.moving)}, len(W), self.digraph.unit
+        columns: list[dict[int, int]] = [{} for _ in range(n)]
+        for i, v in enumerate(self.moving):
+            for j, x in self.digraph.row(v).items():
+                if j in place:
+                    columns[place[j]][i] = x
+        moved = [[sum(row[i] * x for i, x in column.items()) for column in columns] for row in W]
+        scale = math.lcm((c * unit).denominator, (m * unit).denominator)
+        own, diagonal = int(c * unit * scale), int(m * unit * scale)
+        return [
+            [scale * (moved[i][j] + moved[j][i]) - own * W[i][j] - diagonal * (i == j) for j in range(n)]
+            for i in range(n)
+        ]
+
+    def _on_range(self, S: list[list[int]]) -> list[list[int]]:
+        """Return a form of ``E``, on the nodes that listen, where ``E`` lives: ``L'S L`` on ``kept``, times a scale.
+
+        Where only single nodes are balanced closed components, ``E`` may be anything on the nodes that listen.
+        """
+        if all(len(group) == 1 or gauge is None for group, gauge in zip(self.closed, self.gauges, strict=True)):
+            return S
+        named = zip(self.moving, (dict(zip(self.moving, row, strict=True)) for row in S), strict=True)
+        F = self._state_form(dict(named))
+        return [[F[i][j] for j in self.kept] for i in self.kept]
+
+    def _next(self) -> dict[str, Any]:
+        """Return the obligation that comes next, not verified."""
+        step = self.data["proof"][self.next] if self.next < len(self.data["proof"]) else None
+        return step if isinstance(step, dict) else {}
 
     def _member(self, k: Any) -> int:
         """Return the number of a member."""
@@ -252,13 +310,11 @@ class EffortCheck(LyapunovCheck):
         k = self._member(chosen[0])
         form = bounds.form(k)
         need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
-        rate = limited_rate(form.rate, step["growth"], limits, self.gain)
-        need(rate > 0, "the period is too long for the certificate")
         if period is not None:
             self._growth(form, step["growth"])
         clock = exact(said["clock"])
         need(0 <= clock <= limits.clock_below(self.gain), "the clock does not come so far")
-        left = decay_above(rate / 2 * clock) * bounds.start(k)
+        left = bounds.share(k, limits, clock, step["growth"]) * bounds.start(k)
         need(exact(said["norm"]) >= bounds.root_constant(k, None) * left, "what is left is not proved")
         if said["agents"] is not None:
             distance = self.data["lyapunov"]["members"][k]["distance"]

@@ -40,7 +40,7 @@ OBLIGATIONS = {
     ),
     "input-constants": ("e_k^2 <= c_k E'P E for every agent", "Schur complement"),
     "input-peak": ("gain |e_k| <= peak_k up to the deadline", "|e_k| <= min(held_k, sqrt(c_k V(0)) e^(-rate s / 2))"),
-    "input-energy": ("int ||gain E||^2 dt <= energy", "the same in norm"),
+    "input-energy": ("int ||gain E||^2 dt <= energy", "the same in norm, or two Lyapunov equations"),
     "input-length": ("int ||gain E|| dt <= path length", "the same in norm"),
     "input-sliding": ("|u_k - gain e_k| <= mu1 + (mu2 + mu3 kappa/T_r) |sigma_k(0)|", "Proposition 1"),
     "limited-gain": ("what is left at the deadline if the gain is capped, stopped or held", "Lyapunov decrease"),
