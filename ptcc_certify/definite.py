@@ -15,6 +15,7 @@ from operator import mul
 from typing import Any
 
 from ptcc_certify.sparse_definite import dense_definite
+from ptcc_certify.work import affordable, spend
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the factor, one after the other, until the proof succeeds.
@@ -25,6 +26,8 @@ FLINT_ROWS = 24
 FLINT_BITS = 40_000
 #: Above this many rows NumPy, where it is installed, forms factor and remainder.
 NUMPY_ROWS = 150
+#: Bits that the entries of a dense matrix may take together.
+MOST_BITS = 400_000_000
 
 
 class Factor:
@@ -119,8 +122,11 @@ class Standard:
 
     def factor(self, S: Rows, first: int = BITS[0]) -> Factor | None:
         """Return the factor that proves a matrix definite, with ``first`` bits or more; None if none does."""
+        n = len(S)
         for bits in BITS:
-            if bits >= first:
+            # Every precision costs more than the one before.
+            if bits >= first and affordable(n**3 // 6, bits, bits):
+                spend(n**3 // 6, bits, bits)
                 try:
                     return Factor(S, bits)
                 except ArithmeticError:
@@ -147,6 +153,7 @@ class Standard:
             factor = self.factor(S, bits)
             if factor is None:
                 return 0
+            spend(len(todo) * len(S) ** 2 // 2, bits, bits, "constants of many agents")
             todo = [k for k in todo if not factor.bounds(*forms[k])]
             if not todo:
                 return None
@@ -165,7 +172,7 @@ class Flint(Standard):
         self.name = f"python-flint {self.flint.__version__} and the standard library"
         with contextlib.suppress(ImportError):
             self.name = f"python-flint {self.flint.__version__}, NumPy {importlib.import_module('numpy').__version__}"
-            self.rows, self.products, self.numpy = 1000, 10_000_000_000, True
+            self.products, self.numpy = 10_000_000_000, True
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Standard.definite`."""

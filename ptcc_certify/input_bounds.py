@@ -10,13 +10,14 @@ downwards where a name says ``below``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
 
 from ptcc_certify.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
+from ptcc_certify.work import spend
 
 #: Bits to which bounds are rounded.
 BITS = 64
@@ -369,6 +370,8 @@ class InputBounds:
     def _squared(self, sizes: Sequence[Fraction]) -> list[Fraction]:
         """Return ``|L^2| sizes``."""
         pushed = []
+        bits = 2 * _bits(x for row in self.rows for x in row.values()) + _bits(sizes)
+        spend(5 * sum(len(self.rows[j]) for row in self.rows for j in row), bits, bits, "L^2")
         for row in self.rows:
             square: dict[int, Fraction] = {}
             for j, x in row.items():
@@ -401,6 +404,7 @@ class InputBounds:
         if k not in self._roots:
             form = self.form(k)
             rows = [self.rows[v] for v in form.nodes] if form.coordinates == "E" else _deviations(form)
+            _count(form, rows, self.starts)
             root = _largest_root(form, rows, self.starts)
             if self.sigma0:
                 if form.coordinates != "E":
@@ -452,6 +456,8 @@ class InputBounds:
         """
         if not self.quiet <= z <= LARGEST_EXPONENT:
             raise ValueError("an instant at which sliding variables still move, or one too late")
+        bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
+        spend(50, bits, bits, "bounds of the input")
         held = self.held_norm if v is None else self.held[v]
         return of(self.gain, held, self.root_constant(k, v) * self.start(k), self.form(k).rate, z)
 
@@ -493,6 +499,22 @@ class InputBounds:
         own = (2 * row.get(v, Fraction(0)) * noise for v, row in enumerate(self.rows))
         each = [root_above(c) * added + x for c, x in zip(self.constant(k), own, strict=True)]
         return self.root_constant(k, None) * added, each
+
+
+def _bits(values: Iterable[Fraction]) -> int:
+    """Return the bits of the longest numerator or denominator."""
+    return max((max(x.numerator.bit_length(), x.denominator.bit_length()) for x in values), default=0)
+
+
+def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
+    """Count the work of :func:`_largest_root`."""
+    n, matrix = len(rows), [*([form.diagonal] if form.diagonal is not None else form.matrix or ())]
+    vectors = [starts.center, *([starts.radius] if starts.radius else []), *starts.axes]
+    bits = _bits(x for row in rows for x in row.values()) + _bits(x for vector in vectors for x in vector)
+    entries = sum(map(len, rows))
+    spend(5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts")
+    if starts.radius:
+        spend((entries + n * len(matrix)) * len(starts.center), bits, bits, "starts")
 
 
 def _largest_root(form: Form, rows: Sequence[Linear], starts: Starts) -> Fraction:

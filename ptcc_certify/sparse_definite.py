@@ -16,6 +16,8 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from ptcc_certify.work import fits
+
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
 #: Bits of a slice of :func:`dense_definite`: three of them fit in an int64.
@@ -23,11 +25,11 @@ SLICE = 20
 #: Exponents beyond this are refused, lest a witness fill the memory.
 LARGEST_SHIFT = 2**16
 #: Bits that the entries may be shifted by, or multiplied by, in all.
-LARGEST_BITS = 4_000_000_000
+LARGEST_BITS = 400_000_000
 #: Pairs of entries of a column of the factor that are multiplied: in all, and kept at a time by the standard library.
-LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 20_000_000
-#: NumPy: longest column that is multiplied pair by pair, and largest dense block at the end.
-LONGEST_COLUMN, LARGEST_BLOCK = 4000, 6000
+LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 2_000_000
+#: NumPy: longest column that is multiplied pair by pair, and entries of the largest dense block at the end.
+LONGEST_COLUMN, LARGEST_BLOCK = 4000, 2_000_000
 #: Pairs of entries multiplied at a time.
 CHUNK = 2_000_000
 
@@ -279,7 +281,7 @@ def residual_definite(
         place[node] = k
     shifts = [exponents[i] + exponents[j] + power + 2 * bits for i, j in zip(rows, cols, strict=True)]
     up = max(0, -min(shifts, default=0))
-    if (max(shifts, default=0) + up) * len(shifts) > LARGEST_BITS:
+    if not fits((max(shifts, default=0) + up) * len(shifts), LARGEST_BITS):
         return False
     T: dict[tuple[int, int], int] = defaultdict(int)
     for i, j, value, shift in zip(rows, cols, values, shifts, strict=True):
@@ -296,7 +298,7 @@ Factor = tuple[list[int], list[int], list[int]]
 def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     indptr, indices, data = factor
     pairs = sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(indptr))
-    if pairs > LARGEST_PAIRS or min(pairs, n * (n + 1) // 2) > LARGEST_KEPT:
+    if pairs > LARGEST_PAIRS or not fits(min(pairs, n * (n + 1) // 2), LARGEST_KEPT):
         return False
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(n)]
     for k in range(n):
@@ -305,7 +307,7 @@ def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
             row = E[i]
             for j, y in part[:number]:
                 row[j] -= x * y
-    if sum(map(len, E)) * times.bit_length() > LARGEST_BITS:
+    if not fits(sum(map(len, E)) * times.bit_length(), LARGEST_BITS):
         return False
     if times != 1:
         E = [{j: value * times for j, value in row.items()} for row in E]
@@ -334,7 +336,7 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     before = np.concatenate([[0.0], np.cumsum(counts.astype(float) ** 2)])
     first = int(np.argmin(100 * before + 0.1 * left**3 + 500 * left**2))
     long = int(counts[:first].max(initial=0)) > LONGEST_COLUMN
-    if long or before[first] > 2 * LARGEST_PAIRS or n - first > LARGEST_BLOCK:
+    if long or before[first] > 2 * LARGEST_PAIRS or not fits((n - first) ** 2, LARGEST_BLOCK):
         return False
     width = min(21, (53 - max(n - first, 1).bit_length()) // 2 + 1)
     slices = max(-(-(int(np.abs(data).max(initial=0)).bit_length() + 1) // width), 1)
@@ -346,7 +348,7 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     sums = _pair_products(n, first, indptr, indices, _slices_of(data, width, slices))
     if squares is None or sums is None:
         return _residual_plain(n, T, factor, times, d)
-    if (len(sums[0]) + corner.size) * times.bit_length() > LARGEST_BITS:
+    if not fits((len(sums[0]) + corner.size) * times.bit_length(), LARGEST_BITS):
         return False
     block = sum(square.astype(object) << (width * m) for m, square in enumerate(squares))
     keys, limbs = sums

@@ -14,6 +14,7 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries,
 from ptcc_certify.checker.structure import MANY_COMPONENTS
 from ptcc_certify.checker.vectors import SideFiles
 from ptcc_certify.errors import FormatError
+from ptcc_certify.work import WorkError, limited
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]"
 
@@ -45,7 +47,11 @@ __all__ = [
 
 
 def check(
-    source: str | Path | Mapping[str, Any], *, stdlib: bool = False, files: Mapping[str, bytes] | None = None
+    source: str | Path | Mapping[str, Any],
+    *,
+    stdlib: bool = False,
+    files: Mapping[str, bytes] | None = None,
+    memory: float = 1,
 ) -> CheckReport:
     """Check a certificate.
 
@@ -57,6 +63,9 @@ def check(
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional
         The side files by name, in place of those in the folder of the certificate.
+    memory : float
+        GB that the check may take; what would take more is rejected before it is formed. The work that is allowed, some
+        seconds for each GB, grows with it.
 
     Returns
     -------
@@ -72,14 +81,20 @@ def check(
     >>> check({"schema": SCHEMA}).reason
     'the key "producer" is missing'
     """
-    if isinstance(source, Mapping):
-        data, folder = dict(source), Path()
-    else:
-        data, folder = read(source), Path(source).parent
-    run = _Check(data, SideFiles(folder, files), stdlib)
+    with limited(memory) as account:
+        if isinstance(source, Mapping):
+            data, folder = dict(source), Path()
+        else:
+            data, folder = read(source), Path(source).parent
+        report = _check(data, SideFiles(folder, files), stdlib)
+        return replace(report, memory=account.needed)
+
+
+def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
+    run = _Check(data, files, stdlib)
     try:
         run.everything()
-    except RejectedError as error:
+    except (RejectedError, WorkError) as error:
         reason = str(error)
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         reason = f"malformed ({type(error).__name__})"
