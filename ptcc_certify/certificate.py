@@ -68,6 +68,8 @@ SETTLED = 1e-6
 MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
+#: GB that the check of a large graph may take while it is certified.
+LARGE_MEMORY = 16
 
 
 @dataclass(frozen=True, repr=False)
@@ -298,7 +300,7 @@ class Certificate:
         if not (proved and ended):
             return None
         document, written = self._document(CERTIFIED)
-        return check(document, files=written.files)
+        return check(document, files=written.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
 
     def _document(self, verdict: str) -> tuple[dict[str, Any], Writer]:
         """Return the JSON of a verdict and its side files, made once."""
@@ -627,6 +629,9 @@ ReachingTime(0, 1 before T_r)))
         certificate = replace(certificate, comparison=certificate.envelope.compare(trajectory))
     progress(STEPS[5])
     report = certificate.checked
+    if report is not None and report.accepted and report.memory > 1:
+        note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
+        certificate = replace(certificate, notes=(*certificate.notes, note))
     if report is not None and not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
         certificate = replace(certificate, notes=(note, *certificate.notes))

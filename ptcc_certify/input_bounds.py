@@ -512,7 +512,9 @@ def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
     vectors = [starts.center, *([starts.radius] if starts.radius else []), *starts.axes]
     bits = _bits(x for row in rows for x in row.values()) + _bits(x for vector in vectors for x in vector)
     entries = sum(map(len, rows))
-    spend(5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts")
+    spend(
+        5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts"
+    )
     if starts.radius:
         spend((entries + n * len(matrix)) * len(starts.center), bits, bits, "starts")
 

@@ -507,6 +507,27 @@ def _eliminates(rows: list[list[int]]) -> bool:
     return True
 
 
+def _dense_square(R: Any) -> Any:
+    """Return ``R R'`` of int64 entries in integers; None unless every product, sum and shift is exact.
+
+    Rows of the factor of a matrix scaled to a unit diagonal have norms of about ``2^57``, and 16 times that is room
+    enough; a row beyond it would wrap around in the last shift, and prove what is not true.
+    """
+    products = _slice_products(_slices_of(R, SLICE, 3))
+    if products is None:
+        return None
+    # Carried, three limbs in [0, 2^SLICE) make one int64, and so do the two above them, if the last is short
+    for m in range(4):
+        carry = products[m] >> SLICE
+        products[m] -= carry << SLICE
+        products[m + 1] += carry
+    if max(-int(products[4].min()), int(products[4].max())) > INT64_SAFE >> SLICE:
+        return None
+    low = products[0] + (products[1] << SLICE) + (products[2] << 2 * SLICE)
+    high = products[3] + (products[4] << SLICE)
+    return (high.astype(object) << 3 * SLICE) + low.astype(object)
+
+
 def _dense_residual(S: Sequence[Sequence[int]]) -> bool:
     import numpy as np
 
@@ -533,17 +554,9 @@ def _dense_residual(S: Sequence[Sequence[int]]) -> bool:
             R = np.linalg.cholesky(unit - shift * np.eye(n))
         except np.linalg.LinAlgError:
             return False
-        products = _slice_products(_slices_of(np.rint(np.ldexp(R, bits)).astype(np.int64), SLICE, 3))
-        if products is None:
+        whole = np.rint(np.ldexp(R, bits))
+        if not np.abs(whole).max() <= INT64_SAFE or (square := _dense_square(whole.astype(np.int64))) is None:
             return False
-        # Carried, three limbs in [0, 2^SLICE) make one int64, and so do the two above them
-        for m in range(4):
-            carry = products[m] >> SLICE
-            products[m] -= carry << SLICE
-            products[m + 1] += carry
-        low = products[0] + (products[1] << SLICE) + (products[2] << 2 * SLICE)
-        high = products[3] + (products[4] << SLICE)
-        square = (high.astype(object) << 3 * SLICE) + low.astype(object)
         E = T - (square << -spare if spare < 0 else square)
         diagonal = np.diag(E).copy()
         short = (np.abs(E).sum(axis=1) - np.abs(diagonal) - diagonal).tolist()

@@ -35,10 +35,12 @@ class Account:
         Work that is left, in the unit of :func:`cost`.
     needed : float
         GB for which all that was counted so far would have been allowed.
+    kept : float
+        Bytes of what stays to the end.
     """
 
     def __init__(self, memory: float):
-        self.memory, self.left, self.needed = memory, LIMIT * memory, 0.0
+        self.memory, self.left, self.needed, self.kept = memory, LIMIT * memory, 0.0, 0.0
 
 
 _account: ContextVar[Account | None] = ContextVar("account", default=None)
@@ -128,6 +130,21 @@ def fits(size: float, limit: float) -> bool:
         return size <= limit
     account.needed = max(account.needed, size / limit)
     return size <= limit * account.memory
+
+
+def keeps(size: float) -> bool:
+    """Tell whether so many bytes more may stay to the end, and count them.
+
+    Examples
+    --------
+    >>> with limited(1):
+    ...     keeps(6e8), keeps(6e8)
+    (True, False)
+    """
+    if (account := _account.get()) is None:
+        return True
+    account.kept += size
+    return fits(account.kept, 1e9)
 
 
 @contextmanager

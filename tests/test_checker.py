@@ -985,6 +985,7 @@ STANDARD = {
     "re",
     "sys",
     "traceback",
+    "contextvars",
     "typing",
 }
 OWN = {
@@ -994,6 +995,7 @@ OWN = {
     "ptcc_certify.input_bounds",
     "ptcc_certify.sparse_definite",
     "ptcc_certify.spectral_line",
+    "ptcc_certify.work",
 }
 
 

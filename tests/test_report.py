@@ -239,7 +239,7 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     page = sound(source)
     assert page.text.index("CERTIFIED") < page.text.index("What was asked")
     assert made.graph.sha256 in page.text and made.to_dict()["digest"] in page.text
-    assert "ptcc check c.json" in page.text and "python -m ptcc_certify.checker c.json --stdlib" in page.text
+    assert "ptcc check c.json" in page.text and "python -m ptcc_certify.checker c.json" in page.text
     order = ["asked", "proved", "graph", "bound", "effort", "obligations", "check", "limits", "cite"]
     assert [a["id"] for tag, a in page.tags if tag == "h2"] == order
     for claim in made.claims:

@@ -140,7 +140,9 @@ class EffortCheck(LyapunovCheck):
     def _spectrum(self, line: Fraction) -> str:
         """Return where the nonzero eigenvalues of ``L`` lie, exactly."""
         rows = [dict(self.digraph.row(v)) for v in range(min(self.n, INPUT_NODES))]
-        need(self.n <= INPUT_NODES and tractable(rows, self.digraph.unit, line), "too large a graph, or too long numbers")
+        need(
+            self.n <= INPUT_NODES and tractable(rows, self.digraph.unit, line), "too large a graph, or too long numbers"
+        )
         components, seen = [], [False] * self.n
         for v in range(self.n):
             if not seen[v]:

@@ -591,10 +591,10 @@ class LyapunovCheck(OutcomeCheck):
         self._bounded_size(len(nodes))
         H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
         p, q = (limit["limit"] / 2 * self.digraph.unit).as_integer_ratio()
-        bits, own = longest(x for row in H for x in row), self.digraph.bits + longest((p, q))
-        sized(len(nodes) ** 2, bits + own, "H B")
-        spend(2 * len(nodes) ** 2, own, own, "H B")
-        spend(len(nodes) ** 3, bits, own, "H B")
+        bits, entry = longest(x for row in H for x in row), self.digraph.bits + longest((p, q))
+        sized(len(nodes) ** 2, bits + entry, "H B")
+        spend(2 * len(nodes) ** 2, entry, entry, "H B")
+        spend(len(nodes) ** 3, bits, entry, "H B")
         B = [[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(self._block(nodes))]
         HB = product(H, B)
         S = [

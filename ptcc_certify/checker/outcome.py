@@ -305,7 +305,7 @@ class OutcomeCheck(StructureCheck):
             return
         if self.u is None:
             raise RejectedError(f"agent {short(self.labels[astray[0]])} is not where its neighbours pull it")
-        each, fine = self.u.over(self.followers)
+        each, _ = self.u.over(self.followers)
         u = dict(zip(self.followers, each, strict=True))
         spend(2 * sum(map(len, rows.values())), self.digraph.bits, longest(each), "followers")
         worst, least = 0, 1  # max |r_i| / (M(L_F) u)_i, without the scales

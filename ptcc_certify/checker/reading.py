@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.work import fits, spend
+from ptcc_certify.work import fits, keeps, spend
 
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.
@@ -66,8 +66,9 @@ def read(path: str | Path) -> dict[str, Any]:
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
         text = content.decode("utf-8")
-        if not fits(loaded := loaded_bytes(content, text), MAX_LOADED):
-            raise ValueError(f"it would take {loaded / 1e9:.1f} GB in memory; allow it more by --memory")
+        loaded = loaded_bytes(content, text)
+        if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
+            raise ValueError(f"it may take {loaded / 1e9:.1f} GB in memory; allow more by --memory")
         del content
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(
@@ -110,7 +111,7 @@ def digest(data: Mapping[str, Any]) -> str:
 
 def _canonical(value: Any) -> Iterator[str]:
     """Yield JSON with sorted keys and no blanks in pieces, lest the whole stand in memory once more."""
-    plain = {"sort_keys": True, "separators": (",", ":")}
+    plain: dict[str, Any] = {"sort_keys": True, "separators": (",", ":")}
     items = sorted(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
     if len(items) <= PIECE and not any(isinstance(value[k], dict | list) for k in items):
         yield json.dumps(value, **plain)
