@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -22,6 +22,7 @@ from lmi.errors import LMIError
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
+from ptcc_certify.checker.reading import MAX_SCALE_BITS
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.document import Writer, certificate_document, outcome_witness
@@ -68,6 +69,8 @@ SETTLED = 1e-6
 MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
+#: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
+LONGEST_BITS = 470_000
 #: GB that the check of a large graph may take while it is certified.
 LARGE_MEMORY = 16
 
@@ -545,6 +548,7 @@ ReachingTime(0, 1 before T_r)))
     if method not in METHODS:
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
     instant = None if at is None else _instant(at, protocol)
+    _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
     structure = analyse(graph)
     region = _starts(structure, starts)
     if sliding and (limits or delta is not None or noise is not None):
@@ -674,6 +678,41 @@ def _starts(structure: Structure, starts: Any) -> Starts | None:
     return starts
 
 
+def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
+    """Return the weights that may be long, each once."""
+    table, _ = graph.weight_table()
+    if table is None:
+        return (graph.exact_weight(i) for i in range(graph.n_edges))
+    return map(Fraction, np.unique(table).tolist()) if table.dtype.kind == "f" else ()
+
+
+def _bits(value: Fraction) -> int:
+    return value.numerator.bit_length() + value.denominator.bit_length()
+
+
+def _longest_edge(graph: SignedDigraph) -> str:
+    edge = max(range(graph.n_edges), key=lambda i: _bits(graph.exact_weight(i)))
+    ends = (graph.labels[int(part[edge])] for part in (graph.source, graph.target))
+    return " -> ".join(map(shorten, ends))
+
+
+def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[[], str]) -> None:
+    """Refuse numbers of ``n`` agents whose exact arithmetic would take long: judged over a common denominator.
+
+    Large graphs are proved row by row, in short numbers: only what their check refuses is refused.
+    """
+    most = int(LONGEST_BITS / n**1.25) if n <= EXACT_NODES else MAX_SCALE_BITS
+    common, longest = 1, 0
+    for value in values:
+        common = math.lcm(common, value.denominator)
+        longest = max(longest, value.numerator.bit_length() - value.denominator.bit_length())
+        if common.bit_length() + longest > most:
+            raise ParameterError(
+                f"{what} take more than {most:,} bits over a common denominator, too many for exact proofs of {n:,} "
+                f"agents (the longest is that of {where()}); round them, to 17 digits say"
+            )
+
+
 def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
     start = tuple(exact_start(structure, values, name))
     for label, value in zip(structure.graph.labels, start, strict=True):
@@ -681,6 +720,8 @@ def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name
             raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
         if not writable(value):
             raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
+    longest = max(zip(structure.graph.labels, start, strict=True), key=lambda entry: _bits(entry[1]))[0]
+    _refuse_long(start, len(start), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
     return start
 
 

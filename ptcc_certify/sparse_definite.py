@@ -298,15 +298,20 @@ Factor = tuple[list[int], list[int], list[int]]
 def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     indptr, indices, data = factor
     pairs = sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(indptr))
-    if pairs > LARGEST_PAIRS or not fits(min(pairs, n * (n + 1) // 2), LARGEST_KEPT):
+    if pairs > LARGEST_PAIRS:
         return False
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(n)]
+    kept = 0
     for k in range(n):
         part = list(zip(indices[indptr[k] : indptr[k + 1]], data[indptr[k] : indptr[k + 1]], strict=True))
         for number, (i, x) in enumerate(part, 1):
             row = E[i]
+            kept -= len(row)
             for j, y in part[:number]:
                 row[j] -= x * y
+            kept += len(row)
+            if not fits(kept, LARGEST_KEPT):
+                return False
     if not fits(sum(map(len, E)) * times.bit_length(), LARGEST_BITS):
         return False
     if times != 1:
