@@ -12,7 +12,7 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.work import fits, keeps, spend
@@ -62,7 +62,7 @@ def read(path: str | Path) -> dict[str, Any]:
     name = short(str(path), 200)
     try:
         with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = _content(file)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
         text = content.decode("utf-8")
@@ -86,7 +86,15 @@ def read(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def loaded_bytes(content: bytes, text: str) -> int:
+def _content(file: BinaryIO) -> bytearray:
+    """Read a file up to one byte more than is taken."""
+    found = bytearray()
+    while len(found) <= MAX_BYTES and (part := file.read(2**20)):
+        found += part
+    return found
+
+
+def loaded_bytes(content: bytes | bytearray, text: str) -> int:
     """Bound the memory of a JSON text and of what it becomes, from its brackets, commas, colons and quotes.
 
     Examples
