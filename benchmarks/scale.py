@@ -54,7 +54,7 @@ def generated(n: int) -> ptcc.SignedDigraph:
     pairs, first = np.unique(target * n + source, return_index=True)
     keep = first[pairs // n != pairs % n]
     W = sparse.csr_array((weight[keep], (target[keep], source[keep])), shape=(n, n))
-    return ptcc.SignedDigraph.from_matrix(W)
+    return ptcc.SignedDigraph.from_matrix(W, orientation="listens")
 
 
 def largest_core(path: Path) -> ptcc.SignedDigraph:

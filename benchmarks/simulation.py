@@ -65,7 +65,7 @@ def graph_of(family: str, n: int) -> ptcc.SignedDigraph:
         W.data /= 1000
     else:
         W.data = np.sign(W.data) * 10 ** np.random.default_rng(n + 1).uniform(-1, 2, W.data.size)
-    return ptcc.SignedDigraph.from_matrix(W)
+    return ptcc.SignedDigraph.from_matrix(W, orientation="listens")
 
 
 def start_of(n: int) -> np.ndarray:

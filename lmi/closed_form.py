@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, eigsh, splu
 
 from lmi.certificate import DiagonalCertificate
+from lmi.deadline import checkpoint
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
 from lmi.matrices import comparison_matrix, m_matrix_witness, square
 
@@ -22,6 +24,8 @@ ELIMINATION_ROWS = 3000
 LOSS = 5e-7
 #: The shares of ``lambda_min`` tried under a bound on the condition; above 1 the shift is negative.
 LOSSES = np.geomspace(LOSS, 10.0, 15)
+#: Above this many rows only so many of them, the best, are improved.
+FEW_ROWS, MOST_TIGHTENED = 40, 4
 EPS = float(np.finfo(float).eps)
 
 
@@ -131,35 +135,51 @@ def m_matrix_certificate(
     >>> m_matrix_certificate([[1.0, 0.0], [-3.0, 1.0]], max_condition=100).rate > 1.39
     True
     """
-    A = _sparse(A)
-    _require_z_matrix(A)
-    if max_condition is not None and not max_condition >= 1:
-        raise MatrixError(f"max_condition is {max_condition}, not at least 1")
-    limit = math.inf if max_condition is None else math.log(max_condition)
-    right, left = _Components(A), _Components(A.T)
-    low = max(right.smallest(), left.smallest())
-    upper = 2 * float(min(right.high.min(), left.high.min()))
-    log_u, log_v = _checked(A, u, "A u", "u"), _checked(A.T, v, "A' v", "v")
+    return _ClosedForm(A, u, v).best(max_condition)
 
-    def found(loss: float) -> DiagonalCertificate:
-        return _from_witness(
-            A,
-            right.log_witness(low * (1 - loss)) if log_u is None else log_u,
-            left.log_witness(low * (1 - loss)) if log_v is None else log_v,
-            upper,
-        )
 
-    best = found(LOSS)
-    if best.rate <= 0:
-        raise NotAnMMatrix("the matrix is too near a singular one for float64")
-    if best.log_condition <= limit:
+class _ClosedForm:
+    """The witnesses of an M-matrix at several losses of rate, each made once."""
+
+    def __init__(self, A: Any, u: Any = None, v: Any = None):
+        self.A = _sparse(A)
+        _require_z_matrix(self.A)
+        self._right, self._left = _Components(self.A), _Components(self.A.T)
+        self._low = max(self._right.smallest(), self._left.smallest())
+        self._upper = 2 * float(min(self._right.high.min(), self._left.high.min()))
+        self._log_u, self._log_v = _checked(self.A, u, "A u", "u"), _checked(self.A.T, v, "A' v", "v")
+        self._found: dict[float, DiagonalCertificate] = {}
+
+    def _at(self, loss: float) -> DiagonalCertificate:
+        if loss not in self._found:
+            checkpoint()
+            rate = self._low * (1 - loss)
+            self._found[loss] = _from_witness(
+                self.A,
+                self._right.log_witness(rate) if self._log_u is None else self._log_u,
+                self._left.log_witness(rate) if self._log_v is None else self._log_v,
+                self._upper,
+            )
+        return self._found[loss]
+
+    def best(self, max_condition: float | None) -> DiagonalCertificate:
+        """Return the certificate of :func:`m_matrix_certificate`."""
+        if max_condition is not None and not max_condition >= 1:
+            raise MatrixError(f"max_condition is {max_condition}, not at least 1")
+        limit = math.inf if max_condition is None else math.log(max_condition)
+        best = self._at(LOSS)
+        if best.rate <= 0:
+            raise NotAnMMatrix("the matrix is too near a singular one for float64")
+        if best.log_condition <= limit:
+            return best
+        if self._log_u is None and self._log_v is None:
+            shrunk = [_shrunk(self.A, self._at(loss), limit) for loss in LOSSES]
+            if self.A.shape[0] > FEW_ROWS:
+                shrunk = sorted(shrunk, key=lambda one: one.rate)[-MOST_TIGHTENED:]
+            best = max((_tightened(self.A, one) for one in shrunk), key=lambda one: one.rate)
+        if best.log_condition > limit or best.rate <= 0:
+            raise NoCertificate(f"no positive rate was found with a condition of at most {max_condition:.6g}")
         return best
-    if log_u is None and log_v is None:
-        tried = (_tightened(A, _shrunk(A, found(loss), limit)) for loss in LOSSES)
-        best = max(tried, key=lambda one: one.rate)
-    if best.log_condition > limit or best.rate <= 0:
-        raise NoCertificate(f"no positive rate was found with a condition of at most {max_condition:.6g}")
-    return best
 
 
 def h_matrix_certificate(A: Any, *, max_condition: float | None = None) -> DiagonalCertificate:
@@ -201,15 +221,51 @@ def h_matrix_certificate(A: Any, *, max_condition: float | None = None) -> Diago
     >>> round(found.rate, 9), found.omega.round(9).tolist()
     (4.0, [1.0, 1.0])
     """
+    return next(h_matrix_frontier(A, [max_condition]))
+
+
+def h_matrix_frontier(A: Any, conditions: Sequence[float | None]) -> Iterator[DiagonalCertificate]:
+    """Yield :func:`h_matrix_certificate` for several largest conditions, with less work than one after the other.
+
+    Parameters
+    ----------
+    A : (n, n) array or sparse matrix
+    conditions : sequence of float or None
+        None for no limit.
+
+    Returns
+    -------
+    iterator of DiagonalCertificate
+
+    Raises
+    ------
+    NotAnHMatrix
+        As :func:`h_matrix_certificate`.
+    NoCertificate
+        At the first condition within which no positive rate was found.
+    MatrixError
+        ``A`` is not real, finite and square, or a condition is below 1.
+
+    References
+    ----------
+    Kaszkurewicz and Bhaya, Matrix Diagonal Stability in Systems and Computation, Birkhauser 2000, section 2.
+
+    Examples
+    --------
+    >>> chain = [[1.0, 0.0], [-9.0, 1.0]]
+    >>> wide, narrow = h_matrix_frontier(chain, [None, 100.0])
+    >>> wide.rate > narrow.rate, narrow.condition <= 100
+    (True, True)
+    """
     A = _sparse(A)
     try:
-        found = m_matrix_certificate(_comparison(A), max_condition=max_condition)
+        closed = _ClosedForm(_comparison(A))
+        for max_condition in conditions:
+            found = closed.best(max_condition)
+            rate = max(found.rate, _tight_rate(A, found.log_omega)) if A.shape[0] <= DENSE_ROWS else found.rate
+            yield DiagonalCertificate(found.log_omega, rate, witness=found.witness)
     except NotAnMMatrix as error:
         raise NotAnHMatrix(f"M(A) is not a nonsingular M-matrix: {error}") from None
-    rate = found.rate
-    if A.shape[0] <= DENSE_ROWS:
-        rate = max(rate, _tight_rate(A, found.log_omega))
-    return DiagonalCertificate(found.log_omega, rate, witness=found.witness)
 
 
 def perron_certificate(A: Any) -> DiagonalCertificate:

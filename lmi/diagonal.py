@@ -19,6 +19,7 @@ import numpy as np
 from lmi.certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.coupling import couple_blocks
+from lmi.deadline import checkpoint, seconds_left
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact import no_diagonal_rate_above, round_to_bits
 from lmi.interior_point import maximise_margin
@@ -30,11 +31,15 @@ if TYPE_CHECKING:
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 _RESOLVED = 100.0
-#: Up to this many rows Clarabel climbs to the best rate, about as fast; above, and on a subspace,
+#: Up to this many rows Clarabel climbs to the best rate; above, on a subspace, and in the blocks of a larger matrix,
 #: :mod:`lmi.interior_point` does.
 CLARABEL_ROWS = 20
-#: Up to this many rows Clarabel finds the best margin, as the paper does; above, :mod:`lmi.interior_point`.
-CLARABEL_MARGIN_ROWS = 60
+#: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
+#: :mod:`lmi.interior_point`.
+CLARABEL_MARGIN_ROWS = 32
+#: Tolerance of a step, the relative gain that is worth another one, and how many steps there are at most, at a given
+#: condition of a larger matrix.
+_COARSE, _COARSE_GAIN, _COARSE_STEPS = 1e-6, 1e-4, 8
 #: Solvers of the margin that may be asked for by name.
 SOLVERS = ("clarabel", "interior-point", "sdpa")
 #: Share of the smallest block rate that is given up when blocks are coupled.
@@ -87,7 +92,7 @@ def diagonal_lyapunov(
     tolerance : float
         Relative gap asked of the solver.
     solver : {"clarabel", "interior-point", "sdpa"}, optional
-        Margin only; by default Clarabel up to 60 rows and :mod:`lmi.interior_point` above. SDPA needs the package
+        Margin only; by default Clarabel up to 32 rows and :mod:`lmi.interior_point` above. SDPA needs the package
         sdpa-python.
 
     Returns
@@ -178,7 +183,7 @@ def _rate_optimum(
     parts = irreducible_blocks(A)
     bases = [None if basis is None else block_columns(basis, part) for part in parts]
     blocks = [
-        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance))
+        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance, len(A) <= CLARABEL_MARGIN_ROWS))
         for part, b in zip(parts, bases, strict=True)
         if b is None or b.shape[1]
     ]
@@ -202,12 +207,16 @@ def _rate_optimum(
     return DiagonalCertificate(coupled, diagonal_rate(A, coupled, basis), limit[2].upper, witness)
 
 
-def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> DiagonalCertificate:
+def _with_upper(
+    A: np.ndarray, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
+) -> DiagonalCertificate:
     """Return the optimum of an irreducible block with a dual bound on all diagonal rates."""
     if len(A) == 1:
         rate = 2 * float(A[0, 0])
         return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
-    frame, found = _climb(A, None, basis, tolerance)
+    if len(A) == 2 and basis is None:
+        return _two_rows(A)
+    frame, found = _climb(A, None, basis, tolerance, clarabel=clarabel)
     if not found.rate > 0:
         return found
     # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
@@ -215,12 +224,27 @@ def _with_upper(A: np.ndarray, basis: np.ndarray | None, tolerance: float) -> Di
     attempts.append((found.log_omega, tolerance / 100))
     for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
         for log_omega, accuracy in attempts:
-            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy):
+            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy, clarabel):
                 if (upper := diagonal_rate_limit(A, Y)) < found.upper:
                     found = replace(found, upper=max(upper, found.rate), witness=(Y,))
             if found.gap <= 1.5 * excess:
                 return found
     return found
+
+
+def _two_rows(A: np.ndarray) -> DiagonalCertificate:
+    """Return the optimum of an irreducible block of two rows: ``B = Omega^1/2 A Omega^-1/2`` with ``|B_12| = |B_21|``.
+
+    If both have one sign, ``B`` is symmetric and nothing beats its smallest eigenvalue; otherwise ``B + B'`` is
+    diagonal and nothing beats its smaller entry.
+    """
+    log_omega = np.array([math.log(abs(A[1, 0])) - math.log(abs(A[0, 1])), 0.0])
+    log_omega -= log_omega.max()
+    Y = np.eye(2)[:, [int(np.argmin(np.diag(A)))]]
+    if A[0, 1] * A[1, 0] > 0:
+        Y = np.exp(-log_omega / 2)[:, None] * np.linalg.eigh(scaled(A, log_omega))[1][:, :1]
+    rate = diagonal_rate(A, log_omega)
+    return DiagonalCertificate(log_omega, rate, max(diagonal_rate_limit(A, Y), rate), (Y,))
 
 
 def _climb(
@@ -230,16 +254,24 @@ def _climb(
     tolerance: float,
     steps: int = 40,
     known: np.ndarray | None = None,
+    clarabel: bool = True,
 ) -> tuple[np.ndarray, DiagonalCertificate]:
     """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative.
 
-    ``known`` is a diagonal to start from besides.
+    ``known`` is a diagonal to start from besides; without ``clarabel`` a small matrix is left to
+    :mod:`lmi.interior_point` too.
     """
     frame, best = _start(A, basis, max_condition, known)
     current = frame
+    # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
+    coarse = max_condition is not None and len(A) > CLARABEL_ROWS
+    least = _COARSE_GAIN if coarse else 1e-7
+    if coarse:
+        tolerance, steps = max(tolerance, _COARSE), min(steps, _COARSE_STEPS)
     for _ in range(steps):
+        checkpoint()
         try:
-            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance)
+            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance, clarabel)
             proposal = normalised(_positive(omega)) + frame
         except NoCertificate:
             break
@@ -250,7 +282,7 @@ def _climb(
         if rate is None or not rate > best:
             break
         gained, current, best = rate - best, proposal, rate
-        if gained <= 1e-7 * abs(best):
+        if gained <= least * abs(best):
             break
     return frame, DiagonalCertificate(current, best)
 
@@ -302,6 +334,7 @@ def _step(
     basis: np.ndarray | None,
     max_condition: float | None,
     tolerance: float,
+    clarabel: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0``, ``Omega_0`` the current matrix.
 
@@ -320,7 +353,7 @@ def _step(
     if basis is not None:
         tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * basis)[0]
 
-    if n > CLARABEL_ROWS or tail is not None:
+    if n > CLARABEL_ROWS or tail is not None or not clarabel:
         C = S - np.diag(b / 2 * square_unit)
         found = maximise_margin(C, weight, tail, tolerance, np.exp(frame), max_condition)
         return found.omega, unit[:, None] * _dual_rows(found.X, tail)
@@ -347,14 +380,14 @@ def _dual_rows(X: np.ndarray, tail: np.ndarray | None) -> np.ndarray:
 
 
 def _dual_factors(
-    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float
+    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
 ) -> list[np.ndarray]:
     """Return matrices ``Y`` such that ``X = Y Y'`` may show that no diagonal rate exceeds ``b``; in the original rows.
 
     Rows in which the solver left noise are cleared at several levels: a row of zeros meets its condition.
     """
     try:
-        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance)
+        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance, clarabel)
     except NoCertificate:
         return []
     unit = np.sqrt(np.diag(scaled(A, frame))) if (np.diag(A) > 0).all() else np.ones(len(A))
@@ -751,6 +784,8 @@ def coupled_lyapunov(
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
     scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
     fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
+    if n_L + n_F > CLARABEL_MARGIN_ROWS:
+        return _coupled_large(leaders, A_FL / scale, A_F / scale, scale, fixed_top, tolerance)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
         s = cp.Variable() if fixed else cp.Constant(1.0)
@@ -792,6 +827,48 @@ def coupled_lyapunov(
             found.append(_positive(rest[used : used + k]) * unit)
             used += k
     return CoupledCertificate(tuple(found), _positive(Y) * unit if n_F else Y)
+
+
+def _coupled_large(
+    leaders: Sequence[FixedLeader | FreeLeader],
+    A_FL: np.ndarray,
+    A_F: np.ndarray,
+    scale: float,
+    top: float,
+    tolerance: float,
+) -> CoupledCertificate:
+    """Couple blocks by the interior-point method: free leader blocks at their own best margin, all scaled together.
+
+    The blocks are in units of ``scale``, fixed ones have ``top`` as their largest entry. A block of leaders is one
+    weight: ``Pi`` is ``W C + C'W`` with half its decrease on the diagonal of ``C``.
+    """
+    omegas, halves, groups = [], [], []
+    for k, block in enumerate(leaders, start=1):
+        if isinstance(block, FixedLeader):
+            omegas.append(block.omega / top)
+            halves.append(block.decrease / (2 * top * scale))
+        else:
+            found = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
+            omegas.append(found.omega)
+            halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
+        groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))
+    shared, n_L = np.unique(np.concatenate(groups), return_inverse=True)[1], sum(map(len, omegas))
+    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, len(A_F)))], [A_FL, A_F]])
+    own = np.concatenate([shared, shared.max() + 1 + np.arange(len(A_F))])
+    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
+    weights = _positive(solution.omega)
+    if not solution.t > _RESOLVED * tolerance:
+        return _block_by_block(leaders, A_F * scale, top, tolerance)
+    fixed = [i for i, group in enumerate(groups) if not group[0]]
+    starts = np.cumsum([0, *map(len, omegas)])
+    unit = top / weights[starts[fixed[0]]] if fixed else 1.0
+    return CoupledCertificate(
+        tuple(
+            block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
+            for block, omega, start in zip(leaders, omegas, starts, strict=False)
+        ),
+        weights[n_L:] * unit,
+    )
 
 
 def _block_by_block(
@@ -849,13 +926,20 @@ def _solve(
 
     import cvxpy as cp
 
+    checkpoint()
     built, expression = problem(cp)
     options: dict[str, Any] = {}  # SDPA stops where its own precision ends, whatever it is asked for
     if solver == "clarabel":
         options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
+        # The default merge of chordal cliques does not end on some sparse matrices. Small ones need no decomposition.
+        rows = max(c.shape[0] for c in built.constraints if len(c.shape) == 2)
+        options["chordal_decomposition_enable"] = rows > CLARABEL_MARGIN_ROWS
+        options["chordal_decomposition_merge_method"] = "parent_child"
+        options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
         _run(built, solver, options)
+    checkpoint()
     if expression.value is None or not np.isfinite(expression.value).all():
         raise NoCertificate(f"the solver answered {built.status}")
     value = np.atleast_1d(np.asarray(expression.value, dtype=np.float64))

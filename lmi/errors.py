@@ -39,6 +39,20 @@ class NoCertificate(LMIError, RuntimeError):
     """
 
 
+class OutOfTime(LMIError, RuntimeError):
+    """A search or a proof was ended by :func:`lmi.time_limit`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import lmi
+    >>> with lmi.time_limit(0):
+    ...     lmi.diagonal_lyapunov(np.eye(50))
+    Traceback (most recent call last):
+    lmi.errors.OutOfTime: the time limit is reached
+    """
+
+
 class NotAnHMatrix(LMIError, ValueError):
     """A matrix is not a nonsingular H-matrix with positive diagonal; the message says what fails.
 

@@ -20,15 +20,17 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Rational
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from lmi.deadline import checkpoint
 from lmi.errors import MatrixError
 
 Rows = Sequence[Sequence[Fraction]]
+IntegerRows = Sequence[Sequence[int]]
 #: Above this many rows a rounded Cholesky factor is tried before the elimination.
 RESIDUAL_ROWS = 20
 #: Above this many rows a looser rate by the residual test is preferred to the elimination.
@@ -185,7 +187,7 @@ def prove_positive_definite(S: Any) -> DefinitenessProof:
     return _eliminate(_scaled_lower_triangle(_rationals(S)) if rows is None else rows)
 
 
-def _bits(x: Fraction) -> int:
+def _bits(x: Fraction | int) -> int:
     return max(x.numerator.bit_length(), x.denominator.bit_length())
 
 
@@ -199,6 +201,7 @@ def _eliminate(rows: list[list[int]]) -> DefinitenessProof:
     n = len(rows)
     previous = 1
     for k in range(n):
+        checkpoint()
         pivot = rows[k][k]
         if pivot <= 0:
             return DefinitenessProof(False, n, k)
@@ -222,7 +225,7 @@ def _rationals(S: Rows) -> list[list[Fraction]]:
     if any(len(row) != n for row in S):
         raise MatrixError("the matrix is not square")
     try:
-        rows = [[x if type(x) is Fraction else _rational(x) for x in row] for row in S]
+        rows = [[x if type(x) is Fraction or type(x) is int else _rational(x) for x in row] for row in S]
     except (TypeError, ValueError, OverflowError):
         raise MatrixError("the matrix has an entry that is not a finite real number") from None
     if any(rows[i][j] != rows[j][i] for i in range(n) for j in range(i)):
@@ -490,15 +493,28 @@ def _integer_rows(S: Rows) -> tuple[list[list[int]], list[int], int]:
 
     Scaling rows and columns alike keeps definiteness and keeps entries of very different size short.
     """
-    n = len(S)
-    shift = [0] * n
-    for i in range(n):
-        size = abs(S[i][i])
-        if size:
-            shift[i] = (size.denominator.bit_length() - size.numerator.bit_length()) // 2
-    scaled = [[S[i][j] * Fraction(2) ** (shift[i] + shift[j]) for j in range(i + 1)] for i in range(n)]
-    scale = math.lcm(*(value.denominator for row in scaled for value in row))
-    return [[value.numerator * (scale // value.denominator) for value in row] for row in scaled], shift, scale
+    scale = math.lcm(*{x.denominator for row in S for x in row})
+    whole = [[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(S)]
+    rows, shift, power = _equilibrated(whole)
+    return rows, shift, scale << power
+
+
+def _equilibrated(rows: list[list[int]]) -> tuple[list[list[int]], list[int], int]:
+    """Return the lower triangle of ``2^(power + shift_i + shift_j) S_ij`` in integers, ``shift`` and ``power``."""
+    shift = [-((abs(rows[i][i]).bit_length() - 1) // 2) for i in range(len(rows))]
+    places = [[shift[i] + other for other in shift[: i + 1]] for i in range(len(rows))]
+    zeros = (
+        place + (x & -x).bit_length() - 1
+        for xs, ps in zip(rows, places, strict=True)
+        for x, place in zip(xs, ps, strict=True)
+        if x
+    )
+    power = max(0, -min(zeros, default=0))
+    scaled = [
+        [x << place + power if place + power >= 0 else x >> -place - power for x, place in zip(xs, ps, strict=True)]
+        for xs, ps in zip(rows, places, strict=True)
+    ]
+    return scaled, shift, power
 
 
 def prove_margin(S: Rows, guess: float) -> Fraction | None:
@@ -528,16 +544,16 @@ def prove_margin(S: Rows, guess: float) -> Fraction | None:
     """
     if not guess > 0:
         return None
-    identity = [[Fraction(int(i == j)) for j in range(len(S))] for i in range(len(S))]
+    identity = [[int(i == j) for j in range(len(S))] for i in range(len(S))]
     return prove_generalized_margin(S, identity, guess)
 
 
-def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
+def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess: float) -> Fraction | None:
     """Find a rational ``b``, as near to ``guess`` as proves, with ``S - b Z`` positive definite.
 
     Parameters
     ----------
-    S, Z : n rows of n Fractions
+    S, Z : n rows of n Fractions or ints
         Symmetric.
     guess : float
         What floating point takes for the largest such ``b``; not 0.
@@ -559,20 +575,31 @@ def prove_generalized_margin(S: Rows, Z: Rows, guess: float) -> Fraction | None:
     """
     if not math.isfinite(guess) or guess == 0:
         return None
-    n = len(S)
+    n, both = len(S), cast("tuple[Rows, Rows]", (S, Z))
+    scale = math.lcm(*{x.denominator for M in both for row in M for x in row})
+    whole = [[[x.numerator * (scale // x.denominator) for x in row[: i + 1]] for i, row in enumerate(M)] for M in both]
 
-    def lowered(b: Fraction) -> list[list[Fraction]]:
-        return [[S[i][j] - b * Z[i][j] for j in range(n)] for i in range(n)]
+    def lowered(b: Fraction) -> list[list[int]]:
+        """Return the lower triangle of ``scale q (S - b Z)``, ``b = p/q``."""
+        p, q = b.as_integer_ratio()
+        return [[q * x - p * z for x, z in zip(*rows, strict=True)] for rows in zip(*whole, strict=True)]
 
     candidates = [b for loss in LOSSES if (b := Fraction(guess - abs(guess) * loss)) * Fraction(guess) > 0]
     long = any(_bits(x) > LONG_BITS for M in (S, Z) for row in M for x in row)
     if n > RESIDUAL_ROWS or long:
         # Elimination takes seconds to minutes here: it comes last, after all that the residual test can give.
-        quick = candidates if long or n > ELIMINATION_ROWS else candidates[:4]
-        for b in quick:
-            if _residual_test(_scaled_lower_triangle(_rationals(lowered(b)))):
+        for b in candidates if long or n > ELIMINATION_ROWS else candidates[:4]:
+            checkpoint()
+            if _residual_test(lowered(b)):
                 return b
-    return next((b for b in candidates if prove_positive_definite(lowered(b))), None)
+    return next((b for b in candidates if _definite(lowered(b))), None)
+
+
+def _definite(rows: list[list[int]]) -> bool:
+    """Decide the definiteness of a lower triangle in integers."""
+    if len(rows) > RESIDUAL_ROWS and _residual_test(rows):
+        return True
+    return bool(_eliminate(_equilibrated(rows)[0]))
 
 
 #: Relative amounts by which a float eigenvalue is lowered, one after the other, until the proof succeeds.

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.deadline import checkpoint
 from lmi.errors import MatrixError, NoCertificate
 from lmi.matrices import square
 
@@ -112,6 +113,7 @@ def full_frontier(
         if len(groups) in tried:
             continue
         tried.add(len(groups))
+        checkpoint()
         blocks = _Blocks.of(A, vectors, groups)
         if blocks is not None:
             found += [_certificate(A, blocks.lyapunov(decay * (1 - loss))) for loss in losses]

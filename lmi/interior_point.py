@@ -35,6 +35,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import blas, eigh_tridiagonal, lapack
 
+from lmi.deadline import checkpoint
 from lmi.errors import NoCertificate
 
 #: Share of the way to the boundary that a step goes.
@@ -44,8 +45,8 @@ _MOST_ITERATIONS = 60
 _SMALL = 1e-3
 #: Below this relative gap, :data:`_PATIENCE` iterations that do not quarter it are the end: rounding has taken over.
 _NEAR, _PATIENCE = 1e-7, 2
-#: Up to this share of nonzeros ``C`` is kept sparse.
-_SPARSE_SHARE = 0.05
+#: Above so many rows, and up to this share of nonzeros, ``C`` is kept sparse.
+_DENSE_ROWS, _SPARSE_SHARE = 150, 0.05
 #: Above this many rows Lanczos' method gives step lengths, to this relative accuracy, in so many steps at most.
 _LANCZOS_ROWS, _LANCZOS_ACCURACY, _LANCZOS_STEPS = 100, 0.02, 60
 
@@ -81,6 +82,7 @@ def maximise_margin(
     scale: np.ndarray | None = None,
     max_condition: float | None = None,
     least: float | None = None,
+    groups: np.ndarray | None = None,
 ) -> Solution:
     """Solve the program of the module.
 
@@ -100,6 +102,8 @@ def maximise_margin(
         ``c``, above 1.
     least : float, optional
         ``low`` of the box, below 1; without it and without a condition the simplex is searched.
+    groups : (n,) int array, optional
+        Box only: rows with the same number, from 0 on, share their weight.
 
     Returns
     -------
@@ -118,12 +122,14 @@ def maximise_margin(
     >>> found = maximise_margin(np.array([[2.0, -1.0], [0.0, 4.0]]), np.ones(2), least=0.0)
     >>> round(found.t, 7), found.omega.round(6), found.value - found.t < 1e-8
     (3.763932, array([1., 1.]), True)
+    >>> maximise_margin(np.diag([2.0, 1.0]), np.ones(2), least=0.0, groups=np.array([0, 0])).omega.round(6)
+    array([1., 1.])
     """
     with np.errstate(all="ignore"):
-        problem = _Problem(C, np.asarray(weight, dtype=float), basis)
+        problem = _Problem(C, np.asarray(weight, dtype=float), basis, groups)
         n = len(problem.weight)
         if least is not None:
-            weights = _box(n, least)
+            weights = _box(problem.count, least)
         elif max_condition is None or scale is None:
             weights = _simplex(n)
         else:
@@ -210,21 +216,26 @@ def _cone(scale: np.ndarray, c: float) -> _Weights:
 class _Problem:
     """The constraint matrices, by their products. ``X``, ``G`` and steps of ``X`` are kept in n rows: ``U X U'``."""
 
-    def __init__(self, C: Any, weight: np.ndarray, U: np.ndarray | None):
+    def __init__(self, C: Any, weight: np.ndarray, U: np.ndarray | None, groups: np.ndarray | None = None):
         entries = sparse.coo_array(C, dtype=float)
         n = len(weight)
-        self.C: Any = sparse.csr_array(entries) if entries.nnz <= _SPARSE_SHARE * n * n else entries.toarray()
+        self.groups = np.arange(n) if groups is None else np.asarray(groups)
+        self.count = int(self.groups.max()) + 1  # of the weights
+        self._order = np.argsort(self.groups, kind="stable")
+        self._starts = np.searchsorted(self.groups[self._order], np.arange(self.count))
+        sparsely = n > _DENSE_ROWS and entries.nnz <= _SPARSE_SHARE * n * n
+        self.C: Any = sparse.csr_array(entries) if sparsely else entries.toarray()
         self.weight, self._U = weight, U
         self._rows, self._columns, self._data = entries.row, entries.col, entries.data
 
     def combine(self, y: np.ndarray) -> Any:
         """Return ``sum_i omega_i F_i - t W`` in n rows, not yet restricted; sparse if ``C`` is."""
-        n = len(self.weight)
+        omega, t = y[self.groups], y[self.count]
         if isinstance(self.C, np.ndarray):
-            product = y[:n, None] * self.C
-            return product + product.T - np.diag(y[n] * self.weight)
-        product = sparse.diags_array(y[:n]) @ self.C
-        return sparse.csr_array(product + product.T - sparse.diags_array(y[n] * self.weight))
+            product = omega[:, None] * self.C
+            return product + product.T - np.diag(t * self.weight)
+        product = sparse.diags_array(omega) @ self.C
+        return sparse.csr_array(product + product.T - sparse.diags_array(t * self.weight))
 
     def restrict(self, form: Any) -> Any:
         return form if self._U is None else self._U.T @ (form @ self._U)
@@ -235,17 +246,22 @@ class _Problem:
     def inner(self, form: np.ndarray) -> np.ndarray:
         """Return ``<F_i, form>`` for every i and ``-<W, form>``; ``form`` need not be symmetric."""
         i, j = self._rows, self._columns
-        pull = np.bincount(i, self._data * (form[i, j] + form[j, i]), len(self.weight))
+        pull = np.bincount(self.groups[i], self._data * (form[i, j] + form[j, i]), self.count)
         return np.append(pull, -self.weight @ np.diag(form))
 
     def schur(self, X: np.ndarray, G: np.ndarray, size: int) -> np.ndarray:
         """Return ``<F_i, X F_j G>`` for all pairs, ``-W`` the last, in the corner of a matrix of zeros."""
-        C, weight, n = self.C, self.weight, len(self.weight)
+        C, weight, n = self.C, self.weight, self.count
         CX, CG = C @ X, C @ G
         XC, GC = np.ascontiguousarray(CX.T), np.ascontiguousarray(CG.T)
         M = np.zeros((size, size))
-        M[:n, :n] = CX * GC + CG * XC + (C @ XC) * G + (C @ GC) * X
-        M[:n, n] = M[n, :n] = -np.einsum("ij,ij,j->i", CX, G, weight) - np.einsum("ij,ij,j->i", CG, X, weight)
+        pairs = CX * GC + CG * XC + (C @ XC) * G + (C @ GC) * X
+        mixed = -np.einsum("ij,ij,j->i", CX, G, weight) - np.einsum("ij,ij,j->i", CG, X, weight)
+        if n < len(weight):
+            pairs = np.add.reduceat(np.add.reduceat(pairs[self._order][:, self._order], self._starts), self._starts, 1)
+            mixed = np.add.reduceat(mixed[self._order], self._starts)
+        M[:n, :n] = pairs
+        M[:n, n] = M[n, :n] = mixed
         M[n, n] = weight @ (X * G) @ weight
         return M
 
@@ -255,9 +271,9 @@ class _Problem:
 
 def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution:
     """Iterate on ``y = (omega, t, extra)`` with slacks ``s`` of the weights and their multipliers ``z``."""
-    n = len(problem.weight)
+    n = problem.count
     y = np.insert(weights.start, n, _first_t(problem, weights.start[:n]))
-    X = problem.lift(np.eye(len(problem.restrict(np.eye(n)))))
+    X = problem.lift(np.eye(len(problem.restrict(np.eye(len(problem.weight))))))
     X /= problem.weight @ np.diag(X)
     z = (float(np.abs(problem.inner(X)[:n]).max()) or 1.0) / np.maximum(np.abs(weights.own), np.abs(weights.shared))
     own, factor = _cholesky(problem.restrict(X)), _cholesky(_dense(problem.restrict(problem.combine(y))))
@@ -265,6 +281,7 @@ def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution
         raise NoCertificate("the interior-point method broke down at its start")
     lower, upper, idle, iteration = y, (np.inf, X), 0, 0
     while iteration < _MOST_ITERATIONS:
+        checkpoint()
         iteration += 1
         before = upper[0] - float(lower[n])
         pull = problem.inner(X)
@@ -281,7 +298,7 @@ def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution
         if step is None:
             break
         X, y, z, own, factor = step
-    return Solution(lower[:n], float(lower[n]), problem.restrict(upper[1]), upper[0], iteration)
+    return Solution(lower[problem.groups], float(lower[n]), problem.restrict(upper[1]), upper[0], iteration)
 
 
 def _first_t(problem: _Problem, omega: np.ndarray) -> float:
@@ -324,7 +341,7 @@ class _Newton:
         self.G = problem.lift(_inverse(factor))
         K = problem.schur(X, self.G, len(y))
         weights.add_to(K, z / self.s)
-        n = len(problem.weight)
+        n = problem.count
         border = np.append(np.ones(n), np.zeros(len(y) - n)) if weights.fixed else None
         self.system = _System(K, border, n - float(y[:n].sum()))
 

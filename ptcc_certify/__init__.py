@@ -65,6 +65,8 @@ _EXPORTS = {
     "Comparison": "bounds",
     "Certificate": "certificate",
     "certify": "certificate",
+    "Expectations": "verdict",
+    "Assessment": "verdict",
     "SavedCertificate": "saved",
     "RejectedCertificate": "saved",
     "read_certificate": "saved",

@@ -16,7 +16,8 @@ from ptcc_certify.distance import DistanceBound
 from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain import Gain
-from ptcc_certify.outcomes import influence
+from ptcc_certify.outcomes import Influence, exact_start, influence
+from ptcc_certify.rationals import shorten
 from ptcc_certify.sharpen import SharpMember
 from ptcc_certify.structure import Structure
 from ptcc_certify.theorems import LyapunovFunction
@@ -55,6 +56,52 @@ def float_below(value: Fraction | float) -> float:
     (True, True)
     """
     return math.nextafter(float(value), -math.inf)
+
+
+def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
+    """Return values of ``1 - t/T`` as floats, or refuse what is no instant up to the deadline.
+
+    Raises
+    ------
+    ParameterError
+        A value is not a number from 0 to 1.
+
+    Examples
+    --------
+    >>> remaining_part([1, 0.5])
+    array([1. , 0.5])
+    >>> remaining_part(1.9)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: remaining = 1.9 is outside its domain; it is 1 - t/T, from 1 at 0 to 0 at T
+    """
+    return _within(remaining, name, 1.0, "it is 1 - t/T, from 1 at 0 to 0 at T")
+
+
+def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
+    """Return values of a clock as floats, or refuse those before its start.
+
+    Raises
+    ------
+    ParameterError
+        A value is negative or not a number.
+
+    Examples
+    --------
+    >>> clock_values(np.inf)
+    array(inf)
+    """
+    return _within(clock, name, math.inf, "a clock is 0 at the start and infinite at its deadline")
+
+
+def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {shorten(repr(values))} is not a number, nor an array of numbers") from None
+    outside = array[~((array >= 0) & (array <= most))]  # NaN is neither
+    if outside.size:
+        raise ParameterError(f"{name} = {outside.flat[0]:.12g} is outside its domain; {domain}")
+    return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,82 +350,131 @@ class Envelope:
         -------
         array
             Of the shape of ``clock``; infinite where nothing was proved: an envelope without members bounds nothing.
+
+        Raises
+        ------
+        ParameterError
+            A value is negative or not a number.
         """
-        clock = np.asarray(clock, dtype=float)
+        clock = clock_values(clock)
         factors = [_grown(math.sqrt(m.prefactor), m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
-        """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant."""
-        return float(self.norm_factor(self.gain.clock_at_remaining(remaining)))
+        """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant.
 
-    def bound(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+        Parameters
+        ----------
+        remaining : float
+            From 1 at 0 to 0 at the deadline.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ParameterError
+            ``remaining`` is not one number from 0 to 1.
+        """
+        if np.ndim(remaining):
+            raise ParameterError("remaining is one number from 0 to 1; for several instants ask norm_bound")
+        return float(self.norm_factor(self._clock(remaining)))
+
+    def _clock(self, remaining: Any) -> np.ndarray:
+        """Return the clock where ``1 - t/T`` is ``remaining``, or refuse it."""
+        return np.asarray(self.gain.clock_at_remaining(remaining_part(remaining)))
+
+    def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``.
 
         Parameters
         ----------
         clock : (M,) array or float
             Values of the stretched clock, infinite from the deadline on.
-        x0 : sequence of N numbers
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
             Rationals are taken exactly, floats as the dyadic numbers they are.
 
         Returns
         -------
         (M,) array or float
             Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
         """
-        clock = np.asarray(clock, dtype=float)
+        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
         bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest), m.rate, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
-    def norm_bound(self, remaining: Sequence[float] | np.ndarray, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
-        """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,)."""
-        return self.bound(np.array([float(self.gain.clock_at_remaining(q)) for q in remaining]), x0)
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,).
 
-    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Sequence[Any]) -> np.ndarray:
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        return self.bound(self._clock(remaining), x0)
+
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
 
         Parameters
         ----------
         remaining : float or (M,) array
-        x0 : (N,) array
+            From 1 at 0 to 0 at the deadline.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
 
         Returns
         -------
         (N, M) or (N,) array
             Infinite where nothing was proved.
-        """
-        clocks = np.array([float(self.gain.clock_at_remaining(q)) for q in np.atleast_1d(remaining)])
-        bounds = self.distance(clocks, x0)
-        return bounds if np.ndim(remaining) else bounds[:, 0]
 
-    def distance(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        return self.distance(self._clock(remaining), x0)
+
+    def distance(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
+
+        The least of ``sqrt(c_k e^(-rate s) V(0))`` over the members, and never more than ``max_j |x_j(0) - (Q x0)_j|``:
+        ``x - Q x`` obeys the same equation as ``x``, and ``e^(-L s)`` does not expand the largest entry.
 
         Parameters
         ----------
         clock : (M,) array or float
-        x0 : sequence of N numbers
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
             Rationals are taken exactly, floats as the dyadic numbers they are.
 
         Returns
         -------
         (N, M) array or (N,) array
             Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
         """
         return self._distances(clock, x0, lambda d: d.roots)
 
-    def distance_norm(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def distance_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`distance`."""
         return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
 
     def _distances(
         self,
         clock: np.ndarray | float,
-        x0: Sequence[Any] | np.ndarray,
+        x0: Any,
         constants: Callable[[DistanceBound], np.ndarray],
     ) -> np.ndarray:
-        clock = np.asarray(clock, dtype=float)
+        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
         bounds = []
         for m in self.members:
             if m.distance is not None:
@@ -386,7 +482,10 @@ class Envelope:
                     size = np.nan_to_num(constants(m.distance) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
                 bounds.append(_grown(size, m.rate, clock))
         if bounds:
-            return np.minimum.reduce(bounds)
+            most = self._largest_deviation(x0)
+            if len(bounds[0]) < len(x0):  # of the norm, which has N such entries
+                most *= math.sqrt(len(x0)) * (1 + 1e-15)
+            return np.minimum(np.minimum.reduce(bounds), most)
         return np.full((len(x0), *clock.shape), 0.0 if self._still else np.inf)
 
     @cached_property
@@ -395,12 +494,22 @@ class Envelope:
         return not ErrorSystem(self.structure).nodes
 
     @cached_property
+    def _influence(self) -> Influence:
+        return influence(self.structure)
+
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - (Q x0)_k|``, rounded up."""
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply(start)
+        return float_above(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
+
+    @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
         return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
 
-    def _start(self, member: Member, x0: Sequence[Any] | np.ndarray) -> float:
+    def _start(self, member: Member, x0: Sequence[Fraction]) -> float:
         """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
-        z = member.exact_coordinates_of([as_exact(x) for x in x0], self._rows)
+        z = member.exact_coordinates_of(x0, self._rows)
         top = max(map(abs, z), default=Fraction(0))
         if top == 0:
             return 0.0
@@ -484,12 +593,12 @@ class Envelope:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
-        worst, matrix = 0.0, influence(self.structure)
+        worst = 0.0
         for column in range(states.shape[1]):
             x = states[:, column]
             size = self._unit(x[:, 0])
             bounds, start = self._distance_bounds(trajectory, x, size)
-            final, _ = matrix.apply(start)
+            final, _ = self._influence.apply(start)
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
             norm = np.linalg.norm(excess, axis=0)

@@ -10,17 +10,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lmi.errors import LMIError
+from lmi import deadline
+from lmi.apart import apart
+from lmi.deadline import share_of_time
+from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
-from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member
+from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member, remaining_part
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.checker.reading import MAX_SCALE_BITS
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
@@ -38,16 +41,18 @@ from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.outcomes import Influence, Outcome, exact_start, influence, outcome
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rate_limit import RateLimit, prove_rate_limit
+from ptcc_certify.rate_limit import RateLimit, mean_limit, optimality_ratio, prove_rate_limit
 from ptcc_certify.rationals import as_fraction, shorten, writable
 from ptcc_certify.reaching import ReachingTime, certified_reaching_times
-from ptcc_certify.sharpen import DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
+from ptcc_certify.rounding import down
+from ptcc_certify.sharpen import APART_NODES, DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
 from ptcc_certify.simulation import PAST, simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
 from ptcc_certify.sliding_simulation import rounding_slack
 from ptcc_certify.structure import Claim, Structure, analyse
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
 from ptcc_certify.trajectory import Trajectory
+from ptcc_certify.verdict import MANY_DECADES, Assessment, Expectations, assess
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 #: What :func:`certify` does, in this order.
@@ -59,14 +64,15 @@ STEPS = (
     "outcome",
     "independent check",
 )
+#: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
+#: of the time then left that the first of the steps may take.
+SEARCHING, SHARES = 0.7, (0.3, 0.4, 0.8, 1.0)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
 SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
 #: A simulated end state is settled when it is this near to the outcome, relative to the start.
 SETTLED = 1e-6
-#: From so many decades between weights on, they are named as the reason that nothing was proved.
-MANY_DECADES = 8
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
@@ -105,11 +111,10 @@ class Certificate:
     enclosed : EnclosedOutcome or None
         The same in proved intervals, where the graph is too large for rationals.
     trajectory : Trajectory or None
-    comparison : Comparison or None
     sharpening : Sharpening
         Sharper Lyapunov functions of the classes that ``method`` names, proved.
     limit : RateLimit or None
-        A proved bound that no rate exceeds.
+        The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.
     method : str
     at : Fraction or None
         Instant for which the bound was optimised, in units of time.
@@ -121,8 +126,14 @@ class Certificate:
         Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    time_limit : float
+        Seconds that the searches were given, infinity for no limit.
+    cut_off : tuple of str
+        The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
+    expectations : Expectations
+        What is asked besides; what became of it is part of ``assessment``.
 
     References
     ----------
@@ -136,7 +147,7 @@ class Certificate:
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
     >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
     ('certified', 'bipartite consensus', '1.1')
-    >>> cert.outcome, bool(cert.rate <= cert.rate_limit), cert.checked.accepted
+    >>> cert.outcome, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
     (Outcome(1=1, 2=-1), True, True)
     """
 
@@ -154,7 +165,6 @@ class Certificate:
     outcome: Outcome | None
     enclosed: EnclosedOutcome | None
     trajectory: Trajectory | None
-    comparison: Comparison | None
     sharpening: Sharpening
     limit: RateLimit | None
     method: str
@@ -163,7 +173,10 @@ class Certificate:
     limits: tuple[Limits, ...]
     delta: Fraction | None
     noise: Fraction | None
+    time_limit: float
+    cut_off: tuple[str, ...]
     notes: tuple[str, ...]
+    expectations: Expectations = field(default_factory=Expectations)
 
     @property
     def graph(self) -> SignedDigraph:
@@ -241,7 +254,7 @@ class Certificate:
                 found.append(Obligation("distance", of))
         if self.limit is not None:
             witness = self.limit.witness(self.graph.labels)
-            found.append(Obligation("rate-limit", "rates", {"limit": self.limit.value}, witness))
+            found.append(Obligation(self.limit.kind, "rates", {"limit": self.limit.value}, witness))
         if self.reaching is not None:
             found.append(Obligation("sliding-bound", "protocol"))
             if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
@@ -268,6 +281,13 @@ class Certificate:
         return forms
 
     @cached_property
+    def comparison(self) -> Comparison | None:
+        """The simulated run against the proved bounds; None without a run, or if nothing was proved."""
+        if self.trajectory is None or not (self.envelope.members or isinstance(self.envelope, SlidingEnvelope)):
+            return None
+        return self.envelope.compare(self.trajectory)
+
+    @cached_property
     def effort(self) -> Effort | None:
         """What is proved about the input; None if no decay was proved."""
         if self.rate is None and not self.constant:
@@ -277,10 +297,11 @@ class Certificate:
             self.protocol,
             self.forms,
             rate=self.rate,
-            limit=None if self.limit is None else self.limit.value,
+            limit=self.upper_bound,
             start=self.start,
             starts=self.starts,
             sigma0=self.sigma0,
+            reaching=None if self.reaching is None else [r.z for r in self.reaching],
             influence=self.influence,
             distances=[None if m.distance is None else m.distance.agents for m in self.envelope.members],
             limits=self.limits,
@@ -317,12 +338,27 @@ class Certificate:
         """``certified`` if rate and outcome were proved and the independent check accepts it, else ``undecided``."""
         return CERTIFIED if self.checked is not None and self.checked.accepted else UNDECIDED
 
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The graded verdict: whether the bound says something by the deadline, and what became of expectations."""
+        return assess(self)
+
     @property
-    def tightness(self) -> float | None:
-        """Proved rate over spectral rate, at most 1."""
-        if self.rate is None or not self.spectral_rate:
+    def longest_way(self) -> float | None:
+        """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
+        if self.start is None or self.outcome is None:
             return None
-        return float(self.rate) / self.spectral_rate
+        return float(np.abs(np.array([float(x) for x in self.start]) - self.outcome.values).max())
+
+    @property
+    def upper_bound(self) -> Fraction | None:
+        """The proved upper bound on the decay rate, per unit of the clock: no Lyapunov function exceeds it."""
+        return None if self.limit is None else self.limit.value
+
+    @property
+    def optimality_ratio(self) -> float | None:
+        """Proved rate over its proved upper bound, rounded down; at most 1."""
+        return optimality_ratio(self.rate, self.upper_bound)
 
     @property
     def rounding_loss(self) -> float | None:
@@ -340,14 +376,6 @@ class Certificate:
     def direct(self) -> bool:
         """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
         return not any(self.sigma0 or ())
-
-    @cached_property
-    def rate_limit(self) -> Fraction | None:
-        """An exact upper bound of every rate, proved: the better of ``limit`` and twice the mean nonzero eigenvalue."""
-        r = self.graph.n_nodes - len(self.influence.balanced)
-        trace = sum((abs(self.graph.exact_weight(i)) for i in range(self.graph.n_edges)), Fraction(0))
-        known = [2 * trace / r] if r else []
-        return min([*known, *([self.limit.value] if self.limit else [])], default=None)
 
     @cached_property
     def envelope(self) -> Envelope:
@@ -391,7 +419,7 @@ class Certificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.norm_bound(remaining, self._known_start())
 
@@ -403,7 +431,7 @@ class Certificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.outcome_distance(remaining, self._known_start())
 
@@ -413,10 +441,16 @@ class Certificate:
         return self.start
 
     def best_possible_residual(self, remaining: float) -> float | None:
-        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical)."""
+        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical).
+
+        Raises
+        ------
+        ParameterError
+            ``remaining`` is not from 0 to 1.
+        """
         if self.spectral_rate is None:
             return None
-        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining) / 2)
+        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining_part(remaining)) / 2)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``, without side files."""
@@ -453,7 +487,7 @@ class Certificate:
         return certificate_html(self)
 
     def __repr__(self) -> str:
-        rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
+        rate = "none" if self.rate is None else down(self.rate)
         said = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
         return f"Certificate({said}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
@@ -472,6 +506,8 @@ def certify(
     limits: Sequence[Actuator | Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    time_limit: float | None = None,
+    expectations: Expectations | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -482,10 +518,12 @@ def certify(
         Any signed digraph, disconnected ones included.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
-    x0 : sequence of N numbers or mapping of label to number, optional
-        The start, in node order or by label. Without it there is no final state and no simulation.
-    sigma0 : sequence of N numbers or mapping of label to number, optional
-        Sliding mode: ``sigma(0)``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the outcome.
+    x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        The start, in node order, or by label where there are labels. Without it there is no final state and no
+        simulation.
+    sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
+        outcome.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.simulate`.
     simulation : bool, optional
@@ -499,11 +537,18 @@ def certify(
         ``||X(0)||_inf <= R``.
     limits : sequence of Actuator
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
         Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    time_limit : float, optional
+        Seconds of wall time. Simulation and searches may take 70 % together, each its share of what is left; what is
+        proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
+        more for every 1,000 nodes.
+    expectations : Expectations, optional
+        What is asked besides: a behaviour, a rate, a bound of the input. It decides nothing but the ``assessment``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -514,8 +559,8 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a start of the wrong length, beyond 1e300 or of thousands of digits, or a
-        disturbance that exceeds ``delta``.
+        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, with other labels
+        than the nodes, beyond 1e300 or of thousands of digits, or a disturbance that exceeds ``delta``.
 
     References
     ----------
@@ -558,8 +603,12 @@ ReachingTime(0, 1 before T_r)))
     judged = tuple(_limits(entry, protocol) for entry in limits)
     start = None if x0 is None else _start(structure, x0, "x0")
     manifold, reaching = _reaching(structure, protocol, sigma0)
-    trajectory = comparison = None
+    trajectory = None
     notes: list[str] = []
+    cut_off: list[str] = []
+    seconds = 60 + graph.n_nodes / 1000 if time_limit is None else time_limit
+    if not seconds > 0:
+        raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
     if simulation is None and graph.n_nodes > SIMULATED_NODES:
         notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
         simulation = False
@@ -568,24 +617,32 @@ ReachingTime(0, 1 before T_r)))
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
         source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
         source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
-    if begin is not None:
-        progress(STEPS[0])
-        more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
-        if sliding:
-            more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
-        try:
-            trajectory = simulate(graph, protocol, [float(x) for x in begin], **more)
-        except SimulationError as error:
-            notes.append(f"simulation: {error}")
-    progress(STEPS[1])
     theorem = theorem_for(structure, protocol.kind)
-    V, proof, numerical = _search_and_prove(structure, theorem, notes)
-    progress(STEPS[2])
-    sharpening = _sharpen(structure, protocol, method, instant, notes)
-    if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
-        notes.insert(0, _precision_note(graph))
-    progress(STEPS[3])
-    limit = prove_rate_limit(structure)
+    V, proof, numerical, limit, sharpening = None, RateProof(None, ()), None, None, Sharpening()
+    with deadline.time_limit(SEARCHING * seconds):
+        if begin is not None:
+            progress(STEPS[0])
+            more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
+            if sliding:
+                more |= {"sigma0": [float(x) for x in manifold or ()], "disturbance": disturbance}
+            with share_of_time(SHARES[0], STEPS[0], cut_off):
+                try:
+                    trajectory = simulate(graph, protocol, [float(x) for x in begin], **more)
+                except SimulationError as error:
+                    notes.append(f"simulation: {error}")
+        progress(STEPS[1])
+        with share_of_time(SHARES[1], STEPS[1], cut_off):
+            V, proof, numerical = _search_and_prove(structure, theorem, notes)
+        progress(STEPS[2])
+        with share_of_time(SHARES[2], STEPS[2], cut_off):
+            sharpening = _sharpen(structure, protocol, method, instant, notes)
+            cut_off += sharpening.cut_off
+        if proof.rate is None and not any(m.rate > 0 for m in sharpening.members) and graph.n_edges:
+            notes.insert(0, _precision_note(graph))
+        progress(STEPS[3])
+        limit = mean_limit(structure)  # which stands if time runs out
+        with share_of_time(SHARES[3], STEPS[3], cut_off):
+            limit = prove_rate_limit(structure)
     progress(STEPS[4])
     matrix = influence(structure)
     gone = manifold or [Fraction(0)] * graph.n_nodes
@@ -618,7 +675,6 @@ ReachingTime(0, 1 before T_r)))
         outcome=result,
         enclosed=enclosed,
         trajectory=trajectory,
-        comparison=comparison,
         sharpening=sharpening,
         limit=limit,
         method=method,
@@ -627,10 +683,11 @@ ReachingTime(0, 1 before T_r)))
         limits=judged,
         delta=spread,
         noise=blur,
+        time_limit=seconds,
+        cut_off=tuple(cut_off),
         notes=tuple(notes),
+        expectations=expectations or Expectations(),
     )
-    if trajectory is not None and (certificate.envelope.members or sliding):
-        certificate = replace(certificate, comparison=certificate.envelope.compare(trajectory))
     progress(STEPS[5])
     report = certificate.checked
     if report is not None and report.accepted and report.memory > 1:
@@ -754,8 +811,11 @@ def _search_and_prove(
         return None, nothing, None
     try:
         with np.errstate(all="ignore"):
-            V = theorem.lyapunov(structure)
+            search = partial(_searched, theorem, structure)
+            (V,) = apart(search) if n > APART_NODES else search()
             numerical = theorem.rate(structure, V) if V.blocks else None
+    except OutOfTime:
+        raise
     except (LMIError, np.linalg.LinAlgError) as error:
         notes.append(f"no Lyapunov matrix was found: {error}")
         return None, nothing, None
@@ -774,6 +834,10 @@ def _search_and_prove(
     if proof.failed:
         notes.append(proof.failed)
     return V, proof, numerical
+
+
+def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
+    return [theorem.lyapunov(structure)]
 
 
 def _instant(at: Any, protocol: Protocol) -> Fraction:
@@ -812,9 +876,7 @@ def _sharpen(
 
 def _precision_note(graph: SignedDigraph) -> str:
     """Tell how far apart the weights lie, where no rate was proved."""
-    sizes = [abs(graph.exact_weight(i)) for i in range(graph.n_edges)]
-    ratio = max(sizes) / min(sizes)
-    decades = len(str(ratio.numerator // ratio.denominator)) - 1
+    decades = graph.weight_decades
     if decades < MANY_DECADES:
         return "no rate was proved"
     return f"no rate was proved; the weights span {decades} decades, which may be too many for float64"

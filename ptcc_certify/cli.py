@@ -10,7 +10,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -32,8 +34,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.structure import Structure
 
-OK, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 2, 3, 4
-VIOLATED = REJECTED = 1
+OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.verdict has them too
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
@@ -49,7 +50,11 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 _reading_options = _options(
-    click.option("--edges", type=click.Choice(["information", "listens"]), help="Row a,b: flows a -> b, or a listens."),
+    click.option(
+        "--edges",
+        type=click.Choice(["information", "listens"]),
+        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
+    ),
     click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
     click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
@@ -106,6 +111,12 @@ _memory_option = click.option(
     metavar="GB",
     help="What the check may take; a certificate that may take more is refused.",
 )
+_time_limit_option = click.option(
+    "--time-limit",
+    type=float,
+    metavar="SECONDS",
+    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
+)
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
@@ -157,7 +168,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
         _print_json(structure_document(structure))
     else:
         _print(structure_lines(structure, graph))
-    return _refuted(structure, expected)
+    return OK if expected is None else _judged_behaviour(structure, expected)
 
 
 @cli.command()
@@ -174,6 +185,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
 @click.option(
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
 )
+@_time_limit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @_json_option
 def certify(
@@ -188,6 +200,7 @@ def certify(
     simulation: bool | None,
     initial_bound: str | None,
     max_input: str | None,
+    time_limit: float | None,
     output: str | None,
     as_json: bool,
     **options: Any,
@@ -196,11 +209,13 @@ def certify(
     from ptcc_certify.certificate import STEPS
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.summary import certificate_lines
+    from ptcc_certify.verdict import Expectations
 
-    expected, wanted, instant = _behaviour(expect), _number(min_rate, "--min-rate"), _number(at, "--at")
-    bound, most = _number(initial_bound, "--initial-bound"), _number(max_input, "--max-input")
+    instant, bound = _number(at, "--at"), _number(initial_bound, "--initial-bound")
+    most = _number(max_input, "--max-input")
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
+    expected = Expectations(_behaviour(expect), _number(min_rate, "--min-rate"), most)
     _refuse_output(output, graph)
     protocol = _protocol(kind, options)
     signed = _read(graph, **options)
@@ -221,18 +236,23 @@ def certify(
             at=instant,
             simulation=simulation,
             starts=bound,
+            time_limit=time_limit,
+            expectations=expected,
             progress=begin,
             **more,
         )
     if output:
         certificate.save(output)
+    found = certificate.assessment
     if as_json:
         _print_json(certificate.to_dict())
+        if found.exit_code:
+            click.echo(f"verdict    {found.text}", err=True)
     else:
         _print(certificate_lines(certificate, graph))
         if output:
             click.echo(f"written    {output}")
-    return _exit_code(certificate, expected, wanted) or _input_code(certificate, most)
+    return found.exit_code
 
 
 @cli.command()
@@ -407,6 +427,8 @@ def design(
 ) -> int:
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
+    The numbers printed are exact, and the last line is the command that proves them again with exit code 0.
+
     Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
     from ptcc_certify.gain_design import INFEASIBLE, MET
@@ -433,12 +455,19 @@ def design(
         found.certificate.save(output)
     if curve:
         _save_curve(found, curve)
+    command = _certify_command(found, graph, read)
     if as_json:
-        _print_json(found.to_dict())
+        _print_json(found.to_dict() | {"command": command})
     else:
         _print(found.lines())
         if output and found.certificate is not None:
             click.echo(f"written    {output}")
+        if command is not None:
+            again = " (give it the graph again, on standard input)" if graph == "-" else ""
+            click.echo(f"to prove it again{again}:\n{command}")
+        elif found.protocol is not None:
+            why = "certify finds other functions for these gains, which prove less"
+            click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
     return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
 
 
@@ -456,13 +485,15 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     """
     from ptcc_certify.certificate import certify as run
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.paper_figures import Run, paper_figures, results_csv, tightness
+    from ptcc_certify.paper_figures import Run, paper_figures, results_csv
+    from ptcc_certify.rounding import down
+    from ptcc_certify.verdict import Expectations, worst_code
 
-    chosen, code, runs = select(name), OK, []
+    chosen, codes, runs = select(name), [], []
     if output:
         _make_folder(output)
     click.echo(
-        f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'tightness':>11}{'worst':>8}"
+        f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'optimality':>12}{'worst':>8}"
         f"{'reached':>10}{'proved by':>11}{'T_r':>5}  {'final state':<14}verdict"
     )
     for example, graph_name, reported in chosen:
@@ -472,16 +503,17 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             example.x0.split(","),
             sigma0=example.sigma0 and example.sigma0.split(","),
             disturbance=example.disturbance,
+            expectations=Expectations(reported),
         )
         claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
         assert claim is not None
         click.echo(
             f"{example.number} {graph_name:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-            f"{int((rate or 0) * 10_000) / 10_000:>9.4f}{tightness(certificate) or 0:>11.4f}"
+            f"{down(rate or Fraction(0)):>9}{down(certificate.optimality_ratio or 0.0, 4):>12}"
             f"{seen.worst_ratio if seen else 0:>8.3f}{_reached(certificate)}  "
-            f"{_ends(certificate):<14}{certificate.verdict}"
+            f"{_ends(certificate):<14}{certificate.assessment.word}"
         )
-        code = max(code, _exit_code(certificate, reported, None))
+        codes.append(certificate.assessment.exit_code)
         if output:
             stem = Path(output) / (graph_name if example.sigma0 is None else f"{graph_name}_sliding")
             certificate.save(f"{stem}.json")
@@ -493,7 +525,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
         for title, figure in paper_figures(runs).items():
             save_figure(figure, Path(output) / f"{title}.{suffix}")
         write_atomically(Path(output) / "examples.csv", results_csv(runs))
-    return code
+    return worst_code(codes)
 
 
 @cli.command()
@@ -505,6 +537,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @_method_option
 @_starts_option
 @click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@_time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
@@ -530,8 +563,9 @@ def batch(
     weight_decades, undirected); several may be given. Every graph has a random start of its own, unless --x0 is given.
 
     Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
-    missing, and with files that have changed. Whatever goes wrong with one graph becomes the column error of its row.
-    Without -o the table is printed as CSV when it is complete.
+    missing, and with files that have changed; the list of graphs may have changed too. FILE then has the rows so far.
+    Whatever goes wrong with one graph becomes the column error of its row. Without -o the table is printed as CSV when
+    it is complete, or with the rows so far when it ends before.
 
     Exit code 0: every graph certified, and what was asked of them holds. Otherwise the table is there too, and the
     code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
@@ -555,14 +589,14 @@ def batch(
     if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out")
     protocol = _protocol(kind, {**dict.fromkeys(_LIMITS), **options}, ())
-    done = total = 0
-    with _counting() as show:
+    total = 0
+    with _counting() as show, _interrupted_by_term():
 
         def progress(*counts: int) -> None:
-            nonlocal done, total
+            nonlocal total
             if output and total == 0 and counts[0]:
                 click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
-            done, total, _ = counts
+            total = counts[1]
             show(*counts)
 
         try:
@@ -570,7 +604,7 @@ def batch(
                 pattern,
                 protocol,
                 **{name: options[name] for name in ("x0", "seed", "sigma0", "disturbance", "method", "simulation")},
-                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected")},
+                **{name: options[name] for name in ("duplicates", "drop_self_loops", "undirected", "time_limit")},
                 orientation=options["edges"],
                 initial_bound=bound,
                 expect=expected,
@@ -581,10 +615,14 @@ def batch(
                 restart=restart,
                 progress=progress,
             )
-        except KeyboardInterrupt:
-            kept = f"{done} of {total} rows are kept, the same command{' without --restart' * restart} goes on"
-            click.echo(f"ptcc: interrupted; {kept if output and total else 'nothing is kept'}", err=True)
-            return INTERRUPTED
+        except BaseException as error:
+            found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+            if found or stopped:
+                kept = _kept(found, total, output, restart)
+                click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
+            if stopped:
+                return INTERRUPTED
+            raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
     else:
@@ -713,7 +751,7 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 def _reached(certificate: Certificate) -> str:
     """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
     from ptcc_certify.paper_figures import reaching_times
-    from ptcc_certify.summary import up
+    from ptcc_certify.rounding import up
 
     last, proved, deadline = reaching_times(certificate)
     if isinstance(last, str):
@@ -722,12 +760,16 @@ def _reached(certificate: Certificate) -> str:
 
 
 def _ends(certificate: Certificate) -> str:
-    """Return the outcome in a few letters: 0, a common size, or the largest."""
+    """Return the outcome in a few letters: 0, a common size, or the largest, rounded up."""
+    from ptcc_certify.rounding import near, up
+
     if certificate.outcome is None:
         return "-"
-    sizes = {abs(float(x)) for x in certificate.outcome.final_state}
-    largest = f"{max(sizes):.5g}"
-    return largest if sizes == {0} else f"+-{largest}" if len(sizes) == 1 else f"|x| <= {largest}"
+    sizes = {abs(Fraction(x)) for x in certificate.outcome.final_state}
+    largest = max(sizes)
+    return (
+        near(largest, 5) if sizes == {0} else f"+-{near(largest, 5)}" if len(sizes) == 1 else f"|x| <= {up(largest, 5)}"
+    )
 
 
 def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
@@ -781,60 +823,32 @@ def _number(text: str | None, option: str) -> Fraction | None:
         raise ParameterError(f"{option}: {error}") from None
 
 
-def _refuted(structure: Structure, expected: str | None) -> int:
-    if expected is None:
-        return OK
-    if structure.holds(expected):
-        if len(structure.components) > 1:
-            click.echo(f"note: {expected} holds in each of the components by itself", err=True)
-        return OK
-    click.echo(f"refuted: {expected} does not follow for this graph", err=True)
-    return REFUTED_EXPECTATION
+def _judged_behaviour(structure: Structure, expected: str) -> int:
+    from ptcc_certify.verdict import MET, judge_behaviour
 
-
-def _exit_code(certificate: Certificate, expected: str | None, min_rate: Fraction | None) -> int:
-    if certificate.comparison is not None and certificate.comparison.violated:
-        click.echo("violated: the simulated run exceeds the proved bound; please report this graph", err=True)
-        return VIOLATED
-    if code := _refuted(certificate.structure, expected):
-        return code
-    code = OK if certificate.verdict == "certified" else UNDECIDED
-    if min_rate is None or certificate.constant:
-        return code
-    if certificate.rate is not None and certificate.rate >= min_rate:
-        return code
-    limit = certificate.rate_limit
-    if limit is not None and min_rate > limit:
-        click.echo(f"refuted: no rate of this graph exceeds {float(limit):.6g} (proved)", err=True)
+    answer = judge_behaviour(structure, expected)
+    if answer.status != MET:
+        click.echo(f"{answer.status}: {answer}", err=True)
         return REFUTED_EXPECTATION
-    click.echo("undecided: no such rate is proved, and none is excluded", err=True)
-    return UNDECIDED
+    if len(structure.components) > 1:
+        click.echo(f"note: {expected} holds in each of the components by itself", err=True)
+    return OK
 
 
-def _input_code(certificate: Certificate, most: Fraction | None) -> int:
-    """Return the exit code of --max-input; with limits of the gain, of the input under these."""
-    effort = certificate.effort
-    if most is None or certificate.constant:
-        return OK
-    if effort is not None and certificate.limits:
-        proved = [entry.largest for entry in effort.residual]
-        if len(proved) == len(certificate.limits) and all(x is not None and x <= most for x in proved):
-            return OK
-    elif effort is not None and effort.peak is not None and effort.peak.largest <= most:
-        return OK
-    if effort is not None and effort.first is not None:
-        p = certificate.protocol
-        gain = p.rho1 + p.rho2 * p.kappa / p.T
-        caps = [limits.gain_cap for limits in certificate.limits if limits.gain_cap is not None]
-        first = effort.first * min([Fraction(1), *(cap / gain for cap in caps)])
-        if first > most:
-            click.echo(f"refuted: the input is up to {float(first):.6g} at the start (proved)", err=True)
-            return REFUTED_EXPECTATION
-    if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
-        click.echo("refuted: from some of these starts the input grows without limit (proved)", err=True)
-        return REFUTED_EXPECTATION
-    click.echo("undecided: no such peak is proved, and none is excluded", err=True)
-    return UNDECIDED
+def _certify_command(found: Design, graph: str, read: dict[str, Any]) -> str | None:
+    """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
+    import shlex
+
+    options = found.certify_options
+    if options is None:
+        return None
+    flags = [] if read["edges"] is None else ["--edges", read["edges"]]
+    flags += [] if read["duplicates"] == "refuse" else ["--duplicates", read["duplicates"]]
+    flags += [f"--{name.replace('_', '-')}" for name in ("drop_self_loops", "undirected") if read[name]]
+    given = [*flags, *options]
+    if graph.startswith("-") and graph != "-":
+        return shlex.join(["ptcc", "certify", *given, "--", graph])
+    return shlex.join(["ptcc", "certify", graph, *given])
 
 
 @contextmanager
@@ -859,22 +873,53 @@ def _counting() -> Iterator[Callable[[int, int, int], None]]:
         yield show
 
 
+@contextmanager
+def _interrupted_by_term() -> Iterator[None]:
+    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():  # which alone handles signals
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
+    """Tell, after a batch ended before its time, which rows there are and how it goes on; print them without a file."""
+    from ptcc_certify.batch import table_bytes
+
+    if not rows:
+        return "nothing is kept"
+    if output is None:
+        click.echo(table_bytes(rows, ".csv").decode(), nl=False, color=True)
+        return f"{len(rows)} of {total} rows are printed; with -o FILE.csv the same command could go on"
+    missing = f"{total - len(rows)} are missing, and the same command{' without --restart' * restart} goes on"
+    return f"{len(rows)} of {total} rows are kept, in {output} too; {missing}"
+
+
 def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
+    from ptcc_certify.verdict import OPEN, REFUTED, exit_code
+
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)
-    refuted = sum(row["asked"] == "refuted" for row in rows)
-    undecided = sum(row["verdict"] == "undecided" or row["asked"] == "undecided" for row in rows)
+    refuted = sum(row["asked"] == REFUTED for row in rows)
+    undecided = sum(row["verdict"] == "undecided" or row["asked"] == OPEN for row in rows)
+    cut_off = sum(row["cut_off"] is not None for row in rows)
+    if cut_off:
+        click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
     said = (
-        (violated, "violated: the simulated run exceeds the proved bound; please report", VIOLATED),
-        (refuted, "refuted: what was asked does not hold", REFUTED_EXPECTATION),
-        (undecided, "undecided", UNDECIDED),
-        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}", UNDECIDED),
+        (violated, "violated: the simulated run exceeds the proved bound; please report"),
+        (refuted, "refuted: what was asked does not hold"),
+        (undecided, "undecided, or what was asked is left open"),
+        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}"),
     )
-    for count, text, _ in said:
+    for count, text in said:
         if count:
             click.echo(f"note: {count} of {len(rows)} graphs: {text}", err=True)
-    return next((code for count, _, code in said if count), OK)
+    return exit_code(bool(violated), bool(refuted), bool(undecided or failed))
 
 
 def _refuse_output(output: str | None, graph: str) -> None:

@@ -9,25 +9,30 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from itertools import chain
 from math import isqrt
 from operator import mul
 from typing import Any
 
 from ptcc_certify.sparse_definite import dense_definite
-from ptcc_certify.work import affordable, spend
+from ptcc_certify.spectral_line import characteristic
+from ptcc_certify.work import affordable, fits, spend
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the factor, one after the other, until the proof succeeds.
 BITS = (128, 320, 1024, 4096)
-#: Up to this many rows python-flint decides: by the characteristic polynomial, and by exact solutions.
+#: Up to this many rows python-flint decides, by the characteristic polynomial.
 FLINT_ROWS = 24
 #: python-flint is not asked about entries longer than these bits over the number of rows.
 FLINT_BITS = 40_000
-#: Above this many rows NumPy, where it is installed, forms factor and remainder.
-NUMPY_ROWS = 150
-#: Bits that the entries of a dense matrix may take together.
-MOST_BITS = 400_000_000
+#: Above this many rows NumPy, where it is installed, forms factor and remainder, or solves.
+NUMPY_ROWS = 24
+#: Bits of all entries up to which python-flint multiplies large matrices.
+LONGEST = 200_000_000
+#: Bits of an inverse factor in floats, and how near it takes a matrix to the identity: ``2^-CONGRUENCE``.
+FLOAT_BITS, CONGRUENCE = 53, 30
 
 
 class Factor:
@@ -47,10 +52,9 @@ class Factor:
 
     Examples
     --------
-    >>> Factor([[2, 1], [1, 1]], 64).bounds([1, 0], 1), Factor([[2, 1], [1, 1]], 64).bounds([1, 1], 1)
-    (False, False)
-    >>> Factor([[2, 1], [1, 1]], 64).bounds([1, 0], 2)
-    True
+    >>> value = Factor([[2, 1], [1, 1]], 64).above([1, 0])
+    >>> float(value), value > 1
+    (1.0, True)
     """
 
     def __init__(self, S: Rows, bits: int):
@@ -62,7 +66,7 @@ class Factor:
         self.diagonal: list[int] = []
         # Scaled entries lie below 4^(bits + 1), so entries of R below 2^(bits + 1). A scaled entry is cut to an
         # integer and a quotient is rounded: each off-diagonal entry of E is at most 2^bits + 1 in size. With one more
-        # row below (see `bounds`) a row of E has n of them.
+        # row below (see `above`) a row of E has n of them.
         self.slack = (n + 1) * (2**bits + 1)
         for i in range(n):
             row = self._substituted(S[i], self.shifts[i])
@@ -86,15 +90,14 @@ class Factor:
             row.append((2 * left + pivot) // (2 * pivot))
         return row
 
-    def bounds(self, d: Sequence[int], c: int) -> bool:
-        """Prove ``(d'x)^2 < c x'S x`` for all ``x`` but 0: ``[[S, d], [d', c]]`` is definite; or that ``d`` is 0."""
+    def above(self, d: Sequence[int]) -> Fraction:
+        """Bound ``d'S^-1 d`` from above, to ``bits`` bits or so: ``[[S, d], [d', c]]`` is definite for this ``c``."""
         if not any(d):
-            return c >= 0
-        if c <= 0:
-            return False
-        shift = self._shift(c)
+            return Fraction(0)
+        # The largest of d_i^2 / S_ii, none of which exceeds the value, gets as large as a diagonal entry of S.
+        shift = 2 * self.bits - max(abs(x).bit_length() + own for x, own in zip(d, self.shifts, strict=True) if x)
         row = self._substituted(d, shift)
-        return _scaled(c, 2 * shift) - sum(map(mul, row, row)) >= self.slack
+        return Fraction(sum(map(mul, row, row)) + self.slack) / Fraction(4) ** shift
 
 
 def _scaled(entry: int, shift: int) -> int:
@@ -133,10 +136,42 @@ class Standard:
                     continue
         return None
 
+    def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
+        """Return ``det(x I - A)`` of a sparse integer matrix, the leading coefficient first.
+
+        Examples
+        --------
+        >>> Standard().characteristic([{0: 1, 1: 2}, {0: 3, 1: 4}])
+        [1, -5, -2]
+        """
+        return characteristic(rows)
+
+    def above(self, S: Rows, D: Rows, bits: int = BITS[0]) -> list[Fraction] | None:
+        """Bound ``d'S^-1 d`` from above for every row ``d`` of ``D``, by one factor; None if ``S > 0`` is not proved.
+
+        Parameters
+        ----------
+        S : n rows of n integers
+        D : rows of n integers
+            A bound is 0 iff the row is.
+        bits : int
+            Of the factor, at least; the bounds are sharp to about as many unless ``S`` is nearly singular.
+
+        Examples
+        --------
+        >>> [float(x) for x in Standard().above([[2, 1], [1, 1]], [[1, 0], [0, 2]])]
+        [1.0, 8.0]
+        """
+        factor = self.factor(S, bits)
+        if factor is None:
+            return None
+        spend(len(D) * len(S) ** 2 // 2, factor.bits, factor.bits, "constants of many agents")
+        return [factor.above(d) for d in D]
+
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
         """Return the first ``k`` for which ``(d_k'x)^2 < c_k x'S x`` is not proved for all ``x``; None if all are.
 
-        Where ``d_k = 0``, nonnegative ``c_k`` will do.
+        Where ``d_k = 0``, nonnegative ``c_k`` will do. Nothing is bounded unless ``S > 0`` is proved.
 
         Parameters
         ----------
@@ -150,11 +185,11 @@ class Standard:
         """
         todo = list(range(len(forms)))
         for bits in BITS:
-            factor = self.factor(S, bits)
-            if factor is None:
+            values = self.above(S, [forms[k][0] for k in todo], bits)
+            if values is None:
                 return 0
-            spend(len(todo) * len(S) ** 2 // 2, bits, bits, "constants of many agents")
-            todo = [k for k in todo if not factor.bounds(*forms[k])]
+            pairs = ((k, forms[k][1], value) for k, value in zip(todo, values, strict=True))
+            todo = [k for k, c, value in pairs if not (value < c or value == c == 0)]
             if not todo:
                 return None
         return todo[0]
@@ -163,8 +198,8 @@ class Standard:
 class Flint(Standard):
     """Definiteness by python-flint, and by NumPy for large matrices; in between as above.
 
-    python-flint solves exactly and forms the characteristic polynomial: ``S > 0`` iff its signs alternate strictly
-    (Descartes; its roots are real).
+    python-flint forms the characteristic polynomial: ``S > 0`` iff its signs alternate strictly (Descartes; its roots
+    are real).
     """
 
     def __init__(self) -> None:
@@ -185,20 +220,94 @@ class Flint(Standard):
         coefficients = self.flint.fmpz_mat([list(row) for row in S]).charpoly().coeffs()  # constant term first
         return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
 
-    def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
-        """Return the first form that exceeds its bound, by exact solutions; see :meth:`Standard.bounded`."""
-        if not forms or not self._short([*S, *(d for d, _ in forms)]) or len(S) > FLINT_ROWS or not self.definite(S):
-            return super().bounded(S, forms)
-        columns = self.flint.fmpz_mat([list(column) for column in zip(*(d for d, _ in forms), strict=True)])
-        solved, scale = self.flint.fmpz_mat([list(row) for row in S]).solve(columns).numer_denom()
-        reached = columns.transpose() * solved
-        exceeds = (k for k, (d, c) in enumerate(forms) if reached[k, k] >= c * scale and (any(d) or c < 0))
-        return next(exceeds, None)
+    def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
+        """Return the characteristic polynomial; see :meth:`Standard.characteristic`."""
+        dense = [[row.get(j, 0) for j in range(len(rows))] for row in rows]
+        return [int(c) for c in reversed(self.flint.fmpz_mat(dense).charpoly().coeffs())]
+
+    def above(self, S: Rows, D: Rows, bits: int = BITS[0]) -> list[Fraction] | None:
+        """Bound ``d'S^-1 d`` from above for every row ``d`` of ``D``; see :meth:`Standard.above`.
+
+        For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
+        """
+        if self.numpy and len(S) > NUMPY_ROWS and bits == BITS[0]:
+            values = self._above_by_congruence(S, D)
+            if values is not None:
+                return values
+        return super().above(S, D, bits)
+
+    def _above_by_congruence(self, S: Rows, D: Rows) -> list[Fraction] | None:
+        """Bound ``d'S^-1 d`` by ``|Y'd|^2 / least``, since ``Y'S Y >= least I`` is dominated by its diagonal."""
+        np, matrix = importlib.import_module("numpy"), self.flint.fmpz_mat
+        if any(row[i] <= 0 for i, row in enumerate(S)):
+            return None
+        T, halves = unit_diagonal(S)
+        try:
+            found = np.linalg.inv(np.linalg.cholesky(T)).T
+        except np.linalg.LinAlgError:
+            return None
+        # Y = 2^-power U found, U diagonal, in integers: columns of S and D are multiplied by U first
+        up = [max(halves) - half for half in halves]
+        bits = len(S) * longest(S) + len(D) * longest(D) + 2 * (len(S) + len(D)) * max(up)
+        if not fits(bits * len(S), LONGEST) or not np.isfinite(found).all():
+            return None
+        spend((len(S) + len(D)) * len(S) ** 2 // 10, bits // len(S), FLOAT_BITS, "constants of many agents")
+        power = FLOAT_BITS - int(np.frexp(np.abs(found).max())[1])
+        Y = matrix([[int(x) for x in row] for row in np.ldexp(found, power).tolist()])
+        SU = matrix([[x << i + j for x, j in zip(row, up, strict=True)] for row, i in zip(S, up, strict=True)])
+        G = [[int(x) for x in row] for row in (Y.transpose() * (SU * Y)).tolist()]
+        least, one = min(2 * row[i] - sum(map(abs, row)) for i, row in enumerate(G)), 4 ** (max(halves) + power)
+        if (one - least) << CONGRUENCE > one:
+            return None
+        moved = matrix([[x << j for x, j in zip(d, up, strict=True)] for d in D]) * Y
+        return [Fraction(int(sum(x * x for x in row)), least) for row in moved.tolist()]
 
     def _short(self, rows: Rows) -> bool:
         """Tell whether a matrix is small, and its entries short, for what python-flint does."""
-        longest = max((x.bit_length() for row in rows for x in row), default=0)
-        return 0 < len(rows[0] if rows else ()) <= FLINT_ROWS and longest * len(rows) <= FLINT_BITS
+        return 0 < len(rows[0] if rows else ()) <= FLINT_ROWS and longest(rows) * len(rows) <= FLINT_BITS
+
+
+def longest(rows: Rows) -> int:
+    """Return the bits of the largest entry in size.
+
+    Examples
+    --------
+    >>> longest([[1, 2], [-5, 0]])
+    3
+    """
+    return max(map(abs, chain.from_iterable(rows)), default=0).bit_length()
+
+
+def floats(rows: Rows) -> tuple[Any, int]:
+    """Return integers of any size as an array of float64 and a power of two, by which it is to be multiplied.
+
+    Examples
+    --------
+    >>> array, power = floats([[1, 2], [3, 10**400]])
+    >>> [round(x * 2.0 ** (power - 1328), 3) for x in array[1].tolist()]
+    [0.0, 1.707]
+    """
+    np = importlib.import_module("numpy")
+    power = max(longest(rows) - 1000, 0)
+    return np.array([[x >> power for x in row] for row in rows] if power else rows, dtype=float), power
+
+
+def unit_diagonal(S: Rows) -> tuple[Any, list[int]]:
+    """Return ``T_ij = 2^(-h_i - h_j) S_ij`` in floats, its diagonal between 1/4 and 1, and ``h``.
+
+    Entries of ``S`` that are smaller than the largest one by 300 decades are lost.
+
+    Examples
+    --------
+    >>> T, halves = unit_diagonal([[4, 1], [1, 9]])
+    >>> T.tolist(), halves
+    ([[0.25, 0.0625], [0.0625, 0.5625]], [2, 2])
+    """
+    np = importlib.import_module("numpy")
+    halves = [(S[i][i].bit_length() + 1) // 2 for i in range(len(S))]
+    array, power = floats(S)
+    powers = np.array(halves)
+    return np.ldexp(array, power - powers[:, None] - powers[None, :]), halves
 
 
 def arithmetic(stdlib: bool = False) -> Standard:

@@ -1,43 +1,46 @@
 """How far each agent is from its outcome, given a bound on ``V``.
 
-The coordinates ``z`` of a Lyapunov function determine ``x - Q x``: for ``z = E`` on its rows,
-``x - Q x = -(L + g Q)^-1 E`` with any ``g > 0``; for ``z = eps``, ``x - Q x = (I - Q) eps``. With ``x - Q x = R z`` and
-``n_j' z = 0`` on the subspace of ``z``,
+In the state, a Lyapunov function is ``V = x'F x``, and ``x - Q x = D x``; both vanish on the kernel of ``L``, so that
+only rows and columns ``kept`` count: all nodes but the first one of each balanced closed component. There
 
-    |x_k - (Q x)_k|^2 <= c_k V,    c_k = [R P^-1 R' - R P^-1 N (N' P^-1 N)^-1 N' P^-1 R']_kk,
+    |x_k - (Q x)_k|^2 <= c_k V,    c_k = d_k' F^-1 d_k,
 
-the best constants there are; the largest eigenvalue of that matrix bounds ``||x - Q x||^2``. Everything is computed in
-ball arithmetic and rounded up.
+``d_k`` a row of ``D``: the best constants there are. The largest eigenvalue of ``D F^-1 D'`` bounds ``||x - Q x||^2``.
+All constants come from one factor of ``F`` in floats and are raised by more than its rounding errors, which are seen in
+what it leaves of the identity; where they are too large, from one in integers. The check proves them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ptcc_certify.definite import arithmetic, floats, unit_diagonal
+from ptcc_certify.enclosure import rounded
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.structure import Structure
 
-if TYPE_CHECKING:
-    import flint
-
-#: Bits of the balls, doubled until the constants are sharp.
-_BITS, _MOST_BITS = 256, 4096
 #: Bits of the constants that are kept.
-_KEPT_BITS = 40
-#: The largest eigenvalue is bounded by ``(tr C^(2^k))^(1/2^k)``, at most ``N^(1/2^k)`` too large.
-_SQUARINGS = 9
+KEPT_BITS = 40
+#: How near a factor in floats must take a form to the identity for constants of agents, and for that of the norm.
+NEAR, FAR = 2.0**-30, 2.0**-12
+#: Below this squares of floats may have lost digits.
+LEAST = 2.0**-900
+#: By how much constants are raised, relatively, so that they are quick to prove; that of the norm instead.
+RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
+
+Integers = list[list[int]]
 
 
 @dataclass(frozen=True)
 class DistanceBound:
-    """``|x_k - (Q x)_k|^2 <= agents[k] V`` and ``||x - Q x||^2 <= norm V``, proved in ball arithmetic.
+    """``|x_k - (Q x)_k|^2 <= agents[k] V`` and ``||x - Q x||^2 <= norm V``; the check proves it.
 
     Attributes
     ----------
@@ -78,7 +81,7 @@ def root_above(value: Fraction) -> float:
 
 
 class OutcomeGeometry:
-    """What turns coordinates of a Lyapunov function into ``x - Q x``, for one graph.
+    """What turns a bound on Lyapunov functions into bounds of ``x - Q x``, for one graph.
 
     Parameters
     ----------
@@ -97,7 +100,7 @@ class OutcomeGeometry:
         diagonal: Sequence[Fraction] | None,
         matrix: Sequence[Sequence[Fraction]] | None,
     ) -> DistanceBound | None:
-        """Return the constants of ``V = z' P z``, or None where the precision given was not enough.
+        """Return the constants of ``V = z' P z``, or None where ``V`` is not seen to be definite.
 
         Parameters
         ----------
@@ -107,148 +110,113 @@ class OutcomeGeometry:
         diagonal, matrix
             ``P``, one of both.
         """
-        import flint
+        F, scale = self._error_form(nodes, diagonal, matrix) if coordinates == "E" else self._mean_form(diagonal or ())
+        D, common = self._deviation
+        unit, found = scale / common**2, _constants(F, D)
+        if found is None:
+            return None
+        *agents, norm = (rounded(x * unit, KEPT_BITS, up=True) for x in found)
+        return DistanceBound(tuple(agents), norm)
 
-        before, bits = flint.ctx.prec, _BITS
-        try:
-            while bits <= _MOST_BITS:
-                flint.ctx.prec = bits
-                found = self._constants(coordinates, nodes, diagonal, matrix)
-                if found is not None:
-                    return found
-                bits *= 4
-        finally:
-            flint.ctx.prec = before
-        return None
+    @cached_property
+    def _kept(self) -> list[int]:
+        """All nodes but the first one of each balanced closed component."""
+        first = {c.nodes[0] for c in self._influence.balanced}
+        return [v for v in range(self._structure.graph.n_nodes) if v not in first]
 
-    def _constants(
+    @cached_property
+    def _laplacian(self) -> tuple[Integers, int]:
+        """``L`` times a scale on the columns ``kept``, and the scale."""
+        return self._on_kept(self._structure.graph.exact_rows(range(self._structure.graph.n_nodes)))
+
+    @cached_property
+    def _deviation(self) -> tuple[Integers, int]:
+        """``D = I - Q`` times a scale on the columns ``kept``, and the scale."""
+        rows = [
+            {j: -Fraction(x) for j, x in self._influence.row(v).items()} for v in range(self._structure.graph.n_nodes)
+        ]
+        for v, row in enumerate(rows):
+            row[v] = row.get(v, Fraction(0)) + 1
+        return self._on_kept(rows)
+
+    def _on_kept(self, rows: Sequence[Mapping[int, Fraction]]) -> tuple[Integers, int]:
+        """Return sparse rows times a scale on the columns ``kept``, and the scale."""
+        kept = set(self._kept)
+        parts = [{j: x for j, x in row.items() if j in kept} for row in rows]
+        scale = math.lcm(*{x.denominator for row in parts for x in row.values()})
+        whole = ({j: int(x * scale) for j, x in row.items()} for row in parts)
+        return [[row.get(j, 0) for j in self._kept] for row in whole], scale
+
+    def _error_form(
         self,
-        coordinates: str,
         nodes: Sequence[int],
         diagonal: Sequence[Fraction] | None,
         matrix: Sequence[Sequence[Fraction]] | None,
-    ) -> DistanceBound | None:
+    ) -> tuple[Integers, Fraction]:
+        """Return ``L'P L`` times a scale on ``kept``, and the scale."""
         import flint
 
-        n = self._structure.graph.n_nodes
-        where = {v: i for i, v in enumerate(nodes)}
-        try:
-            if coordinates == "E":
-                inverse, still = self._inverse(flint.ctx.prec), self._still
-                R = flint.arb_mat([[flint.arb(0) if i in still else -inverse[i, v] for v in nodes] for i in range(n)])
-            else:
-                Q = self._projection
-                R = flint.arb_mat([[_ball(int(i == v) - Q[i][v]) for v in nodes] for i in range(n)])
-            normals = self._normals(coordinates, where, diagonal)
-            both = flint.arb_mat([[R[i, j] for i in range(n)] + [c[j] for c in normals] for j in range(len(nodes))])
-            if diagonal is not None:
-                weighted = flint.arb_mat(
-                    [[both[j, i] / _ball(w) for i in range(both.ncols())] for j, w in enumerate(diagonal)]
-                )
-            else:
-                assert matrix is not None
-                weighted = flint.arb_mat([[_ball(x) for x in row] for row in matrix]).solve(both)
-            gram = both.transpose() * weighted
-            C = flint.arb_mat([[gram[i, j] for j in range(n)] for i in range(n)])
-            if normals:
-                m = len(normals)
-                mixed = flint.arb_mat([[gram[i, n + j] for j in range(m)] for i in range(n)])
-                own = flint.arb_mat([[gram[n + i, n + j] for j in range(m)] for i in range(m)])
-                C = C - mixed * own.solve(mixed.transpose())
-        except ZeroDivisionError:  # a pivot that may be 0: more digits
+        L, unit = self._laplacian
+        rows = flint.fmpz_mat([L[v] for v in nodes])
+        if diagonal is not None:
+            (weights,), scale = _over_one_scale([diagonal])
+            moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(nodes, weights, strict=True)])
+        else:
+            P, scale = _over_one_scale(matrix or ())
+            moved = flint.fmpz_mat(P) * rows
+        return _rows(rows.transpose() * moved), Fraction(scale * unit**2)
+
+    def _mean_form(self, p: Sequence[Fraction]) -> tuple[Integers, Fraction]:
+        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``, and the scale."""
+        (weights,), scale = _over_one_scale([p])
+        (gauge,), total = (c.gauge or () for c in self._influence.balanced), sum(weights)
+        Z = [
+            [gauge[i] * gauge[j] * weights[i] * (total * (i == j) - weights[j]) for j in self._kept] for i in self._kept
+        ]
+        return Z, Fraction(total * scale)
+
+
+def _over_one_scale(rows: Sequence[Sequence[Fraction]]) -> tuple[Integers, int]:
+    """Return rational rows times their common denominator, and that."""
+    scale = math.lcm(*{x.denominator for row in rows for x in row})
+    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
+
+
+def _rows(M: Any) -> Integers:
+    return [[int(x) for x in row] for row in M.tolist()]
+
+
+def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
+    """Return ``d'F^-1 d`` for the rows ``d`` of ``D`` and the largest eigenvalue of ``D F^-1 D'``, a little raised.
+
+    By floats where they are sharp enough, else in integers; there the last one may be the sum of the others. None where
+    ``F > 0`` is not proved.
+    """
+    moved, power, apart = _factored(F, D)
+    unit, sizes = Fraction(4) ** power, (moved**2).sum(axis=1).tolist()
+    if apart <= NEAR and all(x > LEAST or not any(d) for x, d in zip(sizes, D, strict=True)):
+        values = [Fraction(x) * unit * (1 + Fraction(64 * apart)) for x in sizes]
+    else:
+        proved = arithmetic().above(F, D)
+        if proved is None:
             return None
-        agents = []
-        for i in range(n):
-            if not _sharp(C[i, i]):
-                return None
-            agents.append(_above(C[i, i]))
-        return DistanceBound(tuple(agents), _largest_eigenvalue(C, sum(agents, Fraction(0))))
-
-    @cached_property
-    def _still(self) -> set[int]:
-        """Agents that listen to nobody: they are where they end."""
-        return {c.nodes[0] for c in self._influence.balanced if len(c.nodes) == 1}
-
-    @cached_property
-    def _projection(self) -> list[list[Fraction]]:
-        """``Q``, row by row."""
-        rows = []
-        n = self._structure.graph.n_nodes
-        for node in range(n):
-            row = [Fraction(0)] * n
-            for v, weight in self._influence.row(node).items():
-                row[v] = Fraction(weight)
-            rows.append(row)
-        return rows
-
-    def _inverse(self, bits: int) -> flint.arb_mat:
-        """Enclose ``(L + g Q)^-1``, with ``g`` the mean weight of an edge."""
-        import flint
-
-        kept = getattr(self, "_kept", None)
-        if kept is not None and kept[0] == bits:
-            return kept[1]
-        L, Q = self._structure.graph.exact_laplacian(), self._projection
-        n = len(L)
-        g = sum((abs(L[i][i]) for i in range(n)), Fraction(0)) / n or Fraction(1)
-        matrix = flint.arb_mat([[_ball(L[i][j]) + _ball(g * Q[i][j]) for j in range(n)] for i in range(n)])
-        inverse = matrix.inv()
-        self._kept = (bits, inverse)
-        return inverse
-
-    def _normals(
-        self, coordinates: str, where: dict[int, int], diagonal: Sequence[Fraction] | None
-    ) -> list[list[flint.arb]]:
-        """Return the vectors orthogonal to ``z``: ``G_k eta_k`` of balanced groups for ``E``, ``P G 1`` for ``eps``."""
-        import flint
-
-        columns = []
-        for component, voice in zip(self._influence.balanced, self._influence.voices, strict=True):
-            if component.nodes[0] not in where:
-                continue
-            column = [flint.arb(0)] * len(where)
-            for v, sign, weight in zip(component.nodes, component.gauge or (), voice, strict=True):
-                entry = Fraction(weight) if coordinates == "E" else (diagonal or ())[where[v]] * sign
-                column[where[v]] = _ball(entry)
-            columns.append(column)
-        return columns
+        values = proved
+    norm = sum(values, Fraction(0))
+    if apart <= FAR:
+        raised = 1 + max(NORM_RAISE, Fraction(64 * apart))
+        norm = min(norm, Fraction(float(np.linalg.norm(moved, 2))) ** 2 * unit * raised)
+    return [x * (1 + RAISE) for x in (*values, norm)]
 
 
-def _ball(x: Fraction | int) -> flint.arb:
-    import flint
-
-    x = Fraction(x)
-    return flint.arb(x.numerator) / flint.arb(x.denominator)
-
-
-def _sharp(x: Any) -> bool:
-    """Tell whether a ball is known to seven digits, or is 0."""
-    return bool(x.is_finite()) and (x.rel_accuracy_bits() > 24 or x == 0)
-
-
-def _above(x: Any) -> Fraction:
-    """Return a short rational that is above every number of the ball, 0 if that is all it holds."""
-    mantissa, exponent = (int(part) for part in x.upper().man_exp())
-    if mantissa <= 0:
-        return Fraction(0)
-    extra = mantissa.bit_length() - _KEPT_BITS
-    kept = mantissa >> extra if extra >= 0 else mantissa << -extra
-    return Fraction(kept + 1) * Fraction(2) ** (exponent + extra)
-
-
-def _largest_eigenvalue(C: Any, fallback: Fraction) -> Fraction:
-    """Bound the largest eigenvalue of a positive semidefinite matrix by the trace of a power."""
-    trace = C.trace() if hasattr(C, "trace") else sum((C[i, i] for i in range(C.nrows())), C[0, 0] * 0)
-    if not trace > 0:
-        return fallback
-    power, scale = C / trace, trace
-    exponent = 1
-    for _ in range(_SQUARINGS):
-        power = power * power
-        exponent *= 2
-        trace = sum((power[i, i] for i in range(power.nrows())), power[0, 0] * 0)
-        if not (trace > 0 and trace.rel_accuracy_bits() > 24):
-            break
-        bound = _above(scale * trace.root(exponent))
-        fallback = min(fallback, bound) if bound > 0 else fallback
-    return fallback
+def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
+    """Return ``D Z`` over a power of two, that power, and how far ``Z'F Z`` is from the identity, in floats."""
+    rows, power = floats(D)
+    try:
+        T, halves = unit_diagonal(F)
+        Z = np.linalg.inv(np.linalg.cholesky(T)).T
+    except np.linalg.LinAlgError:
+        return np.zeros_like(rows), 0, math.inf
+    with np.errstate(all="ignore"):
+        moved = np.ldexp(rows, [-half for half in halves]) @ Z
+        apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
+    return (moved, power, apart) if np.isfinite((moved**2).sum()) else (np.zeros_like(rows), 0, math.inf)

@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.bounds import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.checker import MANY_COMPONENTS, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, digest
 from ptcc_certify.dominance import DominantMember
-from ptcc_certify.effort import Peak, effort_section, peak_witness
+from ptcc_certify.effort import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
 from ptcc_certify.enclosed import EnclosedOutcome
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.outcomes import Influence
@@ -127,7 +127,7 @@ def certificate_document(certificate: Certificate, verdict: str, files: bool = F
             "paper": _text(certificate.proof.rate),
             "diagonal": _text(certificate.diagonal_rate),
             "certified": _text(certificate.rate),
-            "limit": _text(None if certificate.limit is None else certificate.limit.value),
+            "limit": _text(certificate.upper_bound),
         },
         "prefactor": _prefactor_section(certificate),
         "initial_state": out.state("start", certificate.start),
@@ -455,7 +455,7 @@ def _unverified_section(certificate: Certificate) -> dict[str, Any]:
         floats = dict(zip(certificate.graph.labels, values, strict=True))
     return {
         "spectral": _finite(certificate.spectral_rate),
-        "tightness": _finite(certificate.tightness),
+        "optimality_ratio": certificate.optimality_ratio,
         "paper_rate": _finite(certificate.numerical_rate),
         "rounding_loss": _finite(certificate.rounding_loss),
         "search": {
@@ -471,8 +471,27 @@ def _unverified_section(certificate: Certificate) -> dict[str, Any]:
         if certificate.direct
         else None,
         "final_state": floats,
+        "asked": _asked_section(certificate),
         "simulation": simulation,
+        "time_limit": _finite(certificate.time_limit),
+        "cut_off": list(certificate.cut_off),
         "notes": list(certificate.notes),
+    }
+
+
+def _asked_section(certificate: Certificate) -> dict[str, Any]:
+    """Return what was asked; what became of it is no part of the claim, and follows from what is."""
+    asked = certificate.expectations
+    return {
+        "behaviour": asked.behaviour,
+        "min_rate": _text(asked.min_rate),
+        "max_input": _text(asked.max_input),
+        "limits": [
+            {name: _text(getattr(entry, name)) for name in ("gain_cap", "stop_before", "sample_period")}
+            for entry in certificate.limits
+        ],
+        "delta": _text(certificate.delta),
+        "noise": _text(certificate.noise),
     }
 
 
@@ -577,6 +596,8 @@ def obligation_section(obligation: Obligation, certificate: Certificate, out: Wr
     witness = obligation.witness
     if isinstance(witness, DominantMember):
         witness = _dominance_witness(witness, out)
+    elif isinstance(witness, EnergyIntegral):
+        witness = energy_witness(witness, format_exact)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, certificate.graph.labels, format_exact)
     elif isinstance(witness, EnclosedOutcome):

@@ -8,7 +8,9 @@ parameters are chosen, in floating point.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -18,21 +20,27 @@ import numpy as np
 
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.definite import arithmetic
+from ptcc_certify.error_system import ErrorSystem
 from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.input_bounds import (
+    LAST_PERIODS,
     Form,
     InputBounds,
     Limits,
+    Of,
     PrescribedGain,
+    Reaching,
+    Rows,
     Starts,
-    decay_above,
     energy_above,
+    integral_above,
     length_above,
-    limited_rate,
     peak_above,
     root_above,
     rounded,
 )
+from ptcc_certify.io import by_label, in_node_order
 from ptcc_certify.outcomes import Influence
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction, nearest_float, writable
@@ -46,10 +54,14 @@ KEPT_BITS, INSTANT_BITS = 40, 24
 LATEST = 5_000
 #: Bounds below are raised to this, so that they can be written.
 LEAST = Fraction(1, 2**1200)
-#: By how much constants of full matrices are raised until they are proved.
-RAISES = (1e-9, 1e-6, 1e-3, 1.0)
+#: By how much constants of full matrices are raised, so that they are quick to prove.
+RAISE = Fraction(1, 2**30)
 
-Of = Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction]
+#: Periods below this share of ``T`` are not tried; how often the interval of the longest one is halved, and which
+#: shares of it are proved, one after the other, until one is.
+SHORTEST_SHARE, PERIOD_STEPS, PERIOD_SHARES = 1e-12, 12, (0.999, 0.99, 0.9, 0.5)
+#: Bits of the matrices that bound the energy, and by how much these exceed what solves the equations.
+MATRIX_BITS, EXCESSES = 48, (1e-6, 1e-4, 1e-2)
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,20 @@ class Witness:
     value: Fraction
     member: int
     z: Fraction
+
+
+@dataclass(frozen=True)
+class EnergyIntegral:
+    """A bound of the energy from two Lyapunov equations, ``L'W + W L - c W >= m I`` with ``c = 0`` and ``c = 1/k``.
+
+    ``p`` says how the gain is split between them, see :func:`ptcc_certify.input_bounds.integral_above`; ``matrices``
+    are the two ``W``, in integers, and ``least`` the two ``m``.
+    """
+
+    value: Fraction
+    p: Fraction
+    matrices: tuple[Rows, Rows]
+    least: tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True)
@@ -134,14 +160,17 @@ class Effort:
         ``c_k`` of every member with a full matrix, ``e_k^2 <= c_k V``.
     peak : Peak or None
         None: not bounded, or not proved.
-    energy, path_length : Witness or None
-        Bounds of ``int ||u||^2 dt`` and ``int ||u|| dt`` (of the nominal part).
+    energy : EnergyIntegral, Witness or None
+        Bound of ``int ||u||^2 dt`` (of the nominal part).
+    path_length : Witness or None
+        Bound of ``int ||u|| dt`` (of the nominal part).
     sliding : SlidingPart or None
         Bounds of the sliding part of the input; None under the nominal protocol, or if ``sigma(0)`` is not known.
     residual : tuple of Limited
         Of those limits under which something is certified.
     longest_period : Fraction or None
-        Where sampling is not certified: a period, with the same largest gain, up to which it would be.
+        Where sampling is not certified, ``||E||`` being proved to be no larger at the deadline than at first: a period
+        with which it would be, near to the longest one.
     disturbed : Disturbed or None
         What disturbances within ``delta`` add under the nominal protocol; None if none was given.
     first : Fraction or None
@@ -174,7 +203,7 @@ class Effort:
     starts: Starts | None
     constants: tuple[tuple[Fraction, ...] | None, ...]
     peak: Peak | None = None
-    energy: Witness | None = None
+    energy: Witness | EnergyIntegral | None = None
     path_length: Witness | None = None
     sliding: SlidingPart | None = None
     residual: tuple[Limited, ...] = ()
@@ -196,7 +225,10 @@ class Effort:
         if self.peak is not None:
             found.append(Obligation("input-peak", "effort", {"z": self.peak.norm_how.z}, self.peak))
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
-            if bound is not None:
+            if isinstance(bound, EnergyIntegral):
+                numbers = {"p": bound.p, "m0": bound.least[0], "m1": bound.least[1]}
+                found.append(Obligation(kind, "effort", numbers, bound))
+            elif bound is not None:
                 found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
         for k, entry in enumerate(self.residual):
             witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
@@ -247,13 +279,15 @@ def starts_within(structure: Structure, bound: Any) -> Starts:
     return Starts((Fraction(0),) * n, (R,) * n)
 
 
-def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
+def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
     """Return all starts with ``low_k <= x_k(0) <= high_k``.
 
     Parameters
     ----------
-    low, high : sequences of N numbers
+    low, high : sequences of N numbers, mappings of label to number or pandas Series
         Ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
 
     Returns
     -------
@@ -262,7 +296,7 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     Raises
     ------
     ParameterError
-        The lengths differ, or a lower end exceeds its upper end.
+        The lengths differ, a lower end exceeds its upper end, or labels are not those of the nodes.
     NumberError
         An end is not a number of the exact grammar.
 
@@ -270,7 +304,12 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     --------
     >>> box([0, 1], [2, 1])
     Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
+    True
     """
+    low, high = _unlabelled(low, graph, "low"), _unlabelled(high, graph, "high")
     if len(low) != len(high):
         raise ParameterError(f"a box of {len(low)} lower and {len(high)} upper ends; give one of each for every agent")
     ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
@@ -279,14 +318,16 @@ def box(low: Sequence[Any], high: Sequence[Any]) -> Starts:
     return Starts(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
 
 
-def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
+def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> Starts:
     """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
 
     Parameters
     ----------
-    center : sequence of N numbers
-    axes : sequence of sequences of N numbers
+    center : sequence of N numbers, mapping of label to number or pandas Series
+    axes : sequence of vectors like ``center``
         One semi-axis or more; they need not be orthogonal.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
 
     Returns
     -------
@@ -295,7 +336,7 @@ def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
     Raises
     ------
     ParameterError
-        There is no axis, or one of another length than ``center``.
+        There is no axis, one of another length than ``center``, or labels are not those of the nodes.
     NumberError
         A number is not of the exact grammar.
 
@@ -304,11 +345,21 @@ def ellipsoid(center: Sequence[Any], axes: Sequence[Sequence[Any]]) -> Starts:
     >>> ellipsoid([0, 0], [[1, 0], [0, 2]]).axes
     ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
     """
-    middle = tuple(as_fraction(x, "center") for x in center)
-    vectors = tuple(tuple(as_fraction(x, "axes") for x in axis) for axis in axes)
+    if by_label(axes, "axes") is not None:
+        raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
+    middle = tuple(as_fraction(x, "center") for x in _unlabelled(center, graph, "center"))
+    vectors = tuple(tuple(as_fraction(x, "axes") for x in _unlabelled(axis, graph, "axes")) for axis in axes)
     if not vectors or any(len(axis) != len(middle) for axis in vectors):
         raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
     return Starts(middle, axes=vectors)
+
+
+def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
+    if graph is not None:
+        return in_node_order(values, graph, name)
+    if by_label(values, name) is not None:
+        raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
+    return values
 
 
 # ---------------------------------------------------------------------- bounds
@@ -324,6 +375,7 @@ def bound_effort(
     start: Sequence[Fraction] | None = None,
     starts: Starts | None = None,
     sigma0: Sequence[Fraction] | None = None,
+    reaching: Sequence[Fraction | None] | None = None,
     influence: Influence | None = None,
     distances: Sequence[Sequence[Fraction] | None] = (),
     limits: Sequence[Limits] = (),
@@ -343,6 +395,8 @@ def bound_effort(
     start, starts
         ``X(0)``, or a set of starts instead.
     sigma0 : sequence of Fraction or None
+    reaching : sequence of (Fraction or None), optional
+        Proved reaching times ``ln(T_r/(T_r - t))`` of the agents; without them, and for None, ``T_r``.
     influence : Influence, optional
         ``Q``, for the drift under disturbances.
     distances : sequence
@@ -366,37 +420,38 @@ def bound_effort(
         return Effort(**effort, starts=None, constants=(None,) * len(forms))
     constants = tuple(None if f is None or f.matrix is None else _proved_constants(f, n) for f in forms)
     region = starts or Starts(tuple(center))
-    if sigma0 is not None:
-        moved = tuple(x - s for x, s in zip(region.center, sigma0, strict=True))
-        region = Starts(moved, region.radius, region.axes)
-    bounds = InputBounds(
-        structure.graph.exact_rows(range(n)),
-        gain,
-        forms,
-        constants,
-        region,
-        [abs(s) for s in sigma0 or ()] if any(sigma0 or ()) else (),
-        protocol.T_s if isinstance(protocol, SlidingModeProtocol) else Fraction(0),
-    )
+    driven = _reaching(protocol, sigma0, reaching)
+    bounds = InputBounds(structure.graph.exact_rows(range(n)), gain, forms, constants, region, driven)
     usable = [k for k, f in enumerate(forms) if f is not None and f.rate > 0 and _usable(bounds, k)]
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None
     if own is not None:
         peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.k >= 2], own)
     ample = [k for k in usable if bounds.form(k).rate * gain.k > 1]
-    entries = [_limited(bounds, usable, entry, distances, peak, noise) for entry in limits]
+    cap = None if influence is None or not influence.exact or not limits else largest_deviation(region, influence)
+    energies = (_integral(structure, bounds), _least(bounds, energy_above, ample))
+    entries = [_limited(bounds, usable, entry, distances, cap, peak, noise) for entry in limits]
     return Effort(
         **effort,
         starts=starts,
         constants=constants,
         peak=peak,
-        energy=_least(bounds, energy_above, ample),
+        energy=min((e for e in energies if e is not None), key=lambda e: e.value, default=None),
         path_length=_least(bounds, length_above, usable),
         residual=tuple(entry for entry in entries if entry is not None),
-        longest_period=_longest_period(bounds, usable, limits) if None in entries else None,
+        longest_period=_longest_period(bounds, usable, limits, entries),
         disturbed=None if delta is None else _disturbed(bounds, usable, delta, influence),
-        first=None if sliding or region.axes else (gain.rho1 + gain.k / gain.T) * max(map(region.largest, bounds.rows)),
+        first=first_input(structure, protocol, region),
     )
+
+
+def first_input(structure: Structure, protocol: Protocol, region: Starts) -> Fraction | None:
+    """Return ``sup max_k |u_k(0)|``, exactly; None in sliding mode, for an ellipsoid, for a large graph."""
+    n = structure.graph.n_nodes
+    if isinstance(protocol, SlidingModeProtocol) or region.axes or n > INPUT_NODES or not structure.graph.n_edges:
+        return None
+    gain = _prescribed(protocol)
+    return (gain.rho1 + gain.k / gain.T) * max(map(region.largest, structure.graph.exact_rows(range(n))))
 
 
 def _prescribed(protocol: Protocol) -> PrescribedGain:
@@ -409,7 +464,7 @@ def _bounded(
     """Decide whether the input stays bounded for every start, and by what."""
     if still or (rate is not None and rate * k >= 2):
         return True, "rate"
-    if limit is not None and limit * k <= 2:
+    if limit is not None and limit * k < 2:
         return False, "limit"
     graph = structure.graph
     if graph.n_nodes > LARGEST:
@@ -422,7 +477,7 @@ def _bounded(
     components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
     balanced = [sorted(c.nodes) for c in structure.closed_components if c.balanced]
     still_parts = {k for k, nodes in enumerate(components) if nodes in balanced}
-    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k)
+    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k, arithmetic().characteristic)
     return place in ("beyond", "on"), "spectrum"
 
 
@@ -441,28 +496,16 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     matrix = form.matrix or ()
     scale = math.lcm(*(x.denominator for row in matrix for x in row))
     P = [[int(x * scale) for x in row] for row in matrix]
-    top = max(abs(x) for row in P for x in row)
-    try:
-        inverse = np.linalg.inv(np.array([[x / top for x in row] for row in P]))
-    except np.linalg.LinAlgError:
+    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
+    if above is None:
         return None
-    place = {v: i for i, v in enumerate(form.nodes)}
-    exact = arithmetic()
-    for raise_ in RAISES:
-        sizes = np.abs(np.diag(inverse)) * (1 + raise_)
-        if not np.isfinite(sizes).all():
-            return None
-        try:
-            c = [_kept(Fraction(float(sizes[place[v]])) * scale / top) if v in place else Fraction(0) for v in range(n)]
-        except OverflowError:
-            return None
-        asked = []
-        for v, i in place.items():
-            p, q = (c[v] / scale).as_integer_ratio()
-            asked.append(([q * (j == i) for j in range(len(P))], q * p))
-        if exact.bounded(P, asked) is None:
-            return tuple(c)
-    return None
+    constants = [Fraction(0)] * n
+    try:
+        for v, value in zip(form.nodes, above, strict=True):
+            constants[v] = _kept(value * scale * (1 + RAISE))
+    except OverflowError:
+        return None
+    return tuple(constants)
 
 
 def _kept(x: Fraction) -> Fraction:
@@ -477,6 +520,78 @@ def _kept(x: Fraction) -> Fraction:
     if not writable(value):
         raise OverflowError("a bound that is too large to be written")
     return value
+
+
+def _reaching(
+    protocol: Protocol, sigma0: Sequence[Fraction] | None, times: Sequence[Fraction | None] | None
+) -> Reaching | None:
+    """Return how the sliding variables move; None if they do not."""
+    if not isinstance(protocol, SlidingModeProtocol) or not any(sigma0 or ()):
+        return None
+    last = [None] if times is None else [z for z, s in zip(times, sigma0 or (), strict=True) if s]
+    return Reaching(
+        sigma0 or (),
+        protocol.T_r,
+        protocol.T_s,
+        protocol.mu2,
+        protocol.mu3 * protocol.kappa,
+        protocol.mu1 + protocol.delta,
+        None if None in last else max(z for z in last if z is not None),
+    )
+
+
+def _integral(structure: Structure, bounds: InputBounds) -> EnergyIntegral | None:
+    """Bound the energy by two Lyapunov equations; None if it is infinite, or floats do not solve them well enough."""
+    if bounds.reaching is not None:
+        return None
+    gain = bounds.gain
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a singular equation: what comes of it is judged by its remainder
+            system = ErrorSystem(structure)
+            (first, m0), (second, m1) = (_lyapunov(system, c) for c in (0.0, nearest_float(1 / gain.k)))
+        even, grown = bounds.largest_form(first) / m0, bounds.largest_form(second) / m1
+        # The best p is ln(grown / even).
+        most = gain.rho1 * gain.T / gain.k
+        wanted = max(_log(grown) - _log(even), 0.0) if even and grown else 0.0
+        p = min(rounded(Fraction(wanted), INSTANT_BITS), most)
+        return EnergyIntegral(_kept(integral_above(gain, even, grown, p)), p, (first, second), (m0, m1))
+    except (np.linalg.LinAlgError, ValueError, OverflowError):
+        return None
+
+
+def _lyapunov(system: ErrorSystem, c: float) -> tuple[Rows, Fraction]:
+    """Return ``W`` in integers and ``m`` with ``A'W + W A - c W > m I`` on the subspace of ``E``, near to equality.
+
+    The remainder is formed in floats, after rounding; what these may be off by is left between it and ``m``, so that
+    the independent check proves it.
+
+    Raises
+    ------
+    ValueError
+        Floats do not find such a ``W > 0``.
+    """
+    from scipy.linalg import solve_continuous_lyapunov
+
+    A, basis = system.matrix, system.basis
+    B = np.eye(len(A)) if basis is None else basis
+    inner = B.T @ A @ B - c / 2 * np.eye(B.shape[1])
+    W = B @ solve_continuous_lyapunov(inner.T, np.eye(B.shape[1])) @ B.T
+    order = np.argsort(system.nodes)
+    W, A, B = W[np.ix_(order, order)], A[np.ix_(order, order)], B[order]
+    top = float(np.abs(W).max())
+    if not 0 < top < 1e100:
+        raise ValueError("the equation is not solved")
+    unit = 2.0 ** (MATRIX_BITS - math.ceil(math.log2(top)))
+    W = np.round((W + W.T) / 2 * unit) / unit
+    least = [float(np.linalg.eigvalsh(B.T @ S @ B)[0]) for S in (W, W @ A + A.T @ W - c * W)]
+    size = float(np.linalg.norm(W))
+    noise = 100 * len(A) * 2.0**-52 * size * np.array([1.0, 2 * float(np.linalg.norm(A)) + c])
+    for excess in EXCESSES:
+        if least[0] > noise[0] and least[1] - noise[1] > 1 - excess:
+            rows = [[Fraction(int(x)) for x in row] for row in (W * unit).tolist()]
+            return rows, rounded(Fraction(unit * (1 - excess)), INSTANT_BITS)
+    raise ValueError("the equation is not solved well enough")
 
 
 def _usable(bounds: InputBounds, k: int) -> bool:
@@ -494,7 +609,9 @@ def _log(x: Fraction) -> float:
 
 
 def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
-    """Return ``z`` where what is held meets what decays: the instant that serves the bounds best."""
+    """Return ``z`` where what is held meets what decays, the instant that serves the bounds best; 0 while driven."""
+    if bounds.reaching is not None:
+        return 0.0
     held = bounds.held_norm if agent is None else bounds.held[agent]
     start = bounds.root_constant(k, agent) * bounds.start(k)
     if not held or not start:
@@ -511,16 +628,21 @@ def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
 
 
 def _best(bounds: InputBounds, of: Of, agent: int | None, members: Sequence[int]) -> Witness | None:
-    """Return the bound of the member whose decay takes over first, which is the least peak."""
-    found = sorted((_crossing(bounds, agent, k), bounds.root_constant(k, agent) * bounds.start(k), k) for k in members)
-    for z, _, k in found:
+    """Return the bound of the member whose decay takes over first, which is the least peak; the least while driven."""
+    found: Witness | None = None
+    order = sorted((_crossing(bounds, agent, k), bounds.root_constant(k, agent) * bounds.start(k), k) for k in members)
+    for z, _, k in order:
         if z <= LATEST:
             instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
             try:
-                return Witness(_kept(bounds.bound(of, agent, k, instant)), k, instant)
+                own = Witness(_kept(bounds.bound(of, agent, k, instant)), k, instant)
             except (ValueError, OverflowError):
                 continue
-    return None
+            if found is None or own.value < found.value:
+                found = own
+            if bounds.reaching is None:
+                break
+    return found
 
 
 def _least(bounds: InputBounds, of: Of, members: Sequence[int]) -> Witness | None:
@@ -543,15 +665,50 @@ def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) 
         return None
 
 
+def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+
+    Parameters
+    ----------
+    starts : Starts
+    influence : Influence
+        ``Q`` in rationals.
+
+    Returns
+    -------
+    Fraction
+        Exact for a point or a box, rounded up for an ellipsoid.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.outcomes import influence
+    >>> from ptcc_certify.structure import analyse
+    >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
+    >>> largest_deviation(Starts([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
+    Fraction(2, 1)
+    """
+    rows = []
+    for v in range(len(starts.center)):
+        row = {j: -Fraction(x) for j, x in influence.row(v).items()}
+        rows.append(row | {v: row.get(v, Fraction(0)) + 1})
+    return max(map(starts.largest, rows))
+
+
 def _limited(
     bounds: InputBounds,
     members: Sequence[int],
     limits: Limits,
     distances: Sequence[Sequence[Fraction] | None],
+    cap: Fraction | None,
     peak: Peak | None,
     noise: Fraction | None,
 ) -> Limited | None:
-    """Bound what is left at the deadline under limits of the gain; None if nothing is certified."""
+    """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
+
+    Unless the input is held no agent is farther from its outcome than ``cap``, the largest deviation at the start.
+    With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at first.
+    """
     gain = bounds.gain
     top = limits.largest_gain(gain)
     if top is None:
@@ -559,21 +716,25 @@ def _limited(
     clock = limits.clock_below(gain)
     found: Limited | None = None
     for k in members:
-        form = bounds.form(k)
         growth = Fraction(0) if limits.sample_period is None else step_growth(bounds, k)
-        if growth is None or (rate := limited_rate(form.rate, growth, limits, gain)) <= 0:
+        if growth is None:
             continue
-        left = decay_above(rate / 2 * clock) * bounds.start(k)
         try:
+            left = bounds.share(k, limits, clock, growth) * bounds.start(k)
             norm = _kept(bounds.root_constant(k, None) * left)
+            if limits.sample_period is not None and norm > bounds.first:
+                continue
             if found is None or norm < found.norm:
                 known = distances[k] if k < len(distances) else None
-                agents = None if known is None else tuple(_kept(root_above(c) * left) for c in known)
+                sizes = [root_above(c) * left for c in known or ()]
+                if cap is not None and limits.sample_period is None:
+                    sizes = [min(x, cap) for x in sizes]
+                agents = None if known is None else tuple(map(_kept, sizes))
                 largest = None
                 if limits.sample_period is None:
                     largest = _kept(min([top * max(bounds.held)] + ([peak.largest] if peak is not None else [])))
                 found = Limited(limits, clock, k, growth, norm, agents, largest)
-        except OverflowError:
+        except (ValueError, OverflowError):
             continue
     if found is None or noise is None or limits.sample_period is not None:
         return found
@@ -594,12 +755,64 @@ def _with_noise(bounds: InputBounds, members: Sequence[int], found: Limited, top
     return result
 
 
-def _longest_period(bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits]) -> Fraction | None:
-    """Return the largest ``rate / (growth largest_gain)``, rounded down; None if nothing else limits the gain."""
-    tops = [Limits(entry.gain_cap, entry.stop_before).largest_gain(bounds.gain) for entry in limits]
-    growths = [(bounds.form(k).rate, step_growth(bounds, k)) for k in members]
-    found = [rate / (m * top) for rate, m in growths if m for top in tops if top is not None]
-    return rounded(max(found), INSTANT_BITS) if found else None
+def _longest_period(
+    bounds: InputBounds, members: Sequence[int], limits: Sequence[Limits], found: Sequence[Limited | None]
+) -> Fraction | None:
+    """Return a period of four digits with which all is certified that is not, near to the longest; None if none is."""
+    failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
+    if not failed or any(entry.sample_period is None for entry in failed) or not bounds.first:
+        return None
+    growths = [(k, m) for k in members if (m := step_growth(bounds, k)) is not None]
+    sizes = {k: _log(bounds.root_constant(k, None) * bounds.start(k)) - _log(bounds.first) for k, _ in growths}
+
+    def excess(limits: Limits, period: float) -> float:
+        logs = (sizes[k] + _log_share(bounds.gain, limits, period, bounds.form(k).rate, m) for k, m in growths)
+        return min(logs, default=math.inf)
+
+    def proved(limits: Limits, period: Fraction) -> bool:
+        sampled = replace(limits, sample_period=period)
+        with contextlib.suppress(ValueError, OverflowError):
+            for k, m in growths:
+                left = bounds.share(k, sampled, Fraction(0), m) * bounds.start(k)
+                if _kept(bounds.root_constant(k, None) * left) <= bounds.first:
+                    return True
+        return False
+
+    longest: list[Fraction] = []
+    for entry in failed:
+        high = nearest_float(entry.sample_period or bounds.gain.T)
+        shortest = SHORTEST_SHARE * nearest_float(bounds.gain.T)
+        low = high / 2
+        while low >= shortest and excess(entry, low) > 0:
+            high, low = low, low / 2
+        for _ in range(PERIOD_STEPS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if excess(entry, middle) <= 0 else (low, middle)
+        for share in PERIOD_SHARES:
+            period = Fraction(f"{low * share:.3e}")
+            if low >= shortest and proved(entry, period):
+                longest.append(period)
+                break
+        else:
+            return None
+    return min(longest)
+
+
+def _log_share(gain: PrescribedGain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
+    """Return the logarithm of the bound of ``sqrt(V)`` over ``sqrt(V(0))`` if the gain is held, in floating point."""
+    T, rho1, k, b, m = map(nearest_float, (gain.T, gain.rho1, gain.k, rate, growth))
+    cap = math.inf if limits.gain_cap is None else nearest_float(limits.gain_cap)
+    end = T - nearest_float(limits.stop_before or Fraction(0))
+    count = math.ceil(end / period * (1 - 1e-12))
+    first = max(count - LAST_PERIODS, 0)
+    # Before the last periods the gain changes little from one to the next: they are counted by the thousand.
+    edges = np.unique(np.append(np.geomspace(1, first + 1, 1000).astype(np.int64), 1)) - 1 if first else np.array([0])
+    starts = np.append(first - edges[::-1], np.arange(first + 1, count))
+    times = np.diff(starts, append=count)
+    at = starts * period
+    eta = np.minimum(rho1 + k / (T - at), cap) * np.minimum(period, end - at)
+    with np.errstate(all="ignore"):
+        return float(np.sum(times * np.log(np.maximum(1 - eta * b + eta**2 * m, 1e-300))) / 2)
 
 
 def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
@@ -807,3 +1020,9 @@ def peak_witness(peak: Peak, labels: Sequence[str], text: Callable[[Fraction], s
     """Return what proves the peaks: a member and an instant for every agent, and for the norm."""
     agents = {label: [how.member, text(how.z)] for label, how in zip(labels, peak.how, strict=True)}
     return {"agents": agents, "norm": peak.norm_how.member}
+
+
+def energy_witness(energy: EnergyIntegral, text: Callable[[Fraction], str]) -> dict[str, list[list[str]]]:
+    """Return the lower triangles of the matrices that prove the energy."""
+    first, second = ([[text(x) for x in row[: i + 1]] for i, row in enumerate(W)] for W in energy.matrices)
+    return {"W0": first, "W1": second}

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +22,13 @@ from ptcc_certify.theorems.base import (
     exact_block,
     float_block,
     follower_nodes,
+    integer_matrix,
+    integer_rows,
     multiply,
-    transpose,
 )
+
+if TYPE_CHECKING:
+    import flint
 
 #: Bits of the rounded factor of the exact basis.
 _BASIS_BITS = 53
@@ -126,20 +131,24 @@ class ErrorSystem:
                 result.append([Fraction(int(x)) for x in self.basis[i]])
         return result
 
-    def restricted(self, S: Matrix) -> Matrix:
-        """Return the quadratic form ``S`` on the subspace, in the exact basis."""
-        K = self.exact_basis
-        return S if K is None else multiply(transpose(K), multiply(S, K))
+    @cached_property
+    def _integers(self) -> tuple[flint.fmpz_mat, int, flint.fmpz_mat | None]:
+        """``A`` in integers over a scale, and the exact basis times a number."""
+        A, scale = integer_matrix(self.exact_matrix)
+        return A, scale, None if self.exact_basis is None else integer_matrix(self.exact_basis)[0]
 
     def prove_rate(self, P: Matrix, guess: float) -> Fraction | None:
         """Prove ``P A + A' P > b P`` on the subspace; return ``b``, near to the guess, or None.
 
         That ``P`` itself is positive definite, without which this bounds nothing, is proved by the caller.
         """
-        PA = multiply(P, self.exact_matrix)
-        n = len(P)
-        S = [[PA[i][j] + PA[j][i] for j in range(n)] for i in range(n)]
-        return prove_generalized_margin(self.restricted(S), self.restricted(P), guess)
+        A, scale, K = self._integers
+        form, _ = integer_matrix(P)
+        product = form * A
+        S, Z = product + product.transpose(), form * scale
+        if K is not None:
+            S, Z = K.transpose() * S * K, K.transpose() * Z * K
+        return prove_generalized_margin(integer_rows(S), integer_rows(Z), guess)
 
 
 def rounded_diagonal(log_weights: np.ndarray, bits: int) -> tuple[Fraction, ...]:

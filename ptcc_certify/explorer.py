@@ -29,6 +29,7 @@ from ptcc_certify.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plo
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction
 from ptcc_certify.reaching import certified_reaching_times
+from ptcc_certify.rounding import down
 from ptcc_certify.sharpen import METHODS, sharpen
 from ptcc_certify.simulation import simulate
 from ptcc_certify.summary import certificate_lines
@@ -163,8 +164,6 @@ class View:
         certificate = self.certificate
         if certificate is None or certificate.trajectory is None:
             return self.refusal
-        if certificate.envelope.members:
-            certificate = replace(certificate, comparison=certificate.envelope.compare(certificate.trajectory))
         return "\n".join(_shown(certificate_lines(certificate, self.settings.graph)))
 
     @cached_property
@@ -302,7 +301,7 @@ class Explorer:
             self._proved[graph, "paper"] = base
         if (graph, method) not in self._proved:
             base = self._proved[graph, "paper"]
-            unit = float(base.rate_limit or 1)
+            unit = float(base.upper_bound or 1)
             found = sharpen(ErrorSystem(base.structure), method, [x / unit for x in _CLOCKS])
             notes = (*base.notes, *found.notes)
             self._proved[graph, method] = replace(base, sharpening=found, method=method, notes=notes)
@@ -492,7 +491,7 @@ def _shown(lines: list[str]) -> list[str]:
 def _unchecked_lines(certificate: Certificate) -> list[str]:
     """Tell claim and rate of a certificate that the independent check has not seen."""
     said, deadline = [claim.behaviour for claim in certificate.claims[:4]], float(certificate.protocol.T)
-    rate = "none" if certificate.rate is None else f"{float(certificate.rate):.6g}"
+    rate = "none" if certificate.rate is None else down(certificate.rate)
     return [
         f"claim      {', '.join(said)} at T = {deadline:.12g} (Theorem {certificate.theorem.number})",
         f"rate       {rate} per unit of s, as found",

@@ -38,7 +38,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -54,7 +53,8 @@ from ptcc_certify.gain import parameter
 from ptcc_certify.input_bounds import BITS, InputBounds, Linear, PrescribedGain
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.rationals import format_exact, nearest_float, shorten
+from ptcc_certify.rationals import format_exact, nearest_float, short_exact, shorten
+from ptcc_certify.rounding import down, float_up, up
 from ptcc_certify.structure import Structure, analyse
 
 if TYPE_CHECKING:
@@ -69,6 +69,8 @@ _LEAST, _MOST = 1e-3, 1e6
 _HOPELESS = Fraction(1001, 1000)
 #: How often a deadline is lengthened by a little until the exact bound agrees.
 _NUDGES = 20
+#: How often gains are sought with the functions that certify finds for those before, until it proves its own.
+_ROUNDS = 4
 _KEPT_BITS = 40
 
 
@@ -117,6 +119,8 @@ class Design:
         Below which ``U T`` is too small for all gains of the protocol, proved.
     lower_by : str
         Why.
+    repeatable : bool
+        Whether :func:`ptcc_certify.certify` proves the same of these gains by the functions that it finds itself.
 
     References
     ----------
@@ -148,6 +152,29 @@ class Design:
     product: Fraction | None = None
     lower_product: Fraction | None = None
     lower_by: str = ""
+    repeatable: bool = False
+
+    @property
+    def certify_options(self) -> list[str] | None:
+        """Options of ``ptcc certify GRAPH`` that prove the same again, with exit code 0; None where none do.
+
+        Whether every agent is within :attr:`residual` at the deadline, or the norm of the input within its limit,
+        cannot be asked there: both are proved all the same.
+        """
+        R = max(self.starts.radius, default=Fraction(0))
+        about_zero = not any(self.starts.center) and R > 0 and min(self.starts.radius) == R
+        if not (self.repeatable and about_zero and self.protocol is not None and self.certificate is not None):
+            return None
+        p, effort = self.protocol, self.certificate.effort
+        options = {"T": p.T, "rho1": p.rho1, "rho2": p.rho2, "kappa": p.kappa, "initial-bound": R}
+        if self.limits is not None and self.limits.gain_cap is not None:
+            options["gain-cap"] = self.limits.gain_cap
+            agents = None if effort is None else effort.residual[0].largest
+        else:
+            agents = Fraction(0) if effort is None or effort.peak is None else effort.peak.largest
+        if agents is not None and agents <= self.max_input:  # of the norm too, but for what is lost in the bounds
+            options["max-input"] = self.max_input
+        return [text for name, value in options.items() for text in (f"--{name}", short_exact(value))]
 
     @property
     def shortest_possible(self) -> Fraction | None:
@@ -161,10 +188,10 @@ class Design:
 
     @property
     def ratio(self) -> float | None:
-        """Shortest certified deadline over the shortest possible one, at least 1."""
+        """Shortest certified deadline over the shortest possible one, rounded up; at least 1."""
         if not self.product or not self.lower_product:
             return None
-        return float(self.product / self.lower_product)
+        return float_up(self.product / self.lower_product)
 
     @cached_property
     def worst(self) -> WorstStart | None:
@@ -182,12 +209,14 @@ class Design:
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
         """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
 
+        Peaks are rounded up, what no gains can undercut is rounded down.
+
         The gains for a deadline ``T`` are those of ``protocol`` with ``rho1 T`` kept.
 
         Parameters
         ----------
         deadlines : iterable of float
-            In units of time.
+            Positive, in units of time.
 
         Returns
         -------
@@ -200,10 +229,13 @@ class Design:
         >>> design(pair, max_input=10, initial_bound=1).trade_off([1, 2]).lower.round(6)
         array([1.5 , 0.75])
         """
-        T = np.array([float(t) for t in deadlines])
+        T = np.array([float(parameter("a deadline", t)) for t in deadlines])
+        known = (self.product, math.inf), (self.lower_product, -math.inf)
         certified, lower = (
-            np.full(T.shape, math.nan if x is None else nearest_float(x)) / T
-            for x in (self.product, self.lower_product)
+            np.full(T.shape, math.nan)
+            if x is None
+            else np.nextafter(np.nextafter(nearest_float(x), towards) / T, towards)
+            for x, towards in known
         )
         return TradeOff(T, certified, lower)
 
@@ -227,33 +259,30 @@ class Design:
     def lines(self) -> list[str]:
         """Return what the screen shows."""
         norm = "||u||" if self.input_norm == 2 else "max |u_k|"
-        asked = f"{norm} <= {_short(self.max_input)}"
+        asked = f"{norm} <= {short_exact(self.max_input)}"
         if self.asked_deadline is None:
             asked += ", shortest deadline"
         else:
-            asked += f", deadline {_short(self.asked_deadline)}"
+            asked += f", deadline {short_exact(self.asked_deadline)}"
         if self.asked_residual is not None:
-            asked += f", residual {_short(self.asked_residual)}"
+            asked += f", residual {short_exact(self.asked_residual)}"
         found = [("asked", asked), ("verdict", self.verdict), ("", self.binding)]
         if self.protocol is not None:
             p = self.protocol
-            found.append(("gains", f"T = {_short(p.T)}, rho1 = {_short(p.rho1)}, rho2 kappa = {_short(p.rho2)}"))
+            gains = ", ".join(f"{name} = {short_exact(getattr(p, name))}" for name in ("T", "rho1", "rho2", "kappa"))
+            found.append(("gains", gains))
         if self.limits is not None and self.limits.gain_cap is not None:
-            found.append(("", f"gain capped at {_short(self.limits.gain_cap)}, which acts from 0 on"))
+            found.append(("", f"gain capped at {short_exact(self.limits.gain_cap)}, which acts from 0 on"))
         if self.peak is not None:
-            found.append(("peak input", f"{_short(self.peak, ROUND_CEILING)} at most"))
+            found.append(("peak input", f"{up(self.peak)} at most"))
         if self.residual is not None:
-            left = (
-                f"{_short(self.residual, ROUND_CEILING)} at most"
-                if self.residual
-                else "none, every agent is at its outcome"
-            )
+            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its outcome"
             found.append(("left at the deadline", left))
         if self.shortest_certified is not None:
-            found.append(("shortest deadline", f"{_short(self.shortest_certified)} certified"))
+            found.append(("shortest deadline", f"{up(self.shortest_certified, DIGITS)} certified"))
         if self.shortest_possible is not None:
-            times = "" if self.ratio is None else f", {self.ratio:.3g} times shorter"
-            found.append(("", f"{_short(self.shortest_possible, ROUND_FLOOR)} at least, whatever the gains{times}"))
+            times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
+            found.append(("", f"{down(self.shortest_possible)} at least, whatever the gains{times}"))
         width = max(len(name) for name, _ in found)
         return [f"{name:<{width}}  {text}" for name, text in found]
 
@@ -290,9 +319,9 @@ class Design:
             return f"Design({self.verdict}: {self.binding})"
         p, cap = self.protocol, ""
         if self.limits is not None and self.limits.gain_cap is not None:
-            cap = f", gain_cap={_short(self.limits.gain_cap)}"
-        gains = f"T={_short(p.T)}, rho1={_short(p.rho1)}, rho2={_short(p.rho2)}{cap}"
-        return f"Design({self.verdict}, {gains}, peak {_short(self.peak)})"
+            cap = f", gain_cap={short_exact(self.limits.gain_cap)}"
+        gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
+        return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"
 
 
 class Option(NamedTuple):
@@ -380,27 +409,50 @@ one asked for)
     begin: dict[str, Any] = {"x0": starts.center} if starts.point else {"starts": starts}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
     blank = Design(UNPROVED, "", U, input_norm, starts, T, r, deadline=T)
-    bounds, members = _bounds(base, starts)
-    lower, why = _lower_product(base, bounds, r)
+    lower, why = _lower_product(base, _bounds(base, starts)[0], r)
     blank = replace(blank, lower_product=lower, lower_by=why)
-    reason = _unusable(base)
+    first = offered = None
+    for _ in range(_ROUNDS):
+        reason = _unusable(base)
+        if reason is not None:
+            break
+        fit, other = _search(base, starts, U, T, r, input_norm)
+        first = first or other
+        if fit is None:
+            break
+        offered = offered or fit
+        own = fit.certificate
+        base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
+        again = _fit_of(base, _bounds(base, starts)[0], input_norm)
+        if _meets(again, U, r) and base.verdict == "certified":
+            return _met(replace(blank, verdict=MET, repeatable=True), again)
+    if offered is not None:
+        checked = offered.certificate.checked
+        if checked is None or not checked.accepted:
+            why = "" if checked is None else f" {checked.rejected}: {checked.reason}"
+            return replace(blank, binding=f"the independent check does not accept{why}")
+        return _met(replace(blank, verdict=MET), offered)
     if reason is not None:
         return _missed(replace(blank, binding=reason))
-    best: Fit | None = None
+    if first is None or first.peak is None:
+        return _missed(replace(blank, binding="this certificate bounds no input"))
+    return _missed(replace(blank, peak=first.peak, product=first.peak * first.deadline))
+
+
+def _search(
+    base: Certificate, starts: Starts, U: Fraction, T: Fraction | None, r: Fraction | None, input_norm: int | None
+) -> tuple[Fit | None, Fit | None]:
+    """Return the first gains of which the functions of ``base`` prove what is asked, and the first of all."""
+    bounds, members = _bounds(base, starts)
+    first = None
     for option in _options(base, bounds, members, input_norm, r):
-        fit = _fit(base, bounds, option, U, T, r, input_norm)
-        best = best or fit
+        fit = _fit(base, bounds, option, U, T, input_norm)
+        first = first or fit
         if _meets(fit, U, r):
-            checked = fit.certificate.checked
-            if checked is None or not checked.accepted:
-                why = "" if checked is None else f" {checked.rejected}: {checked.reason}"
-                return replace(blank, binding=f"the independent check does not accept{why}")
-            return _met(replace(blank, verdict=MET), fit)
+            return fit, first
         if T is not None and option.product > U * T * _HOPELESS:
             break
-    if best is None or best.peak is None:
-        return _missed(replace(blank, binding="this certificate bounds no input"))
-    return _missed(replace(blank, peak=best.peak, product=best.peak * best.deadline))
+    return None, first
 
 
 # ---------------------------------------------------------------------- what is known
@@ -458,7 +510,7 @@ def _lower_product(base: Certificate, bounds: InputBounds, residual: Fraction | 
             way = _largest_below(bounds.starts, row) - (residual or 0)
             if way > best:
                 best, why = way, f"the way of agent {shorten(label)} to its outcome"
-    limit = base.rate_limit
+    limit = base.upper_bound
     if residual is None and limit and _has_inner_points(bounds.starts):
         for heard, label in zip(bounds.rows, labels, strict=True):
             first = 2 / limit * _largest_below(bounds.starts, heard)
@@ -586,7 +638,6 @@ def _fit(
     option: Option,
     U: Fraction,
     deadline: Fraction | None,
-    residual: Fraction | None,
     input_norm: int | None,
 ) -> Fit:
     """Return the gains at a deadline, or at the shortest one that is proved, and what is proved of them."""
@@ -602,20 +653,28 @@ def _fit(
 
 
 def _at(base: Certificate, bounds: InputBounds, option: Option, T: Fraction, input_norm: int | None) -> Fit:
+    limits: tuple[Limits, ...] = ()
     if option.clock is None:
         protocol = NominalProtocol(T, _decimal(option.a / T), option.k, 1)
-        cert = replace(base, protocol=protocol, limits=())
-        effort = cert.effort
+    else:
+        cap = _decimal(option.clock / T, up=True)
+        protocol, limits = NominalProtocol(T, cap, option.k, 1), (Limits(gain_cap=cap),)
+    return _fit_of(replace(base, protocol=protocol, limits=limits), bounds, input_norm)
+
+
+def _fit_of(cert: Certificate, bounds: InputBounds, input_norm: int | None) -> Fit:
+    """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
+    T, effort = cert.protocol.T, cert.effort
+    if not cert.limits:
         if effort is None or effort.peak is None:
             return Fit(T, cert, None, Fraction(0) if not any(bounds.held) else None, Fraction(0))
         return Fit(T, cert, None, effort.peak.norm if input_norm == 2 else effort.peak.largest, Fraction(0))
-    cap = _decimal(option.clock / T, up=True)
-    limits = Limits(gain_cap=cap)
-    cert = replace(base, protocol=NominalProtocol(T, cap, option.k, 1), limits=(limits,))
-    entries = cert.effort.residual if cert.effort is not None else ()
+    (limits,) = cert.limits
+    assert limits.gain_cap is not None
+    entries = effort.residual if effort is not None else ()
     if not entries or entries[0].agents is None:
         return Fit(T, cert, limits, None, None)
-    peak = entries[0].largest if input_norm is None else cap * bounds.held_norm
+    peak = entries[0].largest if input_norm is None else limits.gain_cap * bounds.held_norm
     return Fit(T, cert, limits, peak, max(entries[0].agents))
 
 
@@ -661,15 +720,15 @@ def _missed(asked: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
     U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
     if T is not None and shortest is not None and shortest > T:
-        least, times = (_short(x, ROUND_FLOOR) for x in (shortest, shortest / T))
+        least, times = map(down, (shortest, shortest / T))
         text = f"no gains meet a deadline below {least}, {times} times the one asked for"
         return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
     if asked.peak is None or asked.product is None:
         return asked
     if asked.peak <= U:
         return replace(asked, binding="the residual is not proved")
-    over = f"the certified peak is {_short(asked.peak)}, {_short(asked.peak / U)} times max_input"
-    return replace(asked, binding=f"{over}; from T = {_short(asked.product / U)} on it is met")
+    over = f"the certified peak is {up(asked.peak)}, {up(asked.peak / U)} times max_input"
+    return replace(asked, binding=f"{over}; from T = {up(asked.product / U)} on it is met")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -696,11 +755,5 @@ def _decimal(x: Fraction, up: bool = False) -> Fraction:
     return Fraction(math.ceil(scaled) if up else round(scaled)) / unit
 
 
-def _short(x: Fraction, rounding: str = ROUND_HALF_EVEN) -> str:
-    """Write a nonnegative rational with six digits."""
-    value = Context(prec=6, rounding=rounding).divide(Decimal(x.numerator), Decimal(x.denominator))
-    return f"{float(value):.6g}" if not x or 1e-300 < value < Decimal("1e300") else f"{value.normalize():g}"
-
-
 def _percent(part: Fraction, whole: Fraction) -> str:
-    return f"{nearest_float(100 * part / whole):.4g}% of max_input"
+    return f"{up(100 * part / whole, 4)}% of max_input"

@@ -221,8 +221,7 @@ class SignedDigraph:
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
-        if orientation not in ("information", "listens"):
-            raise GraphError(f'orientation "{orientation}" is unknown; use "information" or "listens"')
+        _refuse_unknown_orientation(orientation)
         index: dict[str, int] = {}
         original: dict[str, Hashable] = {}
 
@@ -255,35 +254,61 @@ class SignedDigraph:
         return cls(labels, source, target, Weights(values), {"orientation": orientation})
 
     @classmethod
-    def from_matrix(cls, matrix: Any, labels: Iterable[Hashable] | None = None) -> SignedDigraph:
-        """Build a graph from an adjacency matrix ``W``: **row = listener**, ``w_kl`` is what k makes of l.
+    def from_matrix(
+        cls, matrix: Any, labels: Iterable[Hashable] | None = None, *, orientation: str | None = None
+    ) -> SignedDigraph:
+        """Build a graph from an adjacency matrix: its entry (k, l) is read as the row ``k, l, entry`` of an edge list.
+
+        Some write ``w_kl`` for what k makes of l, as the paper does, others for the edge k -> l, as networkx does. A
+        matrix does not tell which, so that ``orientation`` must:
+
+            from_matrix(W, orientation="listens").adjacency()              is the paper's W again
+            from_matrix(nx.to_numpy_array(G), orientation="information")   is from_networkx(G), but for the labels
 
         Parameters
         ----------
-        matrix : (N, N) array or SciPy sparse matrix
+        matrix : (N, N) array, SciPy sparse matrix or pandas DataFrame
             Integers are exact, floats are the dyadic numbers they are; the diagonal must be zero. Entries of an
-            object array may be Fractions.
+            object array may be Fractions. A DataFrame has the same labels on rows and columns, in any order; those of
+            the rows become the nodes.
         labels : iterable of N labels, optional
-            ``1 .. N`` by default.
+            ``1 .. N`` by default; none beside those of a DataFrame.
+        orientation : {"information", "listens"} or None
+            ``information``: information flows from the row to the column. ``listens``: the row listens to the column.
+            None is refused: it must be said.
 
         Raises
         ------
         GraphError
-            The matrix is not square, a diagonal entry is not zero, an entry is not a finite number, or there are not N
-            different labels.
+            The orientation is not given, the matrix is not square, a diagonal entry is not zero, an entry is not a
+            finite number, there are not N different labels, or rows and columns of a DataFrame have different ones.
 
         Examples
         --------
-        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]]).edges
+        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="listens").edges
         (('2', '1', Fraction(-1, 1)),)
+        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="information").edges
+        (('1', '2', Fraction(-1, 1)),)
         """
+        if hasattr(matrix, "is_multigraph"):
+            raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
+        if orientation is None:
+            raise GraphError(
+                'a matrix does not tell its direction: say orientation="listens" if row k holds whom k listens to (the '
+                'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
+            )
+        _refuse_unknown_orientation(orientation)
+        if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
+            if labels is not None:
+                raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
+            labels, matrix = rows, _aligned_frame(matrix, rows)
         if hasattr(matrix, "tocoo"):
             coo = matrix.tocoo()
             if len(coo.shape) != 2:
                 raise GraphError(f"an adjacency matrix has two dimensions, not {len(coo.shape)}")
-            shape, target, source, values = coo.shape, coo.row, coo.col, coo.data
+            shape, row, column, values = coo.shape, coo.row, coo.col, coo.data
             keep = values != 0
-            target, source, values = target[keep], source[keep], values[keep]
+            row, column, values = row[keep], column[keep], values[keep]
         else:
             try:
                 dense = np.asarray(matrix)
@@ -294,8 +319,13 @@ class SignedDigraph:
             shape = dense.shape
             if dense.dtype.kind not in "biufO":
                 raise GraphError(f"an adjacency matrix holds real numbers, not {dense.dtype}")
-            target, source = np.nonzero(dense)
-            values = dense[target, source]
+            try:
+                row, column = np.nonzero(dense)
+            except (TypeError, ValueError):  # pandas' NA is neither zero nor not
+                raise GraphError(
+                    "an entry of the adjacency matrix is missing; write 0 where there is no edge"
+                ) from None
+            values = dense[row, column]
         if shape[0] != shape[1]:
             raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
         if values.dtype.kind not in "biufO":
@@ -306,20 +336,45 @@ class SignedDigraph:
         if values.dtype.kind == "f":
             weights = Weights(values.astype(np.float64))
         else:
-            try:
-                weights = Weights([as_fraction(v) for v in values.tolist()])
-            except NumberError as error:
-                raise GraphError(f"the adjacency matrix: {error}") from None
-        return cls(names, source, target, weights, {"orientation": "matrix"})
+            exact = []
+            for k, m, value in zip(row.tolist(), column.tolist(), values.tolist(), strict=True):
+                try:
+                    exact.append(as_fraction(value, "the entry"))
+                except NumberError as error:
+                    place = f"row {shorten(names[k])}, column {shorten(names[m])}"
+                    raise GraphError(f"{place} of the matrix: {error}") from None
+            weights = Weights(exact)
+        if orientation == "information":
+            return cls(names, row, column, weights, {"orientation": "information"})
+        return cls(names, column, row, weights, {"orientation": "matrix"})
 
     @classmethod
-    def from_networkx(cls, graph: nx.DiGraph, weight: str = "weight") -> SignedDigraph:
-        """Build a graph from a networkx ``DiGraph``: an edge ``l -> k`` with its ``weight`` flows from l to k.
+    def from_networkx(
+        cls, graph: nx.DiGraph, weight: str = "weight", *, orientation: str = "information"
+    ) -> SignedDigraph:
+        """Build a graph from a networkx ``DiGraph``.
+
+        Parameters
+        ----------
+        graph : networkx.DiGraph
+        weight : str
+            The attribute of edges that holds their weights.
+        orientation : {"information", "listens"}
+            ``information``: information flows along an edge ``u -> v``. ``listens``: u listens to v, as in trust and
+            rating data.
 
         Raises
         ------
         GraphError
             ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, or an edge has no weight.
+
+        Examples
+        --------
+        >>> import networkx as nx
+        >>> team = nx.DiGraph()
+        >>> team.add_edge("ann", "bob", weight=-2)
+        >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
+        ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
         if graph.is_multigraph():
             raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
@@ -330,7 +385,7 @@ class SignedDigraph:
             if weight not in data:
                 raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"')
             triples.append((u, v, data[weight]))
-        return cls.from_edges(triples, graph.nodes)
+        return cls.from_edges(triples, graph.nodes, orientation=orientation)
 
     # ------------------------------------------------------------------ reading
 
@@ -359,6 +414,13 @@ class SignedDigraph:
     def exact_weight(self, edge: int) -> Fraction:
         """Return the weight of edge number ``edge`` exactly."""
         return self._weights.fraction(edge)
+
+    @cached_property
+    def weight_decades(self) -> int:
+        """How many powers of ten lie between the smallest and the largest size of a weight; 0 without edges."""
+        sizes = {abs(self._weights.fraction(int(i))) for i in np.unique(self._weights.table, return_index=True)[1]}
+        ratio = max(sizes) / min(sizes) if sizes else Fraction(1)
+        return len(str(ratio.numerator // ratio.denominator)) - 1
 
     def weight_table(self) -> tuple[np.ndarray | None, int]:
         """Return int64 numerators or float64 weights, in the order of the edges, and what divides them.
@@ -505,6 +567,40 @@ _READ_DEFAULT: dict[str, Any] = {
     "undirected": False,
     "notes": (),
 }
+
+
+def _refuse_unknown_orientation(orientation: str) -> None:
+    if orientation not in ("information", "listens"):
+        raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
+
+
+def labels_beside(values: Any) -> list[str] | None:
+    """Return the labels of a pandas Series, or of the rows of a DataFrame, as nodes are written; None of other data.
+
+    Examples
+    --------
+    >>> labels_beside([3, 5]) is None
+    True
+    """
+    index = getattr(values, "index", None)  # a method of lists and texts
+    if index is None or callable(index) or not hasattr(values, "to_numpy"):
+        return None
+    return [str(label) for label in index]
+
+
+def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
+    """Return the entries of a DataFrame with its columns in the order of its rows."""
+    place = {str(label): i for i, label in enumerate(frame.columns)}
+    for what, labels in (("rows", rows), ("columns", [str(label) for label in frame.columns])):
+        if len(set(labels)) < len(labels):
+            twice = next(label for label in labels if labels.count(label) > 1)
+            raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
+    if odd := sorted(place.keys() ^ set(rows)):
+        named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
+        raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
+    # One type for all columns would round the integers of one beside the floats of another.
+    entries = frame.to_numpy(dtype=object) if len(set(frame.dtypes)) > 1 else frame.to_numpy()
+    return entries[:, [place[label] for label in rows]]
 
 
 def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:

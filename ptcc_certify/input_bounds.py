@@ -3,8 +3,8 @@
 With ``k = rho2 kappa`` and ``z = ln(T/(T - t))`` the gain is ``rho1 + (k/T) e^z`` and the stretched clock
 ``s = rho1 T (1 - e^-z) + k z``. What is known of an agent is ``|e_k| <= min(held, start e^(-rate s / 2))``: ``held``
 for all times, ``start`` from a Lyapunov function of that rate. The bounds below use ``held`` up to an instant ``z`` and
-``start`` from there on; every ``z`` gives a valid one. All arguments are rationals, every rounding is upwards (or
-downwards where a name says ``below``).
+``start`` from there on; every ``z`` gives a valid one. The energy follows besides from two Lyapunov equations. All
+arguments are rationals, every rounding is upwards (or downwards where a name says ``below``).
 """
 
 from __future__ import annotations
@@ -15,14 +15,22 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
+from typing import Any, NamedTuple
 
 from ptcc_certify.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
 from ptcc_certify.work import spend
 
 #: Bits to which bounds are rounded.
 BITS = 64
+#: Pieces, of equal length in ``z``, into which the time is cut while sliding variables move.
+PIECES = 16
+#: Periods before the end that are multiplied one by one.
+LAST_PERIODS = 2000
 
 Linear = Mapping[int, Fraction]
+Rows = Sequence[Sequence[Fraction]]
+Interval = tuple[Fraction, Fraction]
+Of = Callable[["PrescribedGain", Fraction, Fraction, Fraction, Fraction], Fraction]
 
 
 def root_above(x: Fraction) -> Fraction:
@@ -146,6 +154,34 @@ def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fr
     return rounded((held * gain.clock_above(z) if z else 0) + late, BITS, up=True)
 
 
+def integral_above(gain: PrescribedGain, even: Fraction, grown: Fraction, p: Fraction) -> Fraction:
+    """Bound ``int gain ||E||^2 ds``, the energy, by ``even = int ||E||^2 ds`` and ``grown = int e^(s/k) ||E||^2 ds``.
+
+    With ``q = rho1 T / k`` it is ``z = s/k - q (1 - e^-z)``, hence ``e^z - e^-p e^(s/k) <= p`` for ``0 <= p <= q`` and
+
+        gain = rho1 + (k/T) e^z <= rho1 + (k/T) (p + e^-p e^(s/k))
+
+    which is at most twice the gain for ``p = q``.
+
+    Raises
+    ------
+    ValueError
+        ``p`` is not within ``0 .. q``.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))  # E = e^-s: even 1/2, grown 1
+    >>> round(float(integral_above(gain, Fraction(1, 2), Fraction(1), Fraction(0))), 6)
+    1.5
+    >>> round(float(integral_above(gain, Fraction(1, 2), Fraction(1), Fraction(7, 10))), 6)  # ln 2 is best
+    1.346585
+    """
+    if not 0 <= p <= gain.rho1 * gain.T / gain.k:
+        raise ValueError("p is not between 0 and rho1 T / k")
+    slope = gain.k / gain.T
+    return rounded((gain.rho1 + slope * p) * even + slope * decay_above(p) * grown, BITS, up=True)
+
+
 @dataclass(frozen=True)
 class Limits:
     """What an actuator leaves of the gain: capped at ``gain_cap``, 0 from ``T - stop_before`` on, or held.
@@ -196,27 +232,74 @@ class Limits:
         if top is None:
             raise ValueError("nothing limits the gain")
         T, rho1, k = gain.T, gain.rho1, gain.k
-        end = T - (self.stop_before or 0)
-        first = rho1 + k / T
-        if top <= first:
-            return rounded(top * end, BITS)
-        # From `turn` on the gain is `top`, unless the stop comes first.
-        turn = min(T - k / (top - rho1), end)
+        end, turn = T - (self.stop_before or 0), self._turn(gain, top)
         s = rho1 * turn + k * log(T / (T - turn), BITS)[0] + top * (end - turn)
         if self.sample_period is not None:
-            s -= self.sample_period * (top - first)
+            s -= self.sample_period * max(top - rho1 - k / T, Fraction(0))
         return rounded(max(s, Fraction(0)), BITS)
 
+    def square_above(self, gain: PrescribedGain) -> Fraction:
+        """Bound the integral of the square of the gain up to the deadline from above, without sampling.
 
-def limited_rate(rate: Fraction, growth: Fraction, limits: Limits, gain: PrescribedGain) -> Fraction:
-    """Return the rate at which ``V`` decays under the limits, on the clock: ``rate - h gain growth`` if sampled.
+        Raises
+        ------
+        ValueError
+            Nothing limits the gain: the integral is infinite.
+        """
+        top = self.largest_gain(gain)
+        if top is None:
+            raise ValueError("nothing limits the gain")
+        T, rho1, k = gain.T, gain.rho1, gain.k
+        end, turn = T - (self.stop_before or 0), self._turn(gain, top)
+        squares = rho1**2 * turn + 2 * rho1 * k * log(T / (T - turn), BITS)[1] + k**2 * (1 / (T - turn) - 1 / T)
+        return rounded(squares + top**2 * (end - turn), BITS, up=True)
 
-    With ``F L + L'F >= rate F`` and ``L'F L <= growth F`` a step ``X - eta L X`` leaves
-    ``V (1 - eta rate + eta^2 growth) <= V e^(-eta (rate - eta growth))``.
+    def _turn(self, gain: PrescribedGain, top: Fraction) -> Fraction:
+        """Return the instant from which on the gain is ``top``, the stop unless that comes first."""
+        if top <= gain.rho1 + gain.k / gain.T:
+            return Fraction(0)
+        return min(gain.T - gain.k / (top - gain.rho1), gain.T - (self.stop_before or 0))
+
+
+def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: Fraction) -> Fraction:
+    """Bound ``V`` at the end over ``V(0)`` if gain and input are held over periods.
+
+    With ``F L + L'F >= rate F`` and ``L'F L <= growth F`` a period ``X - eta L X``, ``eta`` being its length times its
+    gain, leaves ``V (1 - eta rate + eta^2 growth)`` at most. All but the last ``LAST_PERIODS`` periods leave
+    ``V e^(-rate A + growth B)``, ``A`` and ``B`` the sums of ``eta`` and ``eta^2``: with ``h`` the period and ``g``
+    the gain that acts, ``A >= int g dt - h (g - g(0))`` and ``B <= h int g^2 dt``, since the gain never falls.
+
+    Raises
+    ------
+    ValueError
+        There is no period, or the bound is too large to be formed.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))  # two periods: eta = 1, 3/2
+    >>> sampled_above(gain, Limits(sample_period=Fraction(1, 2)), Fraction(1), Fraction(1))
+    Fraction(7, 4)
     """
-    if limits.sample_period is None:
-        return rate
-    return rate - limits.sample_period * (limits.largest_gain(gain) or 0) * growth
+    h, g0 = limits.sample_period, gain.rho1 + gain.k / gain.T
+    if h is None:
+        raise ValueError("nothing is sampled")
+    end = gain.T - (limits.stop_before or 0)
+    count = -(-end // h)
+    first = max(count - LAST_PERIODS, 0)
+    factor, bits = Fraction(1), _bits((gain.T, gain.rho1, gain.k, h, end, rate, growth, limits.gain_cap or h))
+    spend(300 * (count - first), bits, bits, "held gains")
+    if first:
+        early = Limits(limits.gain_cap, gain.T - h * first)
+        lost = h * ((early.largest_gain(gain) or g0) - min(g0, limits.gain_cap or g0))
+        power = rate * max(early.clock_below(gain) - lost, Fraction(0)) - growth * h * early.square_above(gain)
+        if power < -LARGEST_EXPONENT:
+            raise ValueError("a bound that is too large to be formed")
+        factor = decay_above(power) if power >= 0 else exp(rounded(-power, BITS, up=True), BITS)[1]
+    for j in range(first, count):
+        g = gain.rho1 + gain.k / (gain.T - h * j)
+        eta = min(g, limits.gain_cap or g) * min(h, end - h * j)
+        factor = rounded(factor * max(1 - eta * rate + eta**2 * growth, Fraction(0)), BITS, up=True)
+    return factor
 
 
 @dataclass(frozen=True)
@@ -250,7 +333,12 @@ class Form:
         """Return ``z'P z``."""
         if self.diagonal is not None:
             return sum((w * x * x for w, x in zip(self.diagonal, z, strict=True)), Fraction(0))
-        return sum((x * sum(map(mul, row, z)) for row, x in zip(self.matrix or (), z, strict=True)), Fraction(0))
+        rows = self.matrix or ()
+        common = math.lcm(*{p.denominator for row in rows for p in row})
+        scale = math.lcm(*{x.denominator for x in z})
+        Z = [x.numerator * (scale // x.denominator) for x in z]
+        each = (sum(p.numerator * (common // p.denominator) * x for p, x in zip(row, Z, strict=True)) for row in rows)
+        return Fraction(sum(map(mul, each, Z)), common * scale**2)
 
     def largest_value(self, sizes: Sequence[Fraction]) -> Fraction:
         """Bound ``z'P z`` where ``|z_i| <= sizes_i``."""
@@ -312,6 +400,81 @@ class Starts:
 
 
 @dataclass(frozen=True)
+class Reaching:
+    """How sliding variables move until they are 0, with ``s_k`` the sign of ``sigma_k(0)``.
+
+        sigma_k' = -(mu2 + power/(T_r - t)) sigma_k - s_k f_k,      0 <= f_k <= push
+        |sigma_k| <= psi |sigma_k(0)|,      psi = e^(-mu2 t) ((T_r - t)/T_r)^power
+
+    Attributes
+    ----------
+    sigma0 : list of Fraction
+        ``sigma(0)``, not all 0.
+    T_r, T_s, mu2 : Fraction
+    power, push : Fraction
+        ``mu3 kappa`` and ``mu1 + delta``.
+    z : Fraction or None
+        The last proved reaching time, ``ln(T_r/(T_r - t))``; None: ``T_r``.
+    """
+
+    sigma0: Sequence[Fraction]
+    T_r: Fraction
+    T_s: Fraction
+    mu2: Fraction
+    power: Fraction
+    push: Fraction
+    z: Fraction | None = None
+
+    @cached_property
+    def quiet(self) -> Fraction:
+        """``z = ln(T/(T - t))``, ``T = T_r + T_s``, from above, of an instant from which on all are 0."""
+        left = self.T_s
+        if self.z is not None and self.z <= LARGEST_EXPONENT:
+            left += self.T_r * exp(-self.z, BITS)[0]
+        return log((self.T_r + self.T_s) / left, BITS)[1]
+
+    def decay(self, remaining: Interval) -> Interval:
+        """Enclose ``psi`` where ``1 - t/T`` is within an interval."""
+        low, high = (((self.T_r + self.T_s) * x - self.T_s) / self.T_r for x in remaining)  # (T_r - t)/T_r
+        if high <= 0:
+            return Fraction(0), Fraction(0)
+        low, high = min(low, Fraction(1)), min(high, Fraction(1))
+        above = decay_above(max(self.mu2 * self.T_r * (1 - high) - self.power * log(high, BITS)[1], Fraction(0)))
+        if low <= 0:
+            return Fraction(0), above
+        push = rounded(self.mu2 * self.T_r * (1 - low) - self.power * log(low, BITS)[0], BITS, up=True)
+        return (exp(-push, BITS)[0] if push <= LARGEST_EXPONENT else Fraction(0)), above
+
+    def pushes(self, row: Linear) -> tuple[Fraction, Fraction]:
+        """Bound ``|sum_k a_k s_k c_k|`` where ``0 <= c_k <= |sigma_k(0)|``, and where ``0 <= c_k <= push``."""
+        moved = [(a * self.sigma0[k], a * self._sign(k)) for k, a in row.items() if self.sigma0[k]]
+        one, other = (
+            max(sum((x for x in own if x > 0), Fraction(0)), -sum((x for x in own if x < 0), Fraction(0)))
+            for own in (zip(*moved, strict=True) if moved else ((), ()))
+        )
+        return one, other * self.push
+
+    def _sign(self, k: int) -> int:
+        return 1 if self.sigma0[k] > 0 else -1
+
+
+class Piece(NamedTuple):
+    """A piece of the time while sliding variables move, all from above but ``clock_below``.
+
+    The gain at its two ends, how far the clock goes, how long it lasts, ``int gain^2 dt``, and by how much ``psi``
+    falls.
+    """
+
+    first: Fraction
+    last: Fraction
+    clock_below: Fraction
+    clock_above: Fraction
+    time: Fraction
+    square: Fraction
+    drop: Fraction
+
+
+@dataclass(frozen=True)
 class InputBounds:
     """Bounds of the input over a set of starts.
 
@@ -325,11 +488,13 @@ class InputBounds:
     constants : list of (list of Fraction or None)
         ``c_k`` of full matrices, ``e_k^2 <= c_k V``; those of diagonal ones follow.
     starts : Starts
-        Of ``X(0) - sigma(0)``.
-    sigma0 : list of Fraction
-        Sizes ``|sigma_k(0)|``; empty if all are 0.
-    T_s : Fraction
-        Sliding mode: how long before ``T`` the sliding variables are 0 at the latest.
+        Of ``X(0)``.
+    reaching : Reaching or None
+        None if no sliding variable moves.
+
+    Notes
+    -----
+    While sliding variables move, ``dx = -gain L x dt + d sigma``: ``E' = -gain L E - L sigma'``.
     """
 
     rows: Sequence[Linear]
@@ -337,9 +502,8 @@ class InputBounds:
     forms: Sequence[Form | None]
     constants: Sequence[Sequence[Fraction] | None]
     starts: Starts
-    sigma0: Sequence[Fraction] = ()
-    T_s: Fraction = Fraction(0)
-    _roots: dict[int, Fraction] = field(default_factory=dict)
+    reaching: Reaching | None = None
+    _kept: dict[Any, Any] = field(default_factory=dict)
 
     def form(self, k: int) -> Form:
         """Return the Lyapunov function ``k``.
@@ -354,18 +518,10 @@ class InputBounds:
             raise ValueError("a member that says nothing of single agents")
         return form
 
-    @cached_property
+    @property
     def quiet(self) -> Fraction:
-        """``z`` from which on the sliding variables are 0, ``ln(T/T_s)`` from above; 0 if they always are."""
-        return log(self.gain.T / self.T_s, BITS)[1] if self.sigma0 else Fraction(0)
-
-    def _pushed(self, row: Linear) -> Fraction:
-        return sum((abs(x) * self.sigma0[j] for j, x in row.items()), Fraction(0))
-
-    @cached_property
-    def _pushed_twice(self) -> list[Fraction]:
-        """``|L^2| |sigma(0)|``, where sliding variables move."""
-        return self._squared(self.sigma0)
+        """``z`` from which on the sliding variables are 0; 0 if they always are."""
+        return Fraction(0) if self.reaching is None else self.reaching.quiet
 
     def _squared(self, sizes: Sequence[Fraction]) -> list[Fraction]:
         """Return ``|L^2| sizes``."""
@@ -384,12 +540,18 @@ class InputBounds:
     def held(self) -> list[Fraction]:
         """What no ``|e_k|`` ever exceeds: ``e^(-L s)`` expands neither ``max |x_k|`` nor ``max |e_k|``."""
         largest = max(map(self.starts.largest, self.rows))
-        heard = [2 * row.get(v, Fraction(0)) for v, row in enumerate(self.rows)]
-        if self.sigma0:
-            largest += max(self._pushed_twice) * self.gain.clock_above(self.quiet)
-            return [largest + self._pushed(row) if h else h for row, h in zip(self.rows, heard, strict=True)]
         states = max(self.starts.largest({v: Fraction(1)}) for v in range(len(self.rows)))
+        if self.reaching is not None:
+            moved = [self.reaching.pushes(row) for row in self.rows]
+            largest += max(a for a, _ in moved) + self.reaching.T_r * max(b for _, b in moved)
+            states += max(map(abs, self.reaching.sigma0)) + self.reaching.T_r * self.reaching.push
+        heard = [2 * row.get(v, Fraction(0)) for v, row in enumerate(self.rows)]
         return [min(largest, h * states) for h in heard]
+
+    @cached_property
+    def first(self) -> Fraction:
+        """A bound of ``||E(0)||``, exact but for rounding for a single start."""
+        return root_above(sum((self.starts.largest(row) ** 2 for row in self.rows), Fraction(0)))
 
     @cached_property
     def held_norm(self) -> Fraction:
@@ -397,23 +559,64 @@ class InputBounds:
         return root_above(sum((x * x for x in self.held), Fraction(0)))
 
     def start(self, k: int) -> Fraction:
-        """Bound ``v`` so that ``sqrt(V) <= e^(-rate s / 2) v`` for all starts, once no sliding variable moves.
-
-        In the reaching phase ``y = x - sigma`` moves by ``dy/ds = -L (y + sigma)``, ``|sigma| <= |sigma(0)|``.
-        """
-        if k not in self._roots:
+        """Bound ``sqrt(V(0))`` for all starts; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
+        if ("start", k) not in self._kept:
             form = self.form(k)
-            rows = [self.rows[v] for v in form.nodes] if form.coordinates == "E" else _deviations(form)
+            rows = self._coordinates(form)
             _count(form, rows, self.starts)
-            root = _largest_root(form, rows, self.starts)
-            if self.sigma0:
-                if form.coordinates != "E":
-                    raise ValueError("deviations say nothing of the reaching phase")
-                size = root_above(form.largest_value([self._pushed_twice[v] for v in form.nodes]))
-                alpha = form.rate / 2
-                root += size * (exp(alpha * self.gain.clock_above(self.quiet), BITS)[1] - 1) / alpha
-            self._roots[k] = rounded(root, BITS, up=True)
-        return self._roots[k]
+            self._kept["start", k] = rounded(_largest_root(form, rows, self.starts), BITS, up=True)
+        return self._kept["start", k]
+
+    def _coordinates(self, form: Form) -> list[Linear]:
+        """Return the rows of the coordinates of a form."""
+        return [self.rows[v] for v in form.nodes] if form.coordinates == "E" else list(_deviations(form))
+
+    def _pieces(self, z: Fraction) -> list[Piece]:
+        """Return what the pieces of the time up to ``z`` have in common."""
+        if z not in self._kept:
+            assert self.reaching is not None
+            bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, z, self.reaching.T_r, self.reaching.mu2))
+            spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
+            (T, rho1, k), up = (self.gain.T, self.gain.rho1, self.gain.k), True
+            instants = [z * j / PIECES for j in range(PIECES + 1)]
+            remaining = [exp(-x, BITS) for x in instants]  # 1 - t/T
+            decay = [(Fraction(1), Fraction(1)), *(self.reaching.decay(x) for x in remaining[1:])]
+            gains = [rounded(rho1 + k / T / low, BITS, up) for low, _ in remaining]
+            pieces = []
+            for j in range(PIECES):
+                (low, high), (end, nearest) = remaining[j], remaining[j + 1]
+                step, time = k * z / PIECES, rounded(T * (high - end), BITS, up)
+                square = rho1**2 * time + 2 * rho1 * step + k**2 / T * (1 / end - 1 / high)
+                clock = rounded(rho1 * T * max(low - nearest, Fraction(0)) + step, BITS)
+                above, drop = rounded(rho1 * time + step, BITS, up), rounded(decay[j][1] - decay[j + 1][0], BITS, up)
+                pieces.append(Piece(gains[j], gains[j + 1], clock, above, time, rounded(square, BITS, up), drop))
+            self._kept[z] = pieces
+        return self._kept[z]
+
+    def _reached(self, k: int, z: Fraction) -> tuple[list[tuple[Fraction, Fraction]], Fraction]:
+        """Bound ``sqrt(V)`` while sliding variables move: at the begin of each piece, what it adds, and at ``z``.
+
+        In a piece from ``a`` to ``b`` of the time ``sqrt(V)`` gains at most ``w (psi(a) - psi(b)) + f (b - a)``, ``w``
+        and ``f`` being the norms of what bounds ``L sigma``, ``|sigma_k| <= |sigma_k(0)|``, and ``L f``.
+        """
+        if (k, z) not in self._kept:
+            assert self.reaching is not None
+            form = self.form(k)
+            pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
+            w, f = (root_above(form.largest_value(own)) for own in pushes)
+            v, found = self.start(k), []
+            for piece in self._pieces(z):
+                added = rounded(w * piece.drop + f * piece.time, BITS, up=True)
+                found.append((v, added))
+                v = rounded(v * decay_above(form.rate / 2 * piece.clock_below) + added, BITS, up=True)
+            self._kept[k, z] = found, v
+        return self._kept[k, z]
+
+    def share(self, k: int, limits: Limits, clock: Fraction, growth: Fraction) -> Fraction:
+        """Bound ``sqrt(V)`` at the deadline over ``sqrt(V(0))`` under limits of the gain that leave this clock."""
+        if limits.sample_period is None:
+            return decay_above(self.form(k).rate / 2 * clock)
+        return root_above(sampled_above(self.gain, limits, self.form(k).rate, growth))
 
     def constant(self, k: int) -> Sequence[Fraction]:
         """Return ``c_v`` with ``e_v^2 <= c_v V`` for every agent.
@@ -440,13 +643,7 @@ class InputBounds:
         form = self.form(k)
         return root_above(1 / form.lowest if form.coordinates == "E" else sum(self.constant(k), Fraction(0)))
 
-    def bound(
-        self,
-        of: Callable[[PrescribedGain, Fraction, Fraction, Fraction, Fraction], Fraction],
-        v: int | None,
-        k: int,
-        z: Fraction,
-    ) -> Fraction:
+    def bound(self, of: Of, v: int | None, k: int, z: Fraction) -> Fraction:
         """Bound the peak, the energy or the length ``of`` an agent's ``gain e_v``, or of ``gain ||E||``.
 
         Raises
@@ -459,7 +656,33 @@ class InputBounds:
         bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
         spend(50, bits, bits, "bounds of the input")
         held = self.held_norm if v is None else self.held[v]
-        return of(self.gain, held, self.root_constant(k, v) * self.start(k), self.form(k).rate, z)
+        c, rate = self.root_constant(k, v), self.form(k).rate
+        if self.reaching is None:
+            return of(self.gain, held, c * self.start(k), rate, z)
+        pieces, end = self._reached(k, z)
+        begin = end * exp(rate / 2 * self.gain.clock_above(z), BITS)[1]
+        early, late = self._early(of, held, c, z, pieces), of(self.gain, Fraction(0), c * begin, rate, z)
+        return rounded(max(early, late) if of is peak_above else early + late, BITS, up=True)
+
+    def _early(
+        self, of: Of, held: Fraction, c: Fraction, z: Fraction, reached: Sequence[tuple[Fraction, Fraction]]
+    ) -> Fraction:
+        """Bound the peak, the energy or the length up to ``z``, while sliding variables move."""
+        pieces = self._pieces(z)
+        if of is peak_above:  # gain e^(-rate s / 2) does not grow
+            most = (p.first * v + p.last * added for p, (v, added) in zip(pieces, reached, strict=True))
+            return min(c * max(most), held * pieces[-1].last)
+        sizes = [min(c * (v + added), held) for v, added in reached]
+        if of is energy_above:
+            return sum((p.square * size**2 for p, size in zip(pieces, sizes, strict=True)), Fraction(0))
+        return sum((p.clock_above * size for p, size in zip(pieces, sizes, strict=True)), Fraction(0))
+
+    def largest_form(self, W: Rows) -> Fraction:
+        """Bound ``E(0)'W E(0)`` over the starts, ``E`` on the nodes that listen, in order."""
+        nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
+        form = Form(one, "E", nodes, None, W, one)
+        _count(form, [self.rows[v] for v in nodes], self.starts)
+        return _largest_root(form, [self.rows[v] for v in nodes], self.starts) ** 2
 
     def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
         """Bound what disturbances ``|d_k| <= delta`` add to the inputs of the nominal protocol.

@@ -17,6 +17,7 @@ import numpy as np
 
 from lmi.iterative import solve
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError
+from ptcc_certify.io import in_node_order
 from ptcc_certify.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -280,15 +281,19 @@ class Outcome:
 
 
 def outcome(
-    structure: Structure, x0: Sequence[Any], *, exact: bool | None = None, matrix: Influence | None = None
+    structure: Structure,
+    x0: Sequence[Any] | Mapping[Any, Any],
+    *,
+    exact: bool | None = None,
+    matrix: Influence | None = None,
 ) -> Outcome:
     """Compute the state at the deadline, ``Q x0``.
 
     Parameters
     ----------
     structure : Structure
-    x0 : sequence of N numbers
-        In node order; ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+    x0 : sequence of N numbers, mapping of label to number or pandas Series
+        In node order, or by label; ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
     exact : bool, optional
         See :func:`influence`.
     matrix : Influence, optional
@@ -326,21 +331,16 @@ def outcome(
 
 
 def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0") -> list[Fraction]:
-    """Return a start as N rationals; ``x0`` in node order, or by label. ``name`` is what messages call it.
+    """Return a start as N rationals; ``x0`` in node order, or with labels. ``name`` is what messages call it.
 
     Raises
     ------
     ParameterError
-        Wrong length, or an entry that is not a finite number.
+        Wrong length, labels other than those of the nodes, or an entry that is not a finite number.
     """
     labels = structure.graph.labels
-    if isinstance(x0, Mapping):
-        if set(map(str, x0)) != set(labels) or len(x0) != len(labels):
-            odd = shorten(str(sorted(set(map(str, x0)) ^ set(labels))[:1]))
-            raise ParameterError(f"the start {name} needs one value for each agent; {odd} is missing or unknown")
-        by_label = {str(key): value for key, value in x0.items()}
-        x0 = [by_label[label] for label in labels]
-    elif isinstance(x0, str) or not hasattr(x0, "__getitem__"):
+    x0 = in_node_order(x0, structure.graph, name)
+    if isinstance(x0, str) or not hasattr(x0, "__getitem__"):
         raise ParameterError(f"the start {name} is a sequence of numbers in node order, or a mapping by label")
     if len(x0) != len(labels):
         raise ParameterError(f"the start {name} has {len(x0)} values for {len(labels)} agents")
@@ -350,9 +350,9 @@ def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], nam
             start.append(value)
             continue
         try:
-            start.append(as_fraction(value, f"{name} of agent {label}"))
+            start.append(as_fraction(value, f"{name} of agent {shorten(label)}"))
         except NumberError as error:
-            where = f"{name} of agent {label}"
+            where = f"{name} of agent {shorten(label)}"
             raise ParameterError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
     return start
 
@@ -406,7 +406,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
 
     Parameters
     ----------
-    x : sequence of N numbers, Outcome or Trajectory
+    x : sequence of N numbers, mapping or pandas Series by label, Outcome or Trajectory
         A trajectory is judged at its deadline and at every later sample, relative to its largest start.
     structure : Structure
     tolerance : float
@@ -429,7 +429,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     >>> is_stability(outcome(st, [3, 4]), st)
     True
     """
-    return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, tolerance))
+    return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, structure, tolerance))
 
 
 def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
@@ -460,7 +460,7 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
     >>> is_bipartite_consensus(outcome(st, [3, 4]), st), is_bipartite_consensus(outcome(st, [3, 3]), st)
     (True, False)
     """
-    return all(_same_modulus(state, tol) for state, tol in _states(x, tolerance))
+    return all(_same_modulus(state, tol) for state, tol in _states(x, structure, tolerance))
 
 
 def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
@@ -497,7 +497,7 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
     return all(
         _same_modulus([state[k] for k in leaders], tol)
         and all(abs(state[k]) <= abs(state[leaders[0]]) + tol for k in followers)
-        for state, tol in _states(x, tolerance)
+        for state, tol in _states(x, structure, tolerance)
     )
 
 
@@ -529,7 +529,7 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
     >>> is_bipartite_containment(outcome(st, [1, 0, 2]), st)
     True
     """
-    return all(_contained(state, structure, tol) for state, tol in _states(x, tolerance))
+    return all(_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
 
 
 def _contained(state: Sequence[Any], structure: Structure, tolerance: float) -> bool:
@@ -548,7 +548,7 @@ def _same_modulus(state: Sequence[Any], tolerance: float) -> bool:
     return min(sizes) > tolerance and max(sizes) - min(sizes) <= tolerance
 
 
-def _states(x: Any, tolerance: float) -> list[tuple[Sequence[Any], float]]:
+def _states(x: Any, structure: Structure, tolerance: float) -> list[tuple[Sequence[Any], float]]:
     """Return the states to judge, each with its absolute tolerance (an int 0 keeps rationals exact)."""
     if isinstance(x, Outcome) and tolerance == 0:
         return [(x.final_state, 0)]
@@ -566,4 +566,4 @@ def _states(x: Any, tolerance: float) -> list[tuple[Sequence[Any], float]]:
             for column in range(states.shape[1])
             for i in range(x.deadline_index, states.shape[-1])
         ]
-    return [(x, tolerance)]
+    return [(in_node_order(x, structure.graph, "x"), tolerance)]

@@ -11,7 +11,6 @@ import io
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from ptcc_certify.bounds import float_below
 from ptcc_certify.examples import Example
 from ptcc_certify.plots import (
     DOUBLE_COLUMN,
@@ -24,6 +23,7 @@ from ptcc_certify.plots import (
     plot_sliding,
     plot_trajectory,
 )
+from ptcc_certify.rounding import float_down
 from ptcc_certify.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 _COLUMNS = (
-    *("example", "graph", "claim", "theorem", "certified_rate", "paper_rate", "tightness", "reached_by", "T_r"),
+    *("example", "graph", "claim", "theorem", "certified_rate", "paper_rate", "optimality_ratio", "reached_by", "T_r"),
     *("final_state", "verdict", "simulated_worst_ratio", "simulated_reached"),
 )
 
@@ -80,11 +80,11 @@ def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
 
 
 def results_csv(runs: Sequence[Run]) -> str:
-    """Return what came of the examples as CSV: claim, theorem, rate, tightness, reaching times, final state, verdict.
+    """Return what came of the examples as CSV: claim, theorem, rates, reaching times, final state, verdict.
 
-    Rates are per unit of the stretched clock and tightness is the certified rate over a proved limit of all rates, both
-    rounded down; ``reached_by`` is when each sliding variable is proved to be 0; the final state is written in full,
-    exactly. What the simulated run showed is called so.
+    Rates are per unit of the stretched clock, and the optimality ratio is the proved rate over its proved upper bound,
+    all rounded down; ``reached_by`` is when each sliding variable is proved to be 0; the final state is written in
+    full, exactly. What the simulated run showed is called so.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -98,9 +98,9 @@ def results_csv(runs: Sequence[Run]) -> str:
                 graph,
                 claim.behaviour if claim else "",
                 claim.theorem if claim else "",
-                "" if certificate.rate is None else float_below(certificate.rate),
-                "" if paper is None else float_below(paper),
-                tightness(certificate),
+                "" if certificate.rate is None else float_down(certificate.rate),
+                "" if paper is None else float_down(paper),
+                certificate.optimality_ratio,
                 proved,
                 deadline,
                 ""
@@ -112,13 +112,6 @@ def results_csv(runs: Sequence[Run]) -> str:
             ]
         )
     return text.getvalue()
-
-
-def tightness(certificate: Certificate) -> float | None:
-    """Return the proved rate over a proved limit of all rates, rounded down to four digits; None without rates."""
-    if certificate.rate is None or certificate.rate_limit is None:
-        return None
-    return int(certificate.rate / certificate.rate_limit * 10_000) / 10_000
 
 
 def reaching_times(certificate: Certificate) -> tuple[float, float, float] | tuple[str, str, str]:

@@ -22,6 +22,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.io import write_atomically
 from ptcc_certify.lemmas import laplacian_spectrum
 from ptcc_certify.rationals import shorten
+from ptcc_certify.rounding import float_up
 from ptcc_certify.structure import Structure
 from ptcc_certify.trajectory import SlidingTrajectory, Trajectory
 
@@ -660,8 +661,8 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
             points = [m.prefactor for m in own], [m.rate for m in own]
             ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
     rates = [m.rate for m in members]
-    if certificate.rate_limit is not None:
-        limit = float(certificate.rate_limit)
+    if certificate.upper_bound is not None:
+        limit = float_up(certificate.upper_bound)
         ax.axhline(limit, color="#7F7F7F", linewidth=2.2, alpha=0.6, label="no rate exceeds (proved)")
         rates.append(limit)
     if certificate.spectral_rate is not None:

@@ -1,10 +1,12 @@
-"""A proved bound that no rate exceeds, whatever the Lyapunov function: twice a bound of the smallest real part.
+"""The upper bound on the decay rate, whatever the Lyapunov function: twice a proved bound of the smallest real part.
 
-``V <= e^(-b s) V(0)`` for all starts means ``b <= 2 Re lambda`` for every nonzero eigenvalue ``lambda`` of ``L``. With
+``V <= e^(-b s) V(0)`` for all starts means ``b <= 2 Re lambda`` for every nonzero eigenvalue ``lambda`` of ``L``, and
+so for their mean in a strong component, the trace of its block ``A`` over their number: exact, and sharp for a single
+follower and for two agents. Otherwise, with
 ``B = A - c I`` for a strong component's block ``A`` and a symmetric ``H`` with ``H B + B'H > 0``, ``H`` and ``B`` have
 the same inertia (Ostrowski and Schneider 1962): where ``H`` is negative on a subspace of dimension ``k``, at least
 ``k`` eigenvalues of ``A`` have a real part below ``c``. One suffices; of a balanced closed component, whose eigenvalue
-0 does not count, two. So no rate exceeds ``2 c``.
+0 does not count, two. So no rate exceeds ``2 c``. The better of the two is taken.
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ from lmi.exact import prove_positive_definite, round_to_bits
 from ptcc_certify.error_system import rounded_matrix
 from ptcc_certify.lemmas import EXACT_NODES, component_blocks, single_followers
 from ptcc_certify.rationals import format_exact
+from ptcc_certify.rounding import float_down
 from ptcc_certify.structure import Structure
-from ptcc_certify.theorems.base import Matrix, multiply
+from ptcc_certify.theorems.base import Matrix, integer_matrix, integer_rows
 
 #: Relative amounts by which ``c`` lies above the smallest real part, one after the other, until the proof succeeds.
 _GAPS = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1)
@@ -37,20 +40,27 @@ class RateLimit:
     ----------
     value : Fraction
     nodes : tuple of int
-        A strong component.
+        A strong component; of the mean eigenvalue one of its nodes.
     form : rows of Fractions
-        ``H``.
+        ``H``; empty if the mean of the nonzero eigenvalues is the bound.
     vectors : tuple of tuple of Fraction
         On which ``H`` is negative.
     """
 
     value: Fraction
     nodes: tuple[int, ...]
-    form: Matrix
-    vectors: tuple[tuple[Fraction, ...], ...]
+    form: Sequence[Sequence[Fraction]] = ()
+    vectors: tuple[tuple[Fraction, ...], ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Kind of the obligation that proves it."""
+        return "rate-limit" if self.form else "rate-mean"
 
     def witness(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Return nodes, form and vectors as JSON-ready data."""
+        """Return the node, or nodes, form and vectors as JSON-ready data."""
+        if not self.form:
+            return {"node": labels[self.nodes[0]]}
         return {
             "nodes": [labels[v] for v in self.nodes],
             "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(self.form)],
@@ -59,20 +69,26 @@ class RateLimit:
 
 
 def prove_rate_limit(structure: Structure) -> RateLimit | None:
-    """Prove an upper bound of every rate, as near to the spectral rate as proves; None if nothing was proved.
+    """Prove an upper bound on every rate, as near to the spectral rate as proves; None if no agent listens.
 
     Examples
     --------
     >>> from ptcc_certify.graph import SignedDigraph
     >>> from ptcc_certify.structure import analyse
-    >>> limit = prove_rate_limit(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])))
-    >>> float(limit.value)
-    8.00000008
+    >>> pair = [(1, 2, -1), (2, 1, -3)]
+    >>> float(prove_rate_limit(analyse(SignedDigraph.from_edges(pair))).value)  # one nonzero eigenvalue, 4
+    8.0
+    >>> limit = prove_rate_limit(analyse(SignedDigraph.from_edges([*pair, (1, 3, 1), (3, 1, 1)])))
+    >>> limit.kind, float(limit.value).__round__(6)
+    ('rate-limit', 1.527864)
     """
-    slowest = _slowest(structure)
-    if slowest is None:
-        return None
+    mean = mean_limit(structure)
+    slowest = None if mean is None else _slowest(structure)
+    if mean is None or slowest is None:
+        return mean
     nodes, decay, dimension = slowest
+    if mean.value <= 2 * Fraction(decay) * (1 + Fraction(_GAPS[0])):
+        return mean
     rows = structure.graph.exact_rows(nodes)
     A = [[row.get(j, Fraction(0)) for j in nodes] for row in rows]
     with np.errstate(all="ignore"):
@@ -81,8 +97,50 @@ def prove_rate_limit(structure: Structure) -> RateLimit | None:
                 break
             found = _proved(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
             if found is not None:
-                return found
-    return None
+                return min(mean, found, key=lambda bound: bound.value)
+    return mean
+
+
+def optimality_ratio(rate: Fraction | None, upper_bound: Fraction | None) -> float | None:
+    """Return the proved rate over its proved upper bound, rounded down; None without one of them.
+
+    Examples
+    --------
+    >>> optimality_ratio(Fraction(3), Fraction(4)), optimality_ratio(None, Fraction(4))
+    (0.75, None)
+    """
+    return None if rate is None or upper_bound is None else float_down(rate / upper_bound)
+
+
+def mean_limit(structure: Structure) -> RateLimit | None:
+    """Return twice the mean nonzero eigenvalue of the strong component where that is least; None if no agent listens.
+
+    Which one is found in floats; its trace is exact, and costs no more than a sum over its edges.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.structure import analyse
+    >>> mean_limit(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3), (2, 3, "1/7")]))).value
+    Fraction(2, 7)
+    """
+    graph, number = structure.graph, structure.strong_component
+    count = np.bincount(number)
+    for component in structure.closed_components:
+        count[number[component.nodes[0]]] -= component.balanced
+    moving = np.flatnonzero(count)
+    if not moving.size:
+        return None
+    with np.errstate(over="ignore"):
+        traces = np.bincount(number, graph.in_weight(), minlength=count.size)
+    least = int(moving[np.argmin(traces[moving] / count[moving])])
+    edges = np.flatnonzero(number[graph.target] == least)
+    table, scale = graph.weight_table()
+    if table is not None and table.dtype.kind == "i":
+        trace = Fraction(sum(map(abs, table[edges].tolist())), scale)
+    else:
+        trace = sum((abs(graph.exact_weight(i)) for i in edges.tolist()), Fraction(0))
+    return RateLimit(2 * trace / int(count[least]), (int(np.flatnonzero(number == least)[0]),))
 
 
 def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
@@ -113,7 +171,6 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
 def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateLimit | None:
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
-    n = len(nodes)
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]
     floats = np.array([[float(x) for x in row] for row in B])
     try:
@@ -131,11 +188,10 @@ def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> R
     except (np.linalg.LinAlgError, ValueError, OverflowError, ZeroDivisionError):
         return None
     vectors = tuple(tuple(round_to_bits(float(x), _VECTOR_BITS) for x in column) for column in directions.T[:dimension])
-    HB = multiply(form, B)
-    if not prove_positive_definite([[HB[i][j] + HB[j][i] for j in range(n)] for i in range(n)]):
+    H, X = integer_matrix(form)[0], integer_matrix(vectors)[0]
+    HB = H * integer_matrix(B)[0]
+    if not prove_positive_definite(integer_rows(HB + HB.transpose())):
         return None
-    columns = [list(column) for column in zip(*vectors, strict=True)]
-    below = multiply([list(v) for v in vectors], multiply(form, columns))
-    if not prove_positive_definite([[-x for x in row] for row in below]):
+    if not prove_positive_definite(integer_rows(-(X * H * X.transpose()))):
         return None
     return RateLimit(2 * c, nodes, form, vectors)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from decimal import Decimal
+from decimal import Context, Decimal, Inexact
 from fractions import Fraction
 from numbers import Integral, Rational, Real
 
@@ -154,6 +154,27 @@ def writable(value: Fraction) -> bool:
     """
     # One bit is at most 0.30103 decimal digits; the guard comes before the expensive conversion.
     return (value.numerator.bit_length() + value.denominator.bit_length()) * 0.30103 <= MAX_CHARACTERS - 6
+
+
+def short_exact(value: Fraction) -> str:
+    """Write a rational exactly: as a decimal if it is one of at most 17 digits, otherwise as ``p/q``.
+
+    Raises
+    ------
+    NumberError
+        The text would be longer than the grammar allows.
+
+    Examples
+    --------
+    >>> [short_exact(x) for x in (Fraction(7, 40), Fraction(50), Fraction(1, 3), Fraction(3, 10**9))]
+    ['0.175', '50', '1/3', '3E-9']
+    """
+    exact = Context(prec=17, traps=[Inexact])
+    try:
+        decimal = exact.divide(Decimal(value.numerator), Decimal(value.denominator)).normalize(exact)
+    except Inexact:
+        return format_exact(value)
+    return f"{decimal:f}" if -7 <= decimal.adjusted() <= 17 else str(decimal)
 
 
 def format_exact(value: Fraction) -> str:

@@ -23,6 +23,7 @@ import numpy as np
 
 from ptcc_certify.disturbance import Adversary, Disturbance
 from ptcc_certify.errors import SimulationError
+from ptcc_certify.rounding import down, near, up
 
 if TYPE_CHECKING:
     from ptcc_certify.protocols import SlidingModeProtocol
@@ -35,6 +36,8 @@ _MAX_PANELS = 200_000
 _LEAST_PANELS = 3000
 _BATCH = 200_000
 _BITS = (96, 256, 1024, 4096)
+#: By how much a sum of panels, or a decay, may be off, relative to the start.
+SUM_ERROR = 1e-12
 _LARGEST_Z = Fraction(2) ** 1000
 
 
@@ -88,8 +91,8 @@ class ReachingTime:
 
     def __repr__(self) -> str:
         if self.z is None:
-            return f"ReachingTime(T_r = {float(self.deadline):.6g})"
-        return f"ReachingTime({self.time:.6g}, {self.remaining:.3g} before T_r)"
+            return f"ReachingTime(T_r = {near(self.deadline)})"
+        return f"ReachingTime({up(Fraction(self.time))}, {down(self.remaining, 3)} before T_r)"
 
 
 def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:
@@ -244,7 +247,7 @@ class ReachingProblem:
         for row, agent in enumerate(self._agents.tolist()):
             before = np.flatnonzero(z < self.z[agent])
             near = before[z[before] <= self._end]
-            panel = np.clip(np.searchsorted(self._edges, z[near], side="right") - 1, 0, self._steps.shape[1] - 1)
+            panel = self._panel(z[near])
             start = self._edges[panel]
             spent = self._sums[row, panel] + self._integrals(start, z[near], [row])[0]
             left = np.maximum(1 - spent, 0) * self._decay(z[near])
@@ -252,6 +255,38 @@ class ReachingProblem:
             far = before[z[before] > self._end]
             values[agent, far] = sigma0[agent] * self._tail(row, z[far])
         return values
+
+    def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
+        """Bound the (N, M) sizes of the sliding variables at increasing ``z >= 0``, 0 from ``certain`` (N,) on.
+
+        What is left of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
+        the certain instant, too, which nothing cancels.
+        """
+        bounds = np.zeros((self.z.size, z.size))
+        for row, agent in enumerate(self._agents.tolist()):
+            before = z < certain[agent]
+            near, far = before & (z <= self._end), before & (z > self._end)
+            panel = self._panel(z[near])
+            spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+            left = np.minimum(np.maximum(1 - spent, 0) + SUM_ERROR, 1)
+            if certain[agent] <= self._end:
+                left = np.minimum(left, self._rest(row, z[near], float(certain[agent])))
+            bounds[agent, near] = left * self._decay(z[near])
+            bounds[agent, far] = self._tail(row, z[far], SUM_ERROR)
+            bounds[agent] *= self._unit[agent] * (1 + SUM_ERROR / 2)
+        return bounds
+
+    def _rest(self, row: int, z: np.ndarray, end: float) -> np.ndarray:
+        """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision."""
+        panel, last = self._panel(z), int(self._panel(np.array([end]))[0])
+        later = np.append(np.cumsum(self._steps[row, :last][::-1])[::-1], 0.0)  # from an edge on to the last panel
+        whole = panel < last
+        own = self._integrals(z, np.where(whole, self._edges[panel + 1], end), [row])[0]
+        final = float(self._integrals(self._edges[[last]], np.array([end]), [row])[0, 0])
+        return own + np.where(whole, later[np.minimum(panel + 1, last)] + final, 0.0)
+
+    def _panel(self, z: np.ndarray) -> np.ndarray:
+        return np.clip(np.searchsorted(self._edges, z, side="right") - 1, 0, self._steps.shape[1] - 1)
 
     def _decay(self, z: np.ndarray) -> np.ndarray:
         return np.exp(-self._protocol.reaching_gain.clock_at_tau(z))
@@ -354,8 +389,8 @@ class ReachingProblem:
             return self._end + share
         return self._end + math.log1p(growth * share) / growth if growth * share > -1 else math.inf
 
-    def _tail(self, row: int, z: np.ndarray) -> np.ndarray:
-        rest = 1 - self._sums[row, -1]
+    def _tail(self, row: int, z: np.ndarray, more: float = 0.0) -> np.ndarray:
+        rest = min(1 - self._sums[row, -1] + more, 1.0)
         growth, beyond = float(self._protocol.mu3 * self._protocol.kappa - 1), z - self._end
         # psi first: what it multiplies may leave the range of floats.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -364,11 +399,18 @@ class ReachingProblem:
         return np.where(np.isfinite(left), left, 0.0)
 
 
-def sliding_bound(protocol: SlidingModeProtocol, sigma0: Sequence[Fraction], z: np.ndarray) -> np.ndarray:
-    """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``: what the adversary would leave.
+def sliding_bound(
+    protocol: SlidingModeProtocol,
+    sigma0: Sequence[Fraction],
+    z: np.ndarray,
+    reaching: Sequence[ReachingTime] | None = None,
+) -> np.ndarray:
+    """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below what the adversary leaves.
 
     ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, sharper than Proposition 1 and kept by every
-    disturbance; 0 from ``T_r`` on.
+    disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
+    lose digits, and may be 0.
     """
     worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
-    return np.abs(worst.sigma(z))
+    times = certified_reaching_times(protocol, sigma0) if reaching is None else reaching
+    return worst.above(z, np.array([math.inf if r.z is None else float(r.z) for r in times]) * (1 + 1e-15))

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import html
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -19,20 +20,35 @@ import numpy as np
 
 from ptcc_certify.bounds import Comparison, Envelope, Member, float_above, float_below
 from ptcc_certify.checker import CheckReport, read_and_check
-from ptcc_certify.checker.reading import exact, interval, triangle
+from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.vectors import Numbers, SideFiles, beside
 from ptcc_certify.distance import DistanceBound
-from ptcc_certify.effort import Disturbed, Effort, Limited, Limits, Peak, SlidingPart, Starts, Witness
+from ptcc_certify.effort import (
+    Disturbed,
+    Effort,
+    EnergyIntegral,
+    Limited,
+    Limits,
+    Peak,
+    SlidingPart,
+    Starts,
+    Witness,
+    first_input,
+)
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graph import SignedDigraph, Weights
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import shorten
+from ptcc_certify.rate_limit import optimality_ratio
+from ptcc_certify.rationals import nearest_float, shorten
 from ptcc_certify.reaching import ReachingTime
+from ptcc_certify.rounding import down
+from ptcc_certify.sharpen import METHODS
 from ptcc_certify.simulation import simulate
 from ptcc_certify.sliding_bounds import SlidingEnvelope
-from ptcc_certify.structure import Claim, Structure, analyse
+from ptcc_certify.structure import Claim, Structure, analyse, behaviour_name
 from ptcc_certify.theorems import LyapunovBlock, LyapunovFunction, sliding_claim
 from ptcc_certify.trajectory import Trajectory
+from ptcc_certify.verdict import Assessment, Expectations, assess
 
 Interval = tuple[Fraction, Fraction]
 Document = Mapping[str, Any]
@@ -108,6 +124,12 @@ class SavedCertificate:
         A run repeated by :meth:`with_simulation`; a file holds none.
     comparison : Comparison or None
         That run against the bounds.
+    expectations : Expectations
+        What was asked when it was made, as the file says; what became of it follows from what is proved.
+    limits : tuple of Limits
+        Likewise the limits of the gain under which the input was asked to be judged.
+    delta, noise : Fraction or None
+        Likewise the bounds of disturbances, in units of the input, and of noise, in units of the states.
 
     Examples
     --------
@@ -117,7 +139,7 @@ class SavedCertificate:
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
-    >>> saved.verdict, saved.claim.theorem, saved.rate <= 4 <= saved.rate_limit
+    >>> saved.verdict, saved.claim.theorem, saved.rate <= 4 <= saved.upper_bound
     ('certified', '1.1', True)
     >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
     True
@@ -141,6 +163,10 @@ class SavedCertificate:
     effort: Effort | None
     trajectory: Trajectory | None = None
     comparison: Comparison | None = None
+    expectations: Expectations = field(default_factory=Expectations)
+    limits: tuple[Limits, ...] = ()
+    delta: Fraction | None = None
+    noise: Fraction | None = None
 
     @property
     def graph(self) -> SignedDigraph:
@@ -151,6 +177,49 @@ class SavedCertificate:
     def verdict(self) -> str:
         """``certified`` or ``undecided``, as the independent check confirms."""
         return self.report.verdict
+
+    @property
+    def checked(self) -> CheckReport:
+        """Of the independent check, accepted."""
+        return self.report
+
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The graded verdict: whether the bound says something by the deadline, and what became of expectations."""
+        return assess(self)
+
+    @property
+    def method(self) -> str:
+        """Which Lyapunov functions were searched, as the file says."""
+        said = self.document["unverified"].get("search")
+        method = said.get("method") if isinstance(said, dict) else None
+        return method if method in METHODS else "best"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks of the file."""
+        said = self.document["unverified"].get("notes")
+        return tuple(note for note in said if isinstance(note, str)) if isinstance(said, list) else ()
+
+    @property
+    def cut_off(self) -> tuple[str, ...]:
+        """What the time limit ended, as the file says."""
+        said = self.document["unverified"].get("cut_off")
+        return tuple(name for name in said if isinstance(name, str)) if isinstance(said, list) else ()
+
+    @property
+    def time_limit(self) -> float:
+        """Seconds that the searches were given, as the file says; infinity if it does not."""
+        said = self.document["unverified"].get("time_limit")
+        return float(said) if type(said) in (int, float) else math.inf
+
+    @property
+    def longest_way(self) -> float | None:
+        """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
+        if self.start is None or self.final_state is None:
+            return None
+        ways = (abs(x - middle) for x, (middle, _) in zip(self.start, self.final_state, strict=True))
+        return nearest_float(max(ways))
 
     @cached_property
     def claims(self) -> tuple[Claim, ...]:
@@ -184,9 +253,14 @@ class SavedCertificate:
         return _maybe(self.document["rates"]["paper"])
 
     @property
-    def rate_limit(self) -> Fraction | None:
-        """A proved bound that no rate of any Lyapunov function exceeds."""
+    def upper_bound(self) -> Fraction | None:
+        """The proved upper bound on the decay rate: no Lyapunov function exceeds it."""
         return _maybe(self.document["rates"]["limit"])
+
+    @property
+    def optimality_ratio(self) -> float | None:
+        """Proved rate over its proved upper bound, rounded down; at most 1."""
+        return optimality_ratio(self.rate, self.upper_bound)
 
     @property
     def prefactor(self) -> Fraction | None:
@@ -202,7 +276,7 @@ class SavedCertificate:
         Parameters
         ----------
         remaining : (M,) array_like
-            ``1 - t/T`` at the instants, in (0, 1].
+            ``1 - t/T`` at the instants, in [0, 1].
 
         Returns
         -------
@@ -212,7 +286,7 @@ class SavedCertificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.norm_bound(remaining, self._known_start())
 
@@ -222,7 +296,7 @@ class SavedCertificate:
         Parameters
         ----------
         remaining : (M,) array_like
-            ``1 - t/T`` at the instants, in (0, 1].
+            ``1 - t/T`` at the instants, in [0, 1].
 
         Returns
         -------
@@ -232,7 +306,7 @@ class SavedCertificate:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no start, or an instant is not from 0 to 1.
         """
         return self.envelope.outcome_distance(remaining, self._known_start())
 
@@ -321,7 +395,7 @@ class SavedCertificate:
         return f"<pre>{html.escape(chr(10).join([repr(self), *self.report.lines()]))}</pre>"
 
     def __repr__(self) -> str:
-        rate = "none" if self.rate is None else f"{float(self.rate):.6g}"
+        rate = "none" if self.rate is None else down(self.rate)
         said = self.claim.behaviour if self.claim else f"{len(self.claims)} components"
         return f"SavedCertificate({said}, rate {rate}, {self.verdict}, {self.graph.n_nodes} nodes)"
 
@@ -460,8 +534,36 @@ class _Reader:
             reaching=reaching,
             lyapunov=lyapunov,
             envelope=envelope,
-            effort=self._effort(),
+            effort=self._effort(protocol),
+            **self._asked(),
         )
+
+    def _asked(self) -> dict[str, Any]:
+        """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
+        said = self.document["unverified"].get("asked")
+
+        def number(section: Any, key: str) -> Fraction | None:
+            try:
+                value = None if section.get(key) is None else exact(section[key])
+            except (AttributeError, RejectedError):
+                return None
+            return value if value is not None and value > 0 else None
+
+        if not isinstance(said, dict):
+            return {}
+        behaviour, limits = said.get("behaviour"), said.get("limits")
+        limits = limits[:100] if isinstance(limits, list) else []
+        try:
+            behaviour = behaviour_name(behaviour) if isinstance(behaviour, str) else None
+        except ValueError:
+            behaviour = None
+        each = [[number(entry, key) for key in ("gain_cap", "stop_before", "sample_period")] for entry in limits]
+        return {
+            "expectations": Expectations(behaviour, number(said, "min_rate"), number(said, "max_input")),
+            "limits": tuple(Limits(*entry) for entry in each if any(entry)),
+            "delta": number(said, "delta"),
+            "noise": number(said, "noise"),
+        }
 
     # ------------------------------------------------------------------ graph, protocol, states
 
@@ -536,11 +638,12 @@ class _Reader:
 
     # ------------------------------------------------------------------ input
 
-    def _effort(self) -> Effort | None:
+    def _effort(self, protocol: Protocol) -> Effort | None:
         said = self.document["effort"]
         if said is None:
             return None
-        by_agent = self._maybe_by_agent
+        by_agent, start = self._maybe_by_agent, self._state("initial_state")
+        region = self._starts(said["starts"]) or (None if start is None else Starts(start))
         sliding = said["sliding"]
         threshold = said["threshold"]
         return Effort(
@@ -550,11 +653,12 @@ class _Reader:
             starts=self._starts(said["starts"]),
             constants=tuple(map(by_agent, said["constants"])),
             peak=self._peak(said["peak"]),
-            energy=self._witness(said["energy"], "input-energy"),
+            energy=self._energy(said["energy"]),
             path_length=self._witness(said["path_length"], "input-length"),
             sliding=None if sliding is None else SlidingPart(sliding["bounded"], by_agent(sliding["agents"])),
             residual=tuple(self._limited(k, entry) for k, entry in enumerate(said["residual"])),
             disturbed=self._disturbed(said["disturbed"]),
+            first=None if region is None else first_input(self.structure, protocol, region),
         )
 
     def _maybe_by_agent(self, said: Any) -> tuple[Fraction, ...] | None:
@@ -571,6 +675,15 @@ class _Reader:
             return None
         step = self.steps[kind, "effort"]
         return Witness(exact(said), step["witness"], exact(step["numbers"]["z"]))
+
+    def _energy(self, said: str | None) -> Witness | EnergyIntegral | None:
+        step = self.steps.get(("input-energy", "effort"))
+        if said is None or step is None or not isinstance(step["witness"], dict):
+            return self._witness(said, "input-energy")
+        rows = [step["witness"][key] for key in ("W0", "W1")]
+        first, second = (triangle(lower, len(lower)) for lower in rows)
+        p, m0, m1 = (exact(step["numbers"][key]) for key in ("p", "m0", "m1"))
+        return EnergyIntegral(exact(said), p, (first, second), (m0, m1))
 
     def _peak(self, said: Document | None) -> Peak | None:
         if said is None:

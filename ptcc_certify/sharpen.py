@@ -13,15 +13,18 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
 import lmi
 import lmi.full
-from lmi.errors import LMIError
+from lmi.apart import apart
+from lmi.deadline import checkpoint, share_of_time
+from lmi.errors import LMIError, OutOfTime
 from lmi.exact import prove_generalized_margin
 from lmi.matrices import block_columns
 from ptcc_certify.dominance import DominantMember, dominant_members
@@ -35,14 +38,23 @@ METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
 #: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
 SEARCHED_GROUP = (300, 2000)
+#: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
+APART_NODES = 40
 #: The member with the largest rate is chosen among those with at most this prefactor.
 LARGEST_PREFACTOR = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
 _FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
+#: A bound is useful where it leaves this share of the error. One more candidate is taken for that, if all others need
+#: so many times more of the clock: it costs a proof, and tells which gains make a bound useful.
+USEFUL, _LATE = 0.01, 1.5
 #: Rates that differ by less, relatively, are the same.
 _SAME_RATE = 1e-6
+#: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
+LARGEST_ENTRY = 2.0
+#: By what factor one more member must improve the bound of deviations at some instant.
+WORTH_A_MEMBER = 1.25
 #: Beyond this prefactor a diagonal matrix is of no use to anybody.
 _HOPELESS = 1e15
 _MATRIX_BITS = 60
@@ -50,13 +62,17 @@ _MATRIX_BITS = 60
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n)."""
+    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n).
+
+    No diagonal matrix has a larger rate than ``upper``.
+    """
 
     kind: str
     rate: float
     condition: float
     log_weights: np.ndarray | None = None
     matrix: np.ndarray | None = None
+    upper: float = math.inf
 
     def log_bound(self, clock: float) -> float:
         """Return the logarithm of the bound of ``||E|| / ||E(0)||`` at a value of the clock."""
@@ -116,12 +132,15 @@ class Sharpening:
         No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
     notes : tuple of str
         What failed.
+    cut_off : tuple of str
+        What the time limit ended.
     """
 
     members: tuple[SharpMember, ...] = ()
     tried: dict[str, float] = field(default_factory=dict)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
+    cut_off: tuple[str, ...] = ()
 
 
 def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Sharpening:
@@ -143,41 +162,61 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
     """
     if method == "paper" or not system.nodes:
         return Sharpening()
-    candidates: list[Candidate] = []
+    results: dict[str, list[Candidate]] = {}
     notes: list[str] = []
-    tried: dict[str, float] = {}
-    limit = None
+    cut_off: list[str] = []
     wanted = [*clocks] if at is None else [*clocks, at]
+    losses = lmi.full.LOSSES if at is None else _FINE_LOSSES
+    # The quickest search first; each takes a share of the time that is left, and leaves some for the proofs.
+    searches = {
+        "perron": (0.2, lambda: _perron_candidates(system)),
+        "full": (0.4, lambda: _full_candidates(system, losses)),
+        "lmi": (0.6, lambda: _lmi_candidates(system, method == "lmi" or at is not None)),
+    }
     with np.errstate(all="ignore"):
-        for kind in ("perron", "lmi", "full"):
+        for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue
-            try:
-                if kind == "lmi":
-                    found, limit = _lmi_candidates(system, method == "lmi" or at is not None)
-                elif kind == "full":
-                    found = _full_candidates(system, lmi.full.LOSSES if at is None else _FINE_LOSSES)
-                else:
-                    found = _perron_candidates(system)
-            except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
-                notes.append(f"class {kind}: {error}")
-                continue
-            if not found:
+            found = results[kind] = []
+            with share_of_time(share, f"class {kind}", cut_off):
+                try:
+                    for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
+                        found.append(candidate)
+                except OutOfTime:
+                    raise
+                except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+                    notes.append(f"class {kind}: {error}")
+                    continue
+            if not found and f"class {kind}" not in cut_off:
                 notes.append(f"class {kind}: nothing was found in floating point")
-                continue
-            tried[kind] = max(c.rate for c in found)
-            kept = [c for c in found if math.isfinite(c.rate) and c.condition <= _HOPELESS]
-            if not any(c.rate > 0 for c in kept):
-                notes.append(f"class {kind}: the rate {tried[kind]:.4g} needs a prefactor above {_HOPELESS:.0e}")
-            candidates += kept
-        proved = []
-        for candidate in choose(candidates, wanted):
-            member = prove_member(system, candidate)
-            if member is None:
-                notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
-            else:
-                proved.append(member)
-    return Sharpening(tuple(_without_hair_splitting(proved)), tried, limit, tuple(notes))
+        every = [c for kind in METHODS for c in results.get(kind, ())]
+        tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
+        candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+        for kind, rate in tried.items():
+            if not any(c.rate > 0 for c in candidates if c.kind == kind):
+                notes.append(f"class {kind}: the rate {rate:.4g} needs a prefactor above {_HOPELESS:.0e}")
+        proved: list[SharpMember] = []
+        extra: SharpMember | None = None
+        with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
+            chosen = choose(candidates, wanted)
+            for candidate in chosen:
+                checkpoint()
+                member = prove_member(system, candidate)
+                if member is None:
+                    notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
+                else:
+                    proved.append(member)
+            checkpoint()
+            near = _for_deviations(system, candidates, chosen, wanted) if any(m.rate > 0 for m in proved) else None
+            extra = None if near is None else prove_member(system, near)
+    limit = min((c.upper for c in every), default=math.inf)
+    members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate))
+    if extra is not None:  # the largest rate, and its prefactor, stay those of a member that is small in E
+        fastest = max(members, key=lambda m: (m.rate, -m.prefactor))
+        if extra.rate < fastest.rate or extra.prefactor >= fastest.prefactor:
+            members.append(replace(extra, rate=min(extra.rate, fastest.rate)))
+    least = limit if math.isfinite(limit) else None
+    return Sharpening(tuple(members), tried, least, tuple(notes), tuple(cut_off))
 
 
 def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) -> Sharpening:
@@ -203,10 +242,12 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
         searches = {"lmi": largest} if method == "lmi" else {**searches, "lmi": largest}
     elif method == "lmi":
         notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
+    cut_off: list[str] = []
     for kind, search in searches.items():
+        found: Sequence[DominantMember] = ()
         try:
-            with np.errstate(all="ignore"):
-                found = dominant_members(structure, search=search)
+            with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
+                found = list(apart(partial(dominant_members, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue
@@ -216,31 +257,43 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
             members[candidate] = SharpMember(kind, nodes, None, None, m.rate, low, high, float(m.rate), m)
         if found:
             tried[kind] = max(float(m.rate) for m in found)
-    return Sharpening(tuple(members[c] for c in choose(list(members), clocks)), tried, notes=tuple(notes))
+    chosen = sorted(choose(list(members), clocks), key=lambda c: c.rate)
+    return Sharpening(tuple(members[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
-    """Return the best candidate at each clock value, the fastest of a useful prefactor, and the fastest diagonal one.
+    """Return the fastest candidate of a useful prefactor, the best at each clock value, and the fastest diagonal one.
+
+    Besides, unless one of these is nearly as early, the one that first leaves a hundredth of the error.
 
     Examples
     --------
     >>> slow, fast = Candidate("perron", 1.0, 1.0), Candidate("full", 2.0, 100.0)
     >>> [c.kind for c in choose([slow, fast], [1.0])]
-    ['perron', 'full']
+    ['full', 'perron']
     """
     if not candidates:
         return []
-    chosen = [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
-    chosen.append(_fastest(useful) if useful else min(candidates, key=lambda c: c.condition))
+    chosen = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
+    chosen += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
         chosen.append(_fastest(diagonal))
+    if decaying := [c for c in candidates if c.rate > 0]:
+        first = min(decaying, key=_useful_from)
+        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
+            chosen.append(first)
     distinct: list[Candidate] = []
     for candidate in chosen:
         if not any(candidate is other for other in distinct):
             distinct.append(candidate)
-    return sorted(distinct, key=lambda c: c.rate)
+    return distinct
+
+
+def _useful_from(candidate: Candidate) -> float:
+    """Return the clock value from which on a decaying candidate leaves the useful share."""
+    return (math.log(candidate.condition) - 2 * math.log(USEFUL)) / candidate.rate
 
 
 def _fastest(candidates: Sequence[Candidate]) -> Candidate:
@@ -291,59 +344,104 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
     return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, candidate.rate)
 
 
+# ---------------------------------------------------------------------- deviations
+
+
+def _for_deviations(
+    system: ErrorSystem, candidates: Sequence[Candidate], chosen: Sequence[Candidate], clocks: Sequence[float]
+) -> Candidate | None:
+    """Return, as a matrix in ``E``, what bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
+
+    ``d`` obeys the equation of ``E``, ``d' = -gain A d``, and ``E = -A d``: a good Lyapunov matrix ``P`` in ``E`` is
+    one for ``d`` too, namely ``A^-T P A^-1`` in ``E``. Judged by the bound of the largest entry of ``d`` at the clock
+    values, from entries at random.
+    """
+    if not any(c.kind == "full" for c in candidates):
+        return None
+    A, U = system.matrix, np.eye(len(system.nodes)) if system.basis is None else system.basis
+    own = U.T @ A @ U
+    own /= np.abs(own).max()  # the scale is immaterial
+    try:
+        inverse = np.linalg.inv(own)
+    except np.linalg.LinAlgError:
+        return None
+
+    def log_bounds(form: np.ndarray, rate: float) -> np.ndarray:
+        try:
+            largest = np.einsum("ij,ji->i", U, np.linalg.solve(form, U.T)).max() * np.trace(form)
+        except np.linalg.LinAlgError:
+            return np.full(len(clocks), np.inf)
+        return (math.log(largest) - rate * np.array(clocks)) / 2 if largest > 0 else np.full(len(clocks), np.inf)
+
+    def reduced(c: Candidate) -> np.ndarray:
+        return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
+
+    known = [log_bounds(own.T @ reduced(c) @ own, c.rate) for c in chosen]
+    known.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
+    best, least, found = np.min(known, axis=0), math.log(WORTH_A_MEMBER), None
+    for c in candidates:
+        if c.kind == "full":
+            gain = best - log_bounds(reduced(c), c.rate)
+            if gain.max() > math.log(WORTH_A_MEMBER) and np.maximum(gain, 0).sum() > least:
+                least, found = np.maximum(gain, 0).sum(), c
+    if found is None:
+        return None
+    P = inverse.T @ reduced(found) @ inverse
+    sizes = np.linalg.eigvalsh(P)
+    low, high = float(sizes[0]), float(sizes[-1])
+    if not low > high / _HOPELESS:
+        return None
+    P = U @ P @ U.T + math.sqrt(low * high) * (np.eye(len(A)) - U @ U.T)
+    return Candidate("full", found.rate, high / low, matrix=P)
+
+
 # ---------------------------------------------------------------------- classes
 
 
-def _perron_candidates(system: ErrorSystem) -> list[Candidate]:
-    """Perron vectors of every leader group and of the followers, coupled at several losses."""
+def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
+    """Yield Perron vectors of every leader group and of the followers, coupled at several losses."""
     A, basis = system.matrix, system.basis
     log_weights = np.zeros(len(A))
     for rows, component in zip(system.parts, system.leaders, strict=False):
         graph = system.structure.graph.subgraph(component.nodes)
         p = np.log(left_vector(graph))
         log_weights[rows] = p - p.max()
-    found: list[Candidate] = []
-    followers = system.parts[-1] if len(system.parts) > len(system.leaders) else None
-    for largest in (None, 1e6, 1e3, 30.0) if followers is not None else (None,):
-        if followers is not None:
-            block = A[np.ix_(followers, followers)]
-            try:
-                log_weights[followers] = lmi.h_matrix_certificate(block, max_condition=largest).log_omega
-            except LMIError:
-                continue
-        found += _coupled("perron", A, system.parts, log_weights, basis)
-    return found
+    if len(system.parts) == len(system.leaders):
+        yield from _coupled("perron", A, system.parts, log_weights, basis)
+        return
+    followers = system.parts[-1]
+    with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
+        for found in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
+            log_weights[followers] = found.log_omega
+            yield from _coupled("perron", A, system.parts, log_weights, basis)
 
 
-def _lmi_candidates(system: ErrorSystem, thorough: bool) -> tuple[list[Candidate], float]:
-    """Return the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
+def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
+    """Yield the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
     A, basis = system.matrix, system.basis
     best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
-    found = [_diagonal("lmi", best)]
-    for largest in (_HOPELESS / 1e3, LARGEST_PREFACTOR):
+    yield replace(_diagonal("lmi", best), upper=best.upper)
+    for largest in (LARGEST_PREFACTOR, _HOPELESS / 1e3):
         if best.log_condition > math.log(largest):
             with contextlib.suppress(lmi.NoCertificate):
                 near = lmi.diagonal_lyapunov(
                     A, objective="rate", max_condition=largest, basis=basis, start=best.log_omega
                 )
-                found.append(_diagonal("lmi", near))
+                yield _diagonal("lmi", near)
     if thorough:
-        found += [_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best)]
-    return found, best.upper
+        yield from (_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best))
 
 
-def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> list[Candidate]:
-    """Return full matrices on the error's subspace, continued beyond it."""
+def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[Candidate]:
+    """Yield full matrices on the error's subspace, continued beyond it."""
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
     reduced = A if U is None else U.T @ A @ U
-    found = []
     for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
         P = member.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
             P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)
-        found.append(Candidate("full", member.rate, member.condition, matrix=P))
-    return found
+        yield Candidate("full", member.rate, member.condition, matrix=P)
 
 
 def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:

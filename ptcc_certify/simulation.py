@@ -23,6 +23,7 @@ from ptcc_certify.actuator import Actuator, as_forcing, simulate_limited
 from ptcc_certify.cvodes import NominalMotion, interruptible
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.io import in_node_order
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import as_fraction, shorten
 from ptcc_certify.sliding_simulation import Instants, simulate_sliding
@@ -71,11 +72,12 @@ def simulate(
         N agents.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 = 0`` the run is on the plain clock ``t``, without a deadline.
-    x0 : (N,) or (N, S) array of numbers
-        The start in the order of ``graph.labels``; S columns are S starts, or the S components of vector-valued
-        agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode: one column.
-    sigma0 : (N,) array of numbers, optional
-        Sliding mode: ``sigma(0)``; without it 0, which leaves no reaching phase.
+    x0 : (N,) or (N, S) array of numbers, mapping by label, pandas Series or DataFrame
+        The start in the order of ``graph.labels``, or by label where there are labels; S columns are S starts, or the
+        S components of vector-valued agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode:
+        one column.
+    sigma0 : (N,) array of numbers, mapping by label or pandas Series, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``; by
         default the adversary ``d_k = delta sign(sigma_k)``. It is refused where it exceeds ``delta``. Nominal
@@ -112,7 +114,8 @@ def simulate(
     Raises
     ------
     ParameterError
-        ``x0`` has a wrong shape or an entry that is not finite, or an option is outside its domain.
+        ``x0`` has a wrong shape, labels other than those of the nodes or an entry that is not finite, or an option is
+        outside its domain.
     SimulationError
         The integrator failed, or a sampled run outgrew floats; the message names the cause.
 
@@ -139,6 +142,7 @@ def simulate(
     (array([ 0.5, -0.5]), True)
     """
     started = time.perf_counter()
+    x0, sigma0 = in_node_order(x0, graph), in_node_order(sigma0, graph, "sigma0")
     start = _start(graph, x0)
     for name, tolerance in (("rtol", rtol), ("atol", atol)):
         if not 1e-15 <= tolerance <= 0.1:
@@ -226,7 +230,7 @@ def _start(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:
     if array.ndim not in (1, 2) or array.shape[0] != n or array.size == 0:
         shape = " x ".join(map(str, array.shape)) or "a single number"
         raise ParameterError(f"the start {name} has shape {shape}; give {n} numbers, or {n} rows, one for each agent")
-    if array.dtype.kind == "O":
+    if array.dtype.kind in "OU":
         try:
             array = np.array([float(as_fraction(v, name)) for v in array.ravel()]).reshape(array.shape)
         except (NumberError, OverflowError) as error:

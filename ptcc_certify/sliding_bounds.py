@@ -23,8 +23,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.bounds import FLOOR_FACTOR, Comparison, Envelope, History, Member, as_exact
+from ptcc_certify.bounds import (
+    FLOOR_FACTOR,
+    Comparison,
+    Envelope,
+    History,
+    Member,
+    as_exact,
+    clock_values,
+    float_above,
+    remaining_part,
+)
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.outcomes import exact_start
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.reaching import LAST_Z, ReachingTime, sliding_bound
 from ptcc_certify.trajectory import SlidingTrajectory
@@ -85,7 +96,7 @@ class SlidingEnvelope(Envelope):
         self._need_direct()
         return super().norm_factor(clock)
 
-    def bound(self, clock: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` at clock values; see :meth:`Envelope.bound`, and :meth:`state_bound` for any sigma(0).
 
         Raises
@@ -100,21 +111,26 @@ class SlidingEnvelope(Envelope):
         if not self.direct:
             raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
 
-    def state_bound(self, remaining: np.ndarray | float, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def state_bound(self, remaining: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, from ``x0``.
 
         Parameters
         ----------
         remaining : float or (M,) array
             Between 0 and 1.
-        x0 : (N,) array
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
 
         Returns
         -------
         array
             Of the shape of ``remaining``; infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
         z, clock = self._instants(q)
         bound, unit = np.full(q.size, np.inf), self._unit(np.array([float(x) for x in x0]))
         for member in self._in_norm:
@@ -124,11 +140,11 @@ class SlidingEnvelope(Envelope):
                     bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit * (1 + 1e-12))
         return bound if np.ndim(remaining) else bound[0]
 
-    def norm_bound(self, remaining: Sequence[float] | np.ndarray, x0: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` from ``x0``, (M,), whatever the disturbance; see :meth:`Envelope.norm_bound`."""
         if self.direct:
             return super().norm_bound(remaining, x0)
-        return self.state_bound(np.asarray(remaining, dtype=float), x0)
+        return self.state_bound(np.asarray(remaining), x0)
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
         """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``.
@@ -141,7 +157,13 @@ class SlidingEnvelope(Envelope):
         Returns
         -------
         (M,) array
+
+        Raises
+        ------
+        ParameterError
+            An instant is negative or not a number.
         """
+        z = clock_values(z, "z")
         size = math.hypot(*(float(x) for x in self.sigma0))
         return size * np.exp(-self.protocol.reaching_gain.clock_at_tau(z))
 
@@ -169,7 +191,7 @@ class SlidingEnvelope(Envelope):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
         kept = bool((trajectory.reaching_z <= certain + late).all())
         z = self._z(trajectory)
-        bound, size = sliding_bound(self.protocol, self.sigma0, z), np.abs(sigma0).max(initial=0.0)
+        bound, size = sliding_bound(self.protocol, self.sigma0, z, self.reaching), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(excess > 0, excess / bound, 0.0)
@@ -220,7 +242,7 @@ class SlidingEnvelope(Envelope):
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = sliding_bound(self.protocol, self.sigma0, knots) / unit
+        size = sliding_bound(self.protocol, self.sigma0, knots, self.reaching) / unit
         forcing = _column_norms(B @ size)
         s = self._clock_at(knots)
         step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
@@ -279,24 +301,45 @@ class SlidingEnvelope(Envelope):
             with np.errstate(invalid="ignore", over="ignore"):
                 bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
                 norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
-        size = sliding_bound(self.protocol, self.sigma0, z) / unit
-        return bounds + size, norm + _column_norms(size)
+        size = sliding_bound(self.protocol, self.sigma0, z, self.reaching) / unit
+        bounds, norm = bounds + size, norm + _column_norms(size)
+        if any(m.distance is not None for m in self.members):
+            most = self._largest_deviation(x0) / unit * (1 + 1e-15)
+            bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
+        return bounds, norm
 
-    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Sequence[Any]) -> np.ndarray:
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - outcome_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
+
+        ``x - outcome`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
+        expand the largest entry.
+        """
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply([x - sigma for x, sigma in zip(start, self.sigma0, strict=True)])
+        gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
+        return float_above(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
+
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
 
         Parameters
         ----------
         remaining : float or (M,) array
-        x0 : (N,) array
+            Between 0 and 1.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
 
         Returns
         -------
         (N, M) or (N,) array
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
         if self.direct:
             return super().outcome_distance(remaining, x0)
-        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
         unit = self._unit(np.array([float(x) for x in x0]))
         z, clock = self._instants(q)
         bounds = self._outcome_bounds(x0, unit, z, clock)[0] * unit

@@ -8,7 +8,7 @@ Everything is decided in integers, and no eigenvalue is computed: where entries 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from fractions import Fraction
 from graphlib import TopologicalSorter
 from itertools import pairwise
@@ -54,7 +54,12 @@ def tractable(rows: Matrix, unit: int, line: Fraction = Fraction(1)) -> bool:
 
 
 def nonzero_spectrum_beyond(
-    rows: Matrix, unit: int, components: Sequence[Sequence[int]], still: Collection[int], line: Fraction
+    rows: Matrix,
+    unit: int,
+    components: Sequence[Sequence[int]],
+    still: Collection[int],
+    line: Fraction,
+    polynomial: Callable[[Matrix], Polynomial] | None = None,
 ) -> Location:
     """Decide where the nonzero eigenvalues of ``L = rows / unit`` lie against ``Re = line``.
 
@@ -70,6 +75,8 @@ def nonzero_spectrum_beyond(
         Indices of the components whose block has the simple eigenvalue 0, which are closed and balanced.
     line
         Real part of the line, positive.
+    polynomial
+        What forms the characteristic polynomial of a block, if not :func:`characteristic`.
 
     Returns
     -------
@@ -114,7 +121,8 @@ def nonzero_spectrum_beyond(
         block = _block(rows, nodes)
         key = (index in still, *(tuple(sorted(row.items())) for row in block))
         if key not in found:
-            found[key] = _roots_on_axis(shifted(_nonzero_part(block, index in still), place))
+            p = (polynomial or characteristic)(block)
+            found[key] = _roots_on_axis(shifted(_nonzero_part(p, index in still), place))
         roots = found[key]
         if roots is None:
             return "below"
@@ -157,9 +165,8 @@ def _block(rows: Matrix, nodes: Sequence[int]) -> list[dict[int, int]]:
     return [{place[j]: v for j, v in rows[i].items() if v and j in place} for i in nodes]
 
 
-def _nonzero_part(block: Matrix, still: bool) -> Polynomial:
+def _nonzero_part(p: Polynomial, still: bool) -> Polynomial:
     """Return the characteristic polynomial of a block, divided by ``x`` if its simple eigenvalue is 0."""
-    p = characteristic(block)
     if still:
         if p[-1]:
             raise ValueError("a block said to have the eigenvalue 0 is regular")

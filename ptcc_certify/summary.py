@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ptcc_certify.enclosure import LARGEST_PUSH
+from ptcc_certify.rounding import down, near, up
 from ptcc_certify.structure import Claim, Structure
 from ptcc_certify.trajectory import SlidingTrajectory
 
@@ -64,7 +64,7 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     graph = structure.graph
     negative = int((graph.sign < 0).sum())
     names = [name for name in p.to_dict() if name != "kind"]
-    parameters = ", ".join(f"{name} {float(getattr(p, name)):.12g}" for name in names)
+    parameters = ", ".join(f"{name} {near(getattr(p, name), 12)}" for name in names)
     lines = [
         _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
         _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])),
@@ -76,42 +76,45 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         lines.append(_line("start", _pairs(graph.labels, certificate.start)))
     lines += _sliding_lines(certificate)
     if certificate.outcome is not None:
+        ends = certificate.outcome.final_state
         kind = "exact" if certificate.outcome.exact else "floating point"
         if certificate.enclosed is not None and certificate.enclosed.radius is not None:
             widest = Fraction(float(certificate.enclosed.radius.max())) * certificate.enclosed.unit
             kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
-        lines.append(_line("ends at", f"{_pairs(graph.labels, certificate.outcome.final_state)} ({kind})"))
+        if kind != "floating point" and any(Fraction(_digits(x)) != x for x in ends[:100]):
+            kind += "; here to 5 digits"
+        lines.append(_line("ends at", f"{_pairs(graph.labels, ends)} ({kind})"))
         if certificate.outcome.degenerate:
             groups = ", ".join(map(str, certificate.outcome.degenerate))
             lines.append(_line("", f"degenerate start: leader group {groups} meets at 0, although it is balanced"))
     lines += _rate_lines(certificate)
     lines += _effort_lines(certificate)
     lines += _simulation_lines(certificate)
+    if certificate.cut_off:
+        named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
+        lines.append(_line("cut off", f"{named}; what was proved by then stands"))
     lines += [_line("note", note) for note in certificate.notes[:3]]
-    lines.append(_line("verdict", certificate.verdict))
+    lines.append(_line("verdict", certificate.assessment.text))
     return lines
 
 
 def _rate_lines(certificate: Certificate) -> list[str]:
-    rate, spectral, limit = certificate.rate, certificate.spectral_rate, certificate.limit
-    best = "" if spectral is None else f"; best possible {spectral:.6g} (numerical)"
-    if limit is not None:
-        best = f"; none exceeds {up(limit.value, 8)}, proved"
+    rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
+    best = "" if bound is None else f"; none exceeds {up(bound, 8)}, proved"
+    if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
+        best += f" ({spectral:.6g}, numerical)"
     if certificate.constant:
         kept = "its state" if certificate.direct else "x - sigma"
         return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
     if rate is None:
         numerical = certificate.numerical_rate
         return [_line("rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}")]
-    near = "" if certificate.tightness is None else f", tightness {certificate.tightness:.3f}"
-    if limit is not None:
-        near = f", tightness at least {down(rate / limit.value, 4)}"
-    lines = [_line("rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{near}")]
+    ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
+    lines = [_line("rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{ratio}")]
     lines += _class_lines(certificate)
     lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     lines += _distance_lines(certificate)
-    balls = not certificate.direct or any(m.distance is not None for m in certificate.envelope.members)
-    arithmetic = "exact or ball arithmetic" if balls else "exact arithmetic"
+    arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
     said = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"
     report = certificate.checked
     if report is not None:
@@ -132,7 +135,7 @@ def _class_lines(certificate: Certificate) -> list[str]:
         tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
         limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
         lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit})"))
-        taken = [f"{m.kind} {_signed(m.rate, 4)} (prefactor {up(m.prefactor, 2)})" for m in found.members]
+        taken = [f"{m.kind} {down(m.rate, 4)} (prefactor {up(m.prefactor, 2)})" for m in found.members]
         lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
     return lines
 
@@ -151,7 +154,7 @@ def _distance_lines(certificate: Certificate) -> list[str]:
         q = float(1 - certificate.at / certificate.protocol.T)
         each = certificate.outcome_distance([q])[:, 0]
         listed = _listed([f"{label} {up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
-        lines.append(_line("", f"at t = {float(certificate.at):.12g}: {listed}"))
+        lines.append(_line("", f"at t = {near(certificate.at, 12)}: {listed}"))
     return lines
 
 
@@ -194,17 +197,17 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         lines.append(_line("", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"))
     for entry in effort.residual:
         named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
-        said = [f"{what}{float(x):.6g}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
+        said = [f"{what}{near(x)}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
         agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its outcome"
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
         lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"))
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-            noise = f"noise |n_k| <= {float(entry.noise):.6g} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
+            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
             lines.append(_line("", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"))
     if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
         lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
     if effort.longest_period is not None:
-        lines.append(_line("limited", f"not certified with this period; up to {down(effort.longest_period, 4)} it is"))
+        lines.append(_line("limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"))
     elif len(effort.residual) < len(certificate.limits):
         lines.append(_line("limited", "nothing is certified under these limits"))
     if effort.disturbed is not None:
@@ -212,7 +215,7 @@ def _effort_lines(certificate: Certificate) -> list[str]:
         ends = "" if drift is None else ", and all end where they would without"
         if drift is not None and any(drift):
             ends = f", every agent ends within {up(max(drift), 4)} of its outcome"
-        more = f"|d_k| <= {float(d.delta):.6g} adds at most {up(max(d.inputs), 4)} to |u_k|"
+        more = f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|"
         lines.append(_line("disturbed", f"{more}{ends}"))
     elif certificate.delta is not None:
         lines.append(_line("disturbed", "nothing is certified: the rate proves no bounded input"))
@@ -237,15 +240,11 @@ def _residual_lines(certificate: Certificate) -> list[str]:
     proved = [f"{up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
     if at is not None:
         own = certificate.envelope.residual(float(1 - at / certificate.protocol.T))
-        proved.insert(0, f"{up(own, 3)} at t = {float(at):.12g}")
+        proved.insert(0, f"{up(own, 3)} at t = {near(at, 12)}")
     lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
         lines.append(_line("", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)))
-        if slowest[-1] > 0.01:
-            lines.append(
-                _line("", "most of the error is left to the last instant: raise rho2 * kappa for a usable deadline")
-            )
     return lines
 
 
@@ -311,8 +310,8 @@ def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") 
 def _deadline(certificate: Certificate) -> str:
     p = certificate.protocol
     if certificate.reaching is None:
-        return f" at T = {float(p.T):g}"
-    return f" at T_r + T_s = {float(p.T):g} whatever the disturbance"
+        return f" at T = {near(p.T)}"
+    return f" at T_r + T_s = {near(p.T)} whatever the disturbance"
 
 
 def _sliding_lines(certificate: Certificate) -> list[str]:
@@ -385,36 +384,13 @@ def remarks_on(structure: Structure) -> list[str]:
     return [*remarks, *read["notes"]]
 
 
-def down(x: Fraction | float, digits: int = 6) -> str:
-    """Write a positive number with few digits that is not above it."""
-    return _rounded(x, digits, ROUND_FLOOR)
-
-
-def _signed(x: Fraction | float, digits: int) -> str:
-    """Write a proved rate, rounded down; a negative one bounds the growth."""
-    return down(x, digits) if x > 0 else f"-{up(-x, digits)}" if x < 0 else "0"
-
-
-def up(x: Fraction | float, digits: int) -> str:
-    """Write a positive number with few digits that is not below it."""
-    return _rounded(x, digits, ROUND_CEILING)
-
-
-def _rounded(x: Fraction | float, digits: int, rounding: str) -> str:
-    """Write a positive number that was proved with few digits, rounded to the safe side."""
-    if isinstance(x, float) and not math.isfinite(x):
-        return "infinity"
-    if x == 0:  # a float is an exponential that left float64
-        return "0" if isinstance(x, Fraction) else "1e-300"
-    exact = Fraction(x)
-    context = Context(prec=digits, rounding=rounding)
-    value = context.divide(Decimal(exact.numerator), Decimal(exact.denominator))
-    beyond = not 1e-300 < abs(value) < Decimal("1e300")
-    return f"{value.normalize():g}" if beyond else f"{float(value):.{digits}g}"
-
-
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:
-    return _listed([f"{label}={float(value):.5g}" for label, value in zip(labels, values, strict=True)])  # type: ignore[arg-type]
+    return _listed([f"{label}={_digits(value)}" for label, value in zip(labels, values, strict=True)])
+
+
+def _digits(value: object) -> str:
+    """Write a number with five digits, to nearest."""
+    return f"{float(value):.5g}"  # type: ignore[arg-type]
 
 
 def _listed(words: Sequence[str], width: int = 90) -> str:

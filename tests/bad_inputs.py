@@ -198,7 +198,7 @@ FILES = [
     _graph("archive without a matrix", _archive(text=np.array(["a"])), "no square", file="g.npz"),
     _graph("archive that is no archive", b"PK\x03\x04 nonsense", ".npz", file="g.npz"),
     _graph("MATLAB file of zeros", bytes(500), "MATLAB", file="g.mat"),
-    BadInput("--edges with a matrix", ("certify", "g.npy", "--edges", "listens"), "listeners",
+    BadInput("unknown --edges of a matrix", ("certify", "g.npy", "--edges", "rows"), "listens",
              (("g.npy", _array(np.array([[0.0, 1.0], [1.0, 0.0]]))),)),
 ]  # fmt: skip
 

@@ -49,7 +49,7 @@ def random_graph(rng, n, links=3):
     for k in range(n):
         heard = rng.choice([j for j in range(n) if j != k], min(links, n - 1), replace=False)
         W[k, heard] = rng.choice([-1, 1], heard.size) * rng.integers(1, 9, heard.size)
-    return SignedDigraph.from_matrix(W)
+    return SignedDigraph.from_matrix(W, orientation="listens")
 
 
 def plain_gain(t, cap=None, stop=None, p=PROTOCOL):

@@ -273,8 +273,8 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...]):
         assert row["verdict"] == said["verdict"] == "certified"
         rate, limit = Fraction(said["rates"]["certified"]), Fraction(said["rates"]["limit"])
         assert Fraction(row["rate"]) <= rate <= Fraction(math.nextafter(row["rate"], math.inf))
-        assert Fraction(row["rate_limit"]) >= limit or row["rate_limit"] >= row["rate"]
-        assert Fraction(row["tightness"]) <= rate / Fraction(row["rate_limit"]) * (1 + Fraction(1, 10**15))
+        assert Fraction(math.nextafter(row["upper_bound"], 0)) < limit <= Fraction(row["upper_bound"])
+        assert Fraction(row["optimality_ratio"]) <= rate / Fraction(row["upper_bound"]) * (1 + Fraction(1, 10**15))
         assert Fraction(row["paper_rate"]) <= Fraction(said["rates"]["paper"])
         assert row["obligations"] == len(said["proof"])
         assert row["worst_ratio"] == said["unverified"]["simulation"]["worst_ratio"]
@@ -302,6 +302,19 @@ def test_a_row_depends_on_its_graph_alone():
         assert dict(row, graph="") == dict(facts([rows[row["sha256"]]])[0], graph="")
     assert len({row["seed"] for row in rows.values()}) == 8  # each has a start of its own
     assert {row["seed"] for row in quickly(ensemble, seed=1)}.isdisjoint(row["seed"] for row in rows.values())
+
+
+def test_a_row_that_ran_out_of_time_says_so():
+    (row,) = certify_many("fig1a", PROTOCOL, time_limit="1e-9")
+    assert row["error"] is None and "class full" in row["cut_off"]
+    assert certify_many("fig1a", PROTOCOL, time_limit=600)[0]["cut_off"] is None
+    run = ptcc("batch", "fig1a", "fig1b", "--workers", "1", "--time-limit", "1e-9")
+    assert "note: 2 of 2 graphs: the time limit ended searches" in run.err
+    assert all("class full" in row["cut_off"] for row in csv.DictReader(io.StringIO(run.out)))
+    for bad in (0, -1, math.nan, math.inf):
+        with pytest.raises(ParameterError, match="time_limit"):
+            quickly("fig1a", time_limit=bad)
+        assert ptcc("batch", "fig1a", "--time-limit", str(bad)).code == 2
 
 
 def test_the_peak_of_the_input_is_for_the_start_or_for_all_starts():
@@ -431,7 +444,9 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
         with pytest.raises(ParameterError, match="lost all its workers"):
             quickly(sources, scheduler=cluster.scheduler_address, output="lost.csv", progress=lose)
     assert rows_in(Path("lost.csv.journal")) >= 2
+    assert len(read_csv("lost.csv")) == rows_in(Path("lost.csv.journal"))
     Path("lost.csv.journal").unlink()
+    Path("lost.csv").unlink()
     assert names() == ["a.csv", "bad.csv", "dask.csv", "spec.toml"]  # no worker writes anything
     assert read_csv("dask.csv") == texts(here)
 
@@ -516,9 +531,9 @@ def test_no_name_of_a_file_breaks_a_table():
     ("options", "code", "column"),
     [
         ((), 0, ["", ""]),
-        (("--expect", "stability"), 3, ["holds", "refuted"]),
-        (("--expect", "bipartite-containment"), 3, ["refuted", "holds"]),
-        (("--min-rate", "1e-6"), 0, ["holds", "holds"]),
+        (("--expect", "stability"), 3, ["met", "refuted"]),
+        (("--expect", "bipartite-containment"), 3, ["refuted", "met"]),
+        (("--min-rate", "1e-6"), 0, ["met", "met"]),
         (("--min-rate", "1000"), 3, ["refuted", "refuted"]),
     ],
 )
@@ -529,12 +544,12 @@ def test_the_exit_code_is_that_of_the_worst_row(options: tuple[str, ...], code: 
     assert bool(run.err) == bool(code)
 
 
-def test_a_rate_that_is_neither_proved_nor_excluded_is_undecided():
+def test_a_rate_that_is_neither_proved_nor_excluded_is_left_open():
     (row,) = quickly("fig1b")
-    between = (row["rate"] + row["rate_limit"]) / 2
+    between = (row["rate"] + row["upper_bound"]) / 2
     run = ptcc("batch", "fig1b", "-o", "t.csv", "--min-rate", str(between), *QUICK)
     assert run.code == 4 and "1 of 1 graphs: undecided" in run.err
-    assert [row["asked"] for row in read_csv("t.csv")] == ["undecided"]
+    assert [row["asked"] for row in read_csv("t.csv")] == ["left open"]
 
 
 def test_without_a_file_the_table_is_printed():
@@ -635,6 +650,7 @@ def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPat
                 quickly("spec.toml", output="kept.csv", **options)
             assert kept.read_bytes() == before
             kept.unlink()
+            Path("kept.csv").unlink()
 
 
 @pytest.mark.parametrize(
@@ -666,10 +682,11 @@ def interrupted_after(count: int) -> Callable[[int, int, int], None]:
 
 
 def begin(count: int, output: str = "t.csv", **more: Any) -> Path:
-    """Begin a batch and interrupt it after some rows; return its journal."""
-    with pytest.raises(KeyboardInterrupt):
+    """Begin a batch and interrupt it after some rows, of which the table is whole; return its journal."""
+    with pytest.raises(KeyboardInterrupt) as stopped:
         quickly("spec.toml", output=output, progress=interrupted_after(count), **more)
-    assert not Path(output).exists()
+    assert [row["graph"] for row in read_csv(output)] == [f"spec.toml#{i}" for i in range(count)]
+    assert read_csv(output) == texts(stopped.value.rows)
     return Path(f"{output}.journal")
 
 
@@ -742,11 +759,11 @@ def test_a_damaged_journal_is_refused():
     for damage in (
         b"\x00\xff\n",
         b"{}\n",
-        b'{"number": 99, "file": "", "row": {}}\n',
+        b'{"of": "a", "row": {}}\n',
         b"[1]\n",
         b"[" * 10**5 + b"\n",
-        json.dumps(good | {"number": True}).encode() + b"\n",
-        json.dumps(good | {"number": 1.0}).encode() + b"\n",
+        json.dumps(good | {"of": 1}).encode() + b"\n",
+        json.dumps(good | {"number": 1}).encode() + b"\n",
         json.dumps(good | {"row": list(COLUMNS)}).encode() + b"\n",
         edited(graph=None),
         edited(graph="\ud800"),
@@ -784,18 +801,46 @@ def test_other_settings_than_the_journals_are_refused(more: dict[str, Any], says
     assert len(quickly("spec.toml", output="t.csv", restart=True, **more)) == 8
 
 
-def test_other_graphs_and_protocols_than_the_journals_are_refused():
-    begin(3)
-    for sources in (["spec.toml", "fig1a"], "fig1a"):
-        with pytest.raises(ParameterError, match="begun with graphs 8"):
-            quickly(sources, output="t.csv")
-    with pytest.raises(ParameterError, match="begun with other graphs"):
-        quickly([Ensemble.read("spec.toml")], output="t.csv")
+def test_another_protocol_or_version_than_the_journals_is_refused():
+    journal = begin(3)
     with pytest.raises(ParameterError, match="begun with protocol"):
         certify_many("spec.toml", NominalProtocol(2, 1, 1, 2), method="perron", output="t.csv")
-    Path("spec.toml").write_text(TINY.replace("seed = 5", "seed = 6"))
-    with pytest.raises(ParameterError, match="begun with other graphs"):
+    journal.write_bytes(journal.read_bytes().replace(b"ptcc-batch/2", b"ptcc-batch/1", 1))
+    with pytest.raises(ParameterError, match=r'begun with schema "ptcc-batch/1".* --restart'):
         quickly("spec.toml", output="t.csv")
+
+
+def test_rows_are_those_of_their_graphs_whatever_the_list(computed: list[str]):
+    for name in "abcdef":
+        write_graph(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -"abcdef".index(name) - 1)]), f"{name}.csv")
+    whole = facts(quickly(["a.csv", "b.csv", "c.csv", "d.csv"]))
+    lists = [["d.csv", "b.csv"], ["f.csv", "a.csv", "./d.csv", "b.csv"], ["spec.toml", "c.csv", "b.csv"]]
+    with pytest.raises(KeyboardInterrupt):
+        quickly(["a.csv", "b.csv", "c.csv", "d.csv", "e.csv"], output="t.csv", progress=interrupted_after(4))
+    assert read_csv("t.csv") == texts(whole)
+    for graphs, missing in zip(lists, ([], ["f.csv"], [f"spec.toml#{i}" for i in range(8)]), strict=True):
+        journal = Path("t.csv.journal").read_bytes()
+        computed.clear()
+        rows = quickly(graphs, output="t.csv")
+        assert computed == missing
+        assert facts(rows) == facts(quickly(graphs))
+        assert not Path("t.csv.journal").exists()
+        Path("t.csv.journal").write_bytes(journal)
+    computed.clear()
+    Path("spec.toml").write_text(TINY.replace("seed = 5", "seed = 6"))  # a list of other graphs, under the same names
+    assert len(quickly(["spec.toml", "a.csv"], output="t.csv")) == 9 and computed[-1] == "spec.toml#7"
+
+
+def test_graphs_from_python_keep_their_rows_wherever_they_stand(computed: list[str]):
+    pair, turned = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("a", "b", 1)], ["b", "a"])
+    assert pair == turned and pair.labels != turned.labels
+    with pytest.raises(KeyboardInterrupt):
+        quickly([pair, TRIANGLE], output="t.csv", progress=interrupted_after(2))
+    computed.clear()
+    rows = quickly([turned, TRIANGLE, pair, Ensemble.read("spec.toml")], output="t.csv", x0="random")
+    assert computed == ["graph#0", *(f"ensemble#{i}" for i in range(8))]
+    assert [row["graph"] for row in rows[:3]] == ["graph#0", "graph#1", "graph#2"]
+    assert facts(rows)[:3] == facts(quickly([turned, TRIANGLE, pair]))
 
 
 def test_files_that_have_changed_are_computed_again(computed: list[str]):
@@ -819,10 +864,10 @@ def test_a_table_is_replaced_only_if_asked(computed: list[str]):
         quickly("spec.toml", output="t.csv", seed=1)
     with pytest.raises(KeyboardInterrupt):
         quickly("spec.toml", output="t.csv", seed=1, restart=True, progress=interrupted_after(5))
-    assert Path("t.csv").read_bytes() == before  # whole until the new one is
+    assert len(read_csv("t.csv")) == 5 and before not in Path("t.csv").read_bytes()
     computed.clear()
     quickly("spec.toml", output="t.csv", seed=1)
-    assert len(computed) == 3 and Path("t.csv").read_bytes() != before
+    assert len(computed) == 3 and len(read_csv("t.csv")) == 8
 
 
 def test_a_table_that_another_batch_finished_meanwhile_is_kept(monkeypatch: pytest.MonkeyPatch):
@@ -835,7 +880,7 @@ def test_a_table_that_another_batch_finished_meanwhile_is_kept(monkeypatch: pyte
             path.write_bytes(table_bytes([], ".csv"))
 
     monkeypatch.setattr(batch, "refuse_table", late)
-    with pytest.raises(ParameterError, match="is there already, complete"):
+    with pytest.raises(ParameterError, match="is there already; name another"):
         quickly("spec.toml", output="t.csv")
     assert Path("t.csv").read_bytes() == table_bytes([], ".csv") and not Path("t.csv.journal").exists()
 
@@ -873,9 +918,64 @@ def test_ctrl_c_keeps_the_rows_and_says_so(monkeypatch: pytest.MonkeyPatch):
         run = ptcc("batch", "spec.toml", "-o", "t.csv", *QUICK)
     assert (run.code, run.out) == (130, "")
     (line,) = run.err.splitlines()
-    assert "4 of 8 rows are kept" in line and "the same command goes on" in line
+    assert "4 of 8 rows are kept, in t.csv too; 4 are missing, and the same command goes on" in line
+    assert [row["graph"] for row in read_csv("t.csv")] == [f"spec.toml#{i}" for i in range(4)]
     run = ptcc("batch", "spec.toml", "-o", "t.csv", *QUICK)
     assert run.code == 0 and run.err == "note: 4 of 8 rows were there already\n"
+
+
+def test_without_a_file_the_rows_so_far_are_printed(monkeypatch: pytest.MonkeyPatch):
+    row = backends.certified_row
+
+    def stopped(name: str, *args: Any) -> Row:
+        if name.endswith("#4"):
+            raise KeyboardInterrupt
+        return row(name, *args)
+
+    monkeypatch.setattr(backends, "certified_row", stopped)
+    run = ptcc("batch", "spec.toml", *QUICK)
+    assert run.code == 130 and len(list(csv.DictReader(io.StringIO(run.out)))) == 4
+    assert run.err == "ptcc: interrupted; 4 of 8 rows are printed; with -o FILE.csv the same command could go on\n"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_failure_leaves_the_table_so_far_and_says_how_it_goes_on(suffix: str, monkeypatch: pytest.MonkeyPatch):
+    append = batch.Journal.append
+
+    def full(journal: Any, mark: str, row: Row) -> None:
+        if mark.endswith(" 5"):
+            raise OSError(28, "No space left on device")
+        append(journal, mark, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(batch.Journal, "append", full)
+        run = ptcc("batch", "spec.toml", "-o", f"t{suffix}", *QUICK)
+    assert (run.code, run.out) == (2, "")
+    note, line = run.err.splitlines()
+    assert note.startswith(
+        f"note: the batch failed; 6 of 8 rows are kept, in t{suffix} too; 2 are missing, and the same"
+    )
+    assert "No space left on device" in line
+    if suffix == ".csv":
+        assert len(read_csv("t.csv")) == 6
+    run = ptcc("batch", "spec.toml", "-o", f"t{suffix}", *QUICK)
+    assert run.code == 0 and "5 of 8 rows were there already" in run.err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, 1), (signal.SIGINT, 2), (signal.SIGTERM, 1)])
+def test_a_process_that_is_stopped_leaves_the_table_so_far(killed: Any, number: int, workers: int):
+    Path("many.toml").write_text(TINY.replace("8", "400"))
+    args = ["batch", "many.toml", "-o", "t.csv", *QUICK[:-1], str(workers)]
+    process = killed(args, Path("t.csv.journal"), 4, number)
+    assert process.returncode == 130
+    rows = read_csv("t.csv")
+    assert 4 <= len(rows) == rows_in(Path("t.csv.journal")) < 400
+    assert f"{len(rows)} of 400 rows are kept, in t.csv too; {400 - len(rows)} are missing" in process.said
+    Path("many.toml").write_text(TINY.replace("8", "400").replace("nodes = 3", "nodes = 3 # the same"))
+    Path("few.toml").write_text(TINY.replace("8", "1"))
+    run = ptcc("batch", "few.toml", "fig1a", "-o", "t.csv", *QUICK)  # a list that has nothing of the other
+    assert run.code == 0 and len(read_csv("t.csv")) == 2
 
 
 def rows_in(journal: Path) -> int:
@@ -883,11 +983,11 @@ def rows_in(journal: Path) -> int:
 
 
 @pytest.fixture
-def killed() -> Iterator[Callable[[list[str], Path, int, int], None]]:
-    """Start a command, and send a signal when its journal has some rows."""
-    running: list[subprocess.Popen[bytes]] = []
+def killed() -> Iterator[Callable[[list[str], Path, int, int], Any]]:
+    """Start a command, send a signal when its journal has some rows, and return it with what it ``said``."""
+    running: list[Any] = []
 
-    def kill(args: list[str], journal: Path, rows: int, number: int) -> None:
+    def kill(args: list[str], journal: Path, rows: int, number: int) -> Any:
         process = subprocess.Popen([sys.executable, "-m", "ptcc_certify.cli", *args], stderr=subprocess.PIPE)
         running.append(process)
         until = time.monotonic() + 60
@@ -895,7 +995,8 @@ def killed() -> Iterator[Callable[[list[str], Path, int, int], None]]:
             time.sleep(0.005)
         assert process.poll() is None, "ended before it was killed"
         process.send_signal(number)
-        process.communicate(timeout=30)
+        process.said = process.communicate(timeout=30)[1].decode()  # type: ignore[attr-defined]
+        return process
 
     yield kill
     for process in running:

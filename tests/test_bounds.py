@@ -16,7 +16,8 @@ from ptcc_certify.bounds import Envelope, Member
 from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.saved import read_certificate
 from ptcc_certify.simulation import simulate
 
 INSTANTS = [
@@ -185,6 +186,61 @@ def test_a_rate_that_is_too_high_is_seen_as_violated():
     assert envelope.compare(simulate(graph, protocol, [3, 1])).violated
     envelope, protocol, graph = pair_envelope(2.0)
     assert not envelope.compare(simulate(graph, protocol, [3, 1])).violated
+
+
+PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+ROBUST = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory) -> dict[str, Callable[[object], object]]:
+    """Everything that takes an instant, by what it is called and whose it is."""
+    cert = certify(PAIR, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+    slid = certify(PAIR, ROBUST, [3, 1], sigma0=[1, 0], simulation=False)
+    cert.save(path := tmp_path_factory.mktemp("saved") / "c.json")
+    saved, x0 = read_certificate(path), [3, 1]
+    return {
+        "remaining of residual": cert.envelope.residual,
+        "remaining of norm_bound": lambda q: cert.envelope.norm_bound(q, x0),
+        "remaining of outcome_distance": lambda q: cert.envelope.outcome_distance(q, x0),
+        "remaining of a certificate's norm": cert.norm_bound,
+        "remaining of a certificate's distance": cert.outcome_distance,
+        "remaining of a certificate's slowest mode": cert.best_possible_residual,
+        "remaining of a saved norm": saved.norm_bound,
+        "remaining of a saved distance": saved.outcome_distance,
+        "remaining of sliding norm_bound": lambda q: slid.envelope.norm_bound(q, x0),
+        "remaining of sliding state_bound": lambda q: slid.envelope.state_bound(q, x0),
+        "remaining of sliding outcome_distance": lambda q: slid.envelope.outcome_distance(q, x0),
+        "clock of norm_factor": cert.envelope.norm_factor,
+        "clock of bound": lambda s: cert.envelope.bound(s, x0),
+        "clock of distance": lambda s: cert.envelope.distance(s, x0),
+        "clock of distance_norm": lambda s: cert.envelope.distance_norm(s, x0),
+        "z of sliding_norm": slid.envelope.sliding_norm,
+    }
+
+
+def test_an_instant_out_of_range_is_refused_by_name(asked):
+    for name, ask in asked.items():
+        argument = name.split()[0]
+        beyond = [1.9, 1 + 1e-9] if argument == "remaining" else []
+        for bad in (-1, -1e-9, float("nan"), -np.inf, "noon", *beyond):
+            for given in (bad, np.array([0.5, bad], dtype=object)):
+                if np.ndim(given) and "residual" in name:
+                    continue
+                with pytest.raises(ParameterError, match=f"^{argument} = "):
+                    ask(given)
+
+
+def test_both_ends_of_the_time_are_in_range(asked):
+    for name, ask in asked.items():
+        ends = (0, 1) if name.startswith("remaining") else (0, np.inf)
+        for end in ends:
+            assert np.isfinite(np.asarray(ask(end), dtype=float)).all(), name
+
+
+def test_a_residual_is_asked_at_one_instant(asked):
+    with pytest.raises(ParameterError, match="one number from 0 to 1"):
+        asked["remaining of residual"](np.array([0.5, 0.1]))
 
 
 def test_the_residual_is_what_the_bound_leaves():

@@ -263,7 +263,7 @@ SAMPLE = (("1.1", False), ("1.2", True), ("2.1 K>=2", False), ("2.1 K=1", True),
 #: witnesses, constants that have a little slack, how the file was read. Only the digest tells that it was changed.
 OF_ITS_OWN_RIGHT = (
     r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle|protocol\.|initial_state|sigma0"
-    r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.([bmz]|growth))"
+    r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.([bmpz]|m0|m1|growth))"
     r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal|nodes$))"
     r"|effort\.(constants|energy|path_length|peak\.(agents|norm)|sliding\.agents)"
 )
@@ -401,11 +401,14 @@ def test_a_rate_beyond_the_slack_is_rejected():
     count = 0
     for name, slides in SAMPLE:
         data = made(name, 5, slides)
-        rates = [member["rate"] for member in data["lyapunov"]["members"]]
+        least: dict[str, Fraction] = {}
+        for member in data["lyapunov"]["members"]:
+            own = Fraction(member["prefactor"])
+            least[member["rate"]] = min(least.get(member["rate"], own), own)
         for k, member in enumerate(data["lyapunov"]["members"]):
             of = f"lyapunov.members[{k}]"
-            # A rate that two members share may be the smaller one of both, which leaves the other a part in 10^6.
-            if member["class"] == "paper" or rates.count(member["rate"]) > 1:
+            # A rate that members share is that of the least prefactor; the others may have more to spare.
+            if member["class"] == "paper" or Fraction(member["prefactor"]) > least[member["rate"]]:
                 continue
             step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"] == of)
             higher = str(Fraction(member["rate"]) + abs(Fraction(member["rate"])) / 10**9)
@@ -779,8 +782,9 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
     data, files = with_side_files(with_factors(large(name, 5, slides)))
     stops, passed = judge(data, 23, 0, False, files)
     assert sum(stops.values()) > 20
-    # Of the paper's function nothing is proved there.
-    assert [path for path in passed if not re.match(OF_ITS_OWN_RIGHT + r"|paper\.blocks", path)] == []
+    # Of the paper's function nothing is proved there, and voices may be known less well than they are.
+    allowed = OF_ITS_OWN_RIGHT + r"|paper\.blocks|outcome\.influence\.components\.\d+\.voices\.\d+\.(mid|radius)"
+    assert [path for path in passed if not re.match(allowed, path)] == []
 
 
 # ---------------------------------------------------------------------- factors of leader groups
@@ -965,13 +969,15 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
 @pytest.mark.parametrize("piece", ["[]", "{}", '"a"', "257", '{"a":1}', "[[1.5]]"])
 def test_json_that_would_fill_the_memory_is_refused_before_it_is_parsed(piece: str, tmp_path: Path):
     path = tmp_path / "c.json"
-    wide = ",".join([piece] * (50_000_000 // (len(piece) + 1)))
+    wide = ",".join([piece] * (100_000_000 // (len(piece) + 1)))
     path.write_text(f'{{"schema": "ptcc-certificate/1", "unverified": [{wide}]}}')
     tracemalloc.start()
-    with pytest.raises(FormatError, match="GB in memory; allow more by --memory"):
-        check(path)
-    assert tracemalloc.get_traced_memory()[1] < 2 * 10**8
-    tracemalloc.stop()
+    try:
+        with pytest.raises(FormatError, match="GB in memory; allow more by --memory"):
+            check(path)
+        assert tracemalloc.get_traced_memory()[1] < 3 * 10**8
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_check_tells_the_memory_that_it_needs(tmp_path: Path):
@@ -1046,6 +1052,7 @@ OWN = {
     "ptcc_certify.enclosure",
     "ptcc_certify.errors",
     "ptcc_certify.input_bounds",
+    "ptcc_certify.rounding",
     "ptcc_certify.sparse_definite",
     "ptcc_certify.spectral_line",
     "ptcc_certify.work",

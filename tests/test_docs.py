@@ -33,8 +33,9 @@ def of_modules(*modules: str) -> set[str]:
 NO_SOURCE = {
     "errors state what is wrong with an input, not mathematics": {
         *(name for name in ptcc_certify.__all__ if name.endswith("Error")),
-        *("LMIError", "MatrixError", "NoCertificate", "NotAnHMatrix", "NotAnMMatrix"),
+        *("LMIError", "MatrixError", "NoCertificate", "NotAnHMatrix", "NotAnMMatrix", "OutOfTime"),
     },
+    "a time limit is what its definition says": {"time_limit"},
     "files and numbers are converted": {"read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits"},
     "figures, pages and tables show what was computed elsewhere": of_modules("plots", "report", "explorer", "batch"),
     "certificates that are read back state what was proved before": of_modules("saved"),

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,16 @@ from ptcc_certify.actuator import Actuator
 from ptcc_certify.certificate import Certificate, certify
 from ptcc_certify.checker import check
 from ptcc_certify.disturbance import as_disturbance
-from ptcc_certify.effort import Effort, Limits, Starts, bound_effort, ellipsoid, starts_within, worst_start
+from ptcc_certify.effort import (
+    Effort,
+    EnergyIntegral,
+    Limits,
+    Starts,
+    bound_effort,
+    ellipsoid,
+    starts_within,
+    worst_start,
+)
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 from ptcc_certify.graph import SignedDigraph
@@ -275,6 +285,88 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
             assert effort is not None and effort.peak is not None
             assert_holds(effort, seen, [])
             assert (seen.agents[:, 0] + 1.5 <= floats(effort.peak.agents) * SLACK).all()
+
+
+# ---------------------------------------------------------------------- the energy by Lyapunov equations
+
+
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.1 all single", "disconnected mixed"])
+def test_the_energy_of_one_start_is_at_most_twice_what_is_spent(name: str):
+    """Whatever the share of ``rho1`` in the gain, from just above where the energy becomes finite."""
+    rng = np.random.default_rng(11 + len(name))
+    graph = random_graph(rng, **dict(CLASSES[name], n=max(6, smallest(**CLASSES[name])))).graph
+    x0 = rationals(rng, graph.n_nodes)
+    proved = certify(graph, NominalProtocol(1, 1, 1, 1), x0, simulation=False)
+    for over, share in product((F(3, 5), F(1), F(3)), (F(1, 100), F(1), F(10))):
+        k = over / F(slowest(graph)).limit_denominator(10**6)
+        cert = replace(proved, protocol=NominalProtocol(1, share * k, k, 1))
+        assert cert.effort is not None and isinstance(cert.effort.energy, EnergyIntegral)
+        spent = Motion(graph, cert.protocol.gain).seen(floats(x0)[:, None]).energy[0]
+        assert spent <= float(cert.effort.energy.value) * SLACK
+        # what is left at z = 20 is e^(-20 (2 over - 1)) of it at least
+        assert float(cert.effort.energy.value) * (1 - math.exp(-19 * (2 * float(over) - 1))) <= 2 * spent
+        assert cert.verdict == "certified", cert.notes
+
+
+def test_the_energy_is_infinite_up_to_half_the_threshold():
+    for k, finite in ((F(1, 4), False), (F(251, 1000), True)):  # the nonzero eigenvalue is 2
+        cert = certify(edges((1, 2, -1), (2, 1, -1)), NominalProtocol(1, 1, k, 1), [3, 1], simulation=False)
+        assert cert.effort is not None and (cert.effort.energy is not None) == finite
+
+
+@pytest.mark.parametrize("slides", [False, True])
+def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
+    graph = load_graph("fig3a")
+    protocol = NominalProtocol(1, 1, 1, 2)
+    if slides:
+        protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)  # type: ignore[assignment]
+    data = written(certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False))
+    (i,) = [i for i, step in enumerate(data["proof"]) if step["kind"] == "input-energy"]
+    numbers = {key: F(x) for key, x in data["proof"][i]["numbers"].items()}
+    at_step = ("proof", i, "numbers")
+    forged = [
+        changed(data, ("effort", "energy"), str(F(data["effort"]["energy"]) * LESS)),
+        *(changed(data, (*at_step, m), str(numbers[m] * F(11, 10))) for m in ("m0", "m1")),
+        *(changed(data, (*at_step, m), str(-numbers[m])) for m in ("m0", "m1")),
+        changed(data, (*at_step, "p"), "-1"),
+        changed(data, (*at_step, "p"), str(numbers["p"] + 100)),
+    ]
+    for name in ("W0", "W1"):
+        lower = data["proof"][i]["witness"][name]
+        for k, row in enumerate(lower):
+            less = [*row[:k], str(F(row[k]) * F(9, 10))]
+            forged.append(changed(data, ("proof", i, "witness", name, k), less))
+        forged.append(changed(data, ("proof", i, "witness", name), lower[:-1]))
+        forged.append(changed(data, ("proof", i, "witness", name), [[str(-F(x)) for x in row] for row in lower]))
+    for mutant in forged:
+        assert check(resealed(mutant), stdlib=True).rejected in ("input-energy of effort", "effort.energy")
+
+
+# ---------------------------------------------------------------------- held gains
+
+
+def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
+    """The gain of the last periods is ``k/h`` and more; ``||E||`` is to be no larger at the deadline than at first."""
+    graph, x0 = load_graph("fig3a"), [-4, 3, -1, 2, -2, 5]
+    protocol = NominalProtocol("0.6", "0.2", "0.5", 1)
+    size = float(np.linalg.norm(graph.laplacian() @ floats(x0)))
+    left = []
+    for period in ("0.001", "0.0001", "0.00001"):
+        cert = certify(graph, protocol, x0, limits=[Limits(None, None, F(period))], simulation=False)
+        assert cert.verdict == "certified" and cert.effort is not None and cert.effort.longest_period is None
+        left.append(float(cert.effort.residual[0].norm))
+        run = simulate(graph, protocol, x0, actuator=Actuator(sample_period=period), past=0)
+        assert np.linalg.norm(graph.laplacian() @ run.final_state) <= left[-1]
+    assert size > left[0] > 100 * left[1] > 10**4 * left[2]
+    proved = certify(graph, protocol, x0, limits=[Limits(None, None, F(1, 10))], simulation=False)
+    assert proved.effort is not None and proved.effort.residual == ()
+    longest = proved.effort.longest_period
+    assert longest is not None and F(1, 1000) < longest < F(1, 10)
+    again = replace(proved, limits=(Limits(None, None, longest),))
+    assert again.effort is not None and again.effort.residual[0].norm <= F(size) * F(SLACK)
+    assert again.verdict == "certified"
+    line = f"not certified with this period; with {float(longest):.4g} it is"
+    assert any(line in text for text in certificate_lines(proved, "fig3a"))
 
 
 # ---------------------------------------------------------------------- the threshold

@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -52,10 +53,11 @@ def certified(graph, protocol, x0, starts):
 def _certify_once(monkeypatch):
     """Lyapunov functions are searched once for all designs on a graph with the same starts."""
 
-    def again(graph, protocol, x0=None, starts=None, simulation=None):
+    def again(graph, protocol, x0=None, starts=None, simulation=None, limits=()):
         if starts is not None:
             starts = tuple(map(tuple, (starts.center, starts.radius, starts.axes)))
-        return certified(graph, protocol, x0, starts)
+        first = gain_design._first_protocol(analyse(graph))
+        return replace(certified(graph, first, x0, starts), protocol=protocol, limits=tuple(limits))
 
     monkeypatch.setattr(gain_design, "certify", again)
 

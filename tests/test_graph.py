@@ -6,6 +6,7 @@ import hashlib
 import json
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 from itertools import product
 
 import networkx as nx
@@ -170,14 +171,14 @@ def test_matrix_networkx_and_edges_give_the_same_graph(made):
     dense = np.zeros((len(names), len(names)), dtype=object)
     for s, t, w in graph.edges:
         dense[graph.index[t], graph.index[s]] = w
-    assert SignedDigraph.from_matrix(dense, graph.labels) == graph
+    assert SignedDigraph.from_matrix(dense, graph.labels, orientation="listens") == graph
     digraph = nx.DiGraph()
     digraph.add_nodes_from(int(name) for name in names)
     digraph.add_weighted_edges_from((int(a), int(b), w) for (a, b), w in weights.items())
     assert SignedDigraph.from_networkx(digraph) == graph
     floats = graph.adjacency()
-    again = SignedDigraph.from_matrix(floats, graph.labels)
-    assert again == SignedDigraph.from_matrix(floats.toarray(), graph.labels)
+    again = SignedDigraph.from_matrix(floats, graph.labels, orientation="listens")
+    assert again == SignedDigraph.from_matrix(floats.toarray(), graph.labels, orientation="listens")
     assert np.array_equal(again.weights, graph.weights)
 
 
@@ -188,7 +189,9 @@ FORMS = [np.array, list, sparse.csr_array, sparse.coo_matrix, sparse.lil_array, 
 @pytest.mark.parametrize(("dtype", "form"), [*product(DTYPES, FORMS), (object, np.array), (object, list)])
 def test_a_matrix_of_any_kind(dtype, form):
     matrix = np.array([[0, 2, 0], [0, 0, 0], [1, 3, 0]]).astype(dtype)
-    graph = SignedDigraph.from_matrix(matrix.tolist() if form is list else form(matrix), labels="abc")
+    graph = SignedDigraph.from_matrix(
+        matrix.tolist() if form is list else form(matrix), labels="abc", orientation="listens"
+    )
     assert set(graph.edges) == {("b", "a", 2), ("a", "c", 1), ("b", "c", 3)}
     assert graph.read["orientation"] == "matrix"
 
@@ -196,7 +199,7 @@ def test_a_matrix_of_any_kind(dtype, form):
 def test_a_matrix_is_not_changed_by_reading_it():
     matrix = sparse.coo_array(([1, 2, 5], ([0, 1, 1], [1, 0, 2])), shape=(3, 3))
     before = [array.copy() for array in (matrix.row, matrix.col, matrix.data)]
-    graph = SignedDigraph.from_matrix(matrix)
+    graph = SignedDigraph.from_matrix(matrix, orientation="listens")
     assert all(np.array_equal(a, b) for a, b in zip(before, (matrix.row, matrix.col, matrix.data), strict=True))
     matrix.data[:] = 9
     assert graph.exact_weight(0) == 1
@@ -204,14 +207,14 @@ def test_a_matrix_is_not_changed_by_reading_it():
 
 def test_stored_zeros_of_a_matrix_are_no_edges():
     matrix = sparse.coo_array(([1, 0], ([0, 1], [1, 0])), shape=(2, 2))
-    assert SignedDigraph.from_matrix(matrix).n_edges == 1
+    assert SignedDigraph.from_matrix(matrix, orientation="listens").n_edges == 1
 
 
 def test_two_entries_for_one_place_are_refused():
     # SciPy would add them; +1 and -1 would vanish without a word.
     matrix = sparse.coo_array(([1, -1], ([0, 0], [1, 1])), shape=(2, 2))
     with pytest.raises(GraphError, match="two edges 2 -> 1"):
-        SignedDigraph.from_matrix(matrix)
+        SignedDigraph.from_matrix(matrix, orientation="listens")
 
 
 def test_arrays_are_read_only():
@@ -251,9 +254,86 @@ def test_listens_turns_every_edge_round(made):
 
 
 def test_a_row_of_a_matrix_listens():
-    graph = SignedDigraph.from_matrix([[0, 0], [-3, 0]])
+    graph = SignedDigraph.from_matrix([[0, 0], [-3, 0]], orientation="listens")
     assert graph.edges == (("1", "2", -3),)
     assert graph.in_weight().tolist() == [0, 3]
+
+
+def test_a_matrix_without_a_direction_is_refused_with_both():
+    with pytest.raises(GraphError, match="networkx") as caught:
+        SignedDigraph.from_matrix([[0, 1], [0, 0]])
+    assert 'orientation="listens"' in str(caught.value) and '"information"' in str(caught.value)
+    with pytest.raises(GraphError, match='"sideways" is unknown'):
+        SignedDigraph.from_matrix([[0, 1], [0, 0]], orientation="sideways")
+    with pytest.raises(GraphError, match="it is read by SignedDigraph"):
+        SignedDigraph.from_matrix(nx.DiGraph([(1, 2)]), orientation="information")
+
+
+@given(edge_lists(st.integers(0, 30).map(str)))
+def test_a_matrix_of_networkx_with_its_orientation_is_the_networkx_graph(made):
+    names, weights = made
+    graph = nx.DiGraph()
+    graph.add_nodes_from(names)
+    graph.add_weighted_edges_from((a, b, float(w)) for (a, b), w in weights.items())
+    for matrix in (nx.to_numpy_array(graph), nx.to_scipy_sparse_array(graph)):
+        for orientation in ("information", "listens"):
+            expected = SignedDigraph.from_networkx(graph, orientation=orientation)
+            assert SignedDigraph.from_matrix(matrix, graph.nodes, orientation=orientation) == expected
+    assert SignedDigraph.from_networkx(graph) == build(names, {pair: float(w) for pair, w in weights.items()})
+
+
+# ---------------------------------------------------------------------------------------------- labels
+
+
+def test_a_data_frame_keeps_its_labels():
+    pd = pytest.importorskip("pandas")
+    team = nx.DiGraph()
+    team.add_weighted_edges_from([("bob", "ann", 2), ("ann", "eve", -1)])
+    frame = nx.to_pandas_adjacency(team)
+    graph = SignedDigraph.from_matrix(frame, orientation="information")
+    assert graph == SignedDigraph.from_networkx(team) and graph.labels == ("bob", "ann", "eve")
+    assert SignedDigraph.from_matrix(frame[["eve", "bob", "ann"]], orientation="information") == graph
+    assert set(SignedDigraph.from_matrix(frame.T, orientation="listens").edges) == set(graph.edges)
+    places = [("a", 1), ("b", 2)]  # labels as from_networkx writes such nodes
+    frame = pd.DataFrame([[0, 3], [0, 0]], pd.MultiIndex.from_tuples(places), pd.MultiIndex.from_tuples(places))
+    graph = SignedDigraph.from_matrix(frame, orientation="information")
+    assert graph.edges == (("('a', 1)", "('b', 2)", 3),)
+
+
+def test_a_data_frame_of_several_types_keeps_its_integers():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({1: [0, 2**60 + 1, 0], "x": [0.5, 0.0, 0.0], 3: ["1/3", 0, 0]}, index=[1, "x", 3])
+    graph = SignedDigraph.from_matrix(frame.astype({3: object}), orientation="listens")
+    assert set(graph.edges) == {("1", "x", 2**60 + 1), ("x", "1", Fraction(1, 2)), ("3", "1", Fraction(1, 3))}
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "entry", "reason"),
+    [
+        (["a", "b"], ["a", "c"], 1, "different labels: b, c"),
+        ([0, 1], ["a", "b"], 1, "different labels: 0, 1, a, b"),
+        (["a", "a"], ["a", "b"], 1, "two rows of the matrix are both labelled a"),
+        (["a", 1], [1, "1"], 1, "two columns of the matrix are both labelled 1"),
+        (["a", "b"], ["a", "b"], float("nan"), "row a, column b of the matrix: the entry is nan, not a finite"),
+        (["a", "b"], ["a", "b"], "x", "row a, column b of the matrix: .* is not a number"),
+    ],
+)
+def test_a_data_frame_whose_labels_do_not_fit_is_refused(rows, columns, entry, reason):
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame([[0, entry], [0, 0]], index=rows, columns=columns)
+    with pytest.raises(GraphError, match=reason) as caught:
+        SignedDigraph.from_matrix(frame, orientation="listens")
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 200
+
+
+def test_a_missing_entry_of_a_data_frame_is_no_edge_of_any_weight():
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame([[0, None], [1, 0]], dtype="Int64")
+    with pytest.raises(GraphError, match="missing"):
+        SignedDigraph.from_matrix(frame, orientation="listens")
+    assert SignedDigraph.from_matrix(frame.fillna(0), orientation="listens").edges == (("0", "1", 1),)
+    with pytest.raises(GraphError, match="labels of its own"):
+        SignedDigraph.from_matrix(frame.fillna(0), "ab", orientation="listens")
 
 
 # ---------------------------------------------------------------------------------------------- refusals
@@ -266,7 +346,7 @@ def multigraph() -> nx.MultiDiGraph:
 
 
 EDGES = SignedDigraph.from_edges
-MATRIX = SignedDigraph.from_matrix
+MATRIX = partial(SignedDigraph.from_matrix, orientation="listens")
 NETWORKX = SignedDigraph.from_networkx
 
 
@@ -318,9 +398,9 @@ def test_wrong_options_are_refused():
     with pytest.raises(GraphError, match="orientation"):
         SignedDigraph.from_edges([("a", "b", 1)], orientation="sideways")
     with pytest.raises(GraphError, match="3 labels for 2 rows"):
-        SignedDigraph.from_matrix([[0, 1], [0, 0]], labels="abc")
+        SignedDigraph.from_matrix([[0, 1], [0, 0]], labels="abc", orientation="listens")
     with pytest.raises(GraphError, match="same label"):
-        SignedDigraph.from_matrix([[0, 1], [0, 0]], labels="aa")
+        SignedDigraph.from_matrix([[0, 1], [0, 0]], labels="aa", orientation="listens")
 
 
 def test_a_huge_label_and_a_control_character_stay_out_of_messages():

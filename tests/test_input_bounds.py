@@ -14,18 +14,21 @@ from generators import random_graph
 from scipy.integrate import quad
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from ptcc_certify import input_bounds
 from ptcc_certify.input_bounds import (
     Form,
     InputBounds,
     Limits,
     PrescribedGain,
+    Reaching,
     Starts,
     decay_above,
     energy_above,
+    integral_above,
     length_above,
-    limited_rate,
     peak_above,
     root_above,
+    sampled_above,
 )
 from ptcc_certify.structure import analyse
 
@@ -263,22 +266,90 @@ def test_limits_at_the_edges():
         Limits().clock_below(gain)
 
 
+@pytest.mark.parametrize("last", [1, 3, 2000])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_sampled_step_decays_at_the_limited_rate(seed: int):
-    """For ``L = A``, ``F = A'P A``: every step ``eta <= h gain`` leaves at most ``e^(-eta limited)`` of ``V``."""
+def test_a_held_gain_leaves_no_more_than_what_its_periods_leave_together(
+    seed: int, last: int, monkeypatch: pytest.MonkeyPatch
+):
+    """For ``V = ||R E||^2``: the product of ``||R (I - eta A) R^-1||^2``, periods far from the end taken together."""
+    monkeypatch.setattr(input_bounds, "LAST_PERIODS", last)
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 6))
     A = rng.normal(size=(n, n)) + 3 * np.eye(n)
     R = np.diag(rng.uniform(0.5, 2, n))
     moved = R @ A @ np.linalg.inv(R)
     rate, growth = float(np.linalg.eigvalsh(moved + moved.T)[0]), float(np.linalg.norm(moved, 2) ** 2)
-    gain, limits = PrescribedGain(F(1), F(1), F(1)), Limits(F(5), None, log_uniform(rng, 1e-3, 0.1))
-    assert limited_rate(F(rate), F(growth), Limits(F(5)), gain) == F(rate)
-    left = float(limited_rate(F(rate), F(growth), limits, gain))
-    assert left == pytest.approx(rate - 5 * float(limits.sample_period or 0) * growth)
-    for eta in rng.uniform(0, 5 * float(limits.sample_period or 0), 20):
+    gain = random_gain(rng)
+    plain = Limits() if seed % 4 == 3 else random_limits(seed, gain)
+    limits = Limits(plain.gain_cap, plain.stop_before, gain.T / log_uniform(rng, 1, 60))
+    h, end = float(limits.sample_period or 0), float(gain.T - (limits.stop_before or 0))
+    steps, j = 1.0, 0
+    while j * h < end * (1 - 1e-12):
+        eta = acting(Limits(limits.gain_cap), gain, j * h) * min(h, end - j * h)
         step = float(np.linalg.norm(np.eye(n) - eta * moved, 2) ** 2)
-        assert step <= math.exp(-eta * left) * (1 + 1e-12)
+        assert step <= (1 - eta * rate + eta**2 * growth) * (1 + 1e-9)
+        steps, j = steps * (1 - eta * rate + eta**2 * growth), j + 1
+    bound = sampled_above(gain, limits, F(rate), F(growth))
+    assert F(steps) * F(1 - 1e-9) <= bound
+    if last > j:
+        assert bound <= F(steps) * F(1 + 1e-9)
+
+
+def test_ever_shorter_periods_leave_ever_less():
+    """Two enemies, rate 4 and growth 4: at rate ``k`` nothing is proved for long periods, and all for short ones."""
+    gain = PrescribedGain(F(1), F(1), F(2))
+    left = [sampled_above(gain, Limits(sample_period=F(1, 10**p)), F(4), F(4)) for p in range(0, 9, 2)]
+    assert left[0] > 1 and all(b < a / 100 for a, b in pairwise(left[1:]))
+    with pytest.raises(ValueError, match="nothing is sampled"):
+        sampled_above(gain, Limits(F(5)), F(4), F(4))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_square_of_a_limited_gain_is_integrated_from_above(seed: int):
+    gain = random_gain(np.random.default_rng(seed))
+    limits = random_limits(seed, gain)
+    end = float(gain.T - (limits.stop_before or 0))
+    cuts = {0.0, end, *(float(gain.T) * (1 - q) for q in np.geomspace(1e-7, 1, 60) if float(gain.T) * (1 - q) < end)}
+    if limits.gain_cap is not None and limits.gain_cap > gain.rho1:
+        turn = float(gain.T - gain.k / (limits.gain_cap - gain.rho1))
+        cuts |= {turn} if 0 < turn < end else set()
+    pieces = pairwise(sorted(cuts))
+    area = sum(quad(lambda t: acting(limits, gain, t) ** 2, a, b, epsabs=0, epsrel=1e-12)[0] for a, b in pieces)
+    assert area * (1 - SLACK) <= float(limits.square_above(gain)) <= area * (1 + 1e-9)
+
+
+# ---------------------------------------------------------------------- the energy by two Lyapunov equations
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_gain_is_split_between_two_exponentials_of_the_clock(seed: int):
+    """``gain <= rho1 + (k/T) (p + e^(s/k - p))`` at all times, at most twice the gain for the largest ``p``."""
+    rng = np.random.default_rng(seed)
+    gain = random_gain(rng)
+    true, most = Decay(gain, F(1), F(1), F(1)), float(gain.rho1 * gain.T / gain.k)
+    z = np.append(0.0, np.geomspace(1e-9, 300, 500))
+    values = true.rho1 + true.k / true.T * np.exp(z)
+    clock = -true.rho1 * true.T * np.expm1(-z) + true.k * z
+    for p in (0.0, rng.uniform() * most, most):
+        split = true.rho1 + true.k / true.T * (p + np.exp(clock / true.k - p))
+        assert (split >= values * (1 - 1e-12)).all()
+        if p == most:
+            assert (split <= 2 * values * (1 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_energy_is_at_most_doubled_by_the_split(seed: int):
+    """Of one mode, ``E = e^(-r s / 2)``: ``int ||E||^2 ds = 1/r`` and ``int e^(s/k) ||E||^2 ds = 1/(r - 1/k)``."""
+    gain, _, _, rate, _ = case(seed, F(5, 4))
+    energy = Decay(gain, F(1), F(1), rate).energy()
+    even, grown, most = 1 / rate, 1 / (rate - 1 / gain.k), gain.rho1 * gain.T / gain.k
+    best = min(F(math.log(grown / even)), most)
+    bounds = [float(integral_above(gain, even, grown, p)) for p in (F(0), most / 2, most, best)]
+    assert min(bounds) >= energy * (1 - 1e-9)
+    assert max(bounds[2:]) <= 2 * energy * (1 + 1e-9) and bounds[3] <= min(bounds) * (1 + 1e-9)
+    for p in (F(-1, 10**9), most + F(1, 10**9)):
+        with pytest.raises(ValueError, match="not between"):
+            integral_above(gain, even, grown, p)
 
 
 # ---------------------------------------------------------------------- sets of starts, forms
@@ -406,23 +477,28 @@ def test_sliding_variables_move_until_the_instant_is_quiet():
     form = Form(F(4), "E", [1], [F(1)], None, F(1))
     starts = Starts([F(5), F(1)])
     still = InputBounds(rows, gain, [form], [None], starts)
-    moved = InputBounds(rows, gain, [form], [None], starts, [F(0), F(3)], F(1))
+    moving = Reaching([F(0), F(3)], F(1), F(1), F(1, 2), F(1), F(2))
+    moved = InputBounds(rows, gain, [form], [None], starts, moving)
     assert still.quiet == 0 and float(moved.quiet) == pytest.approx(math.log(2))
     assert still.held == [0, 8]
-    # |L^2| |sigma(0)| = 12 while s grows to 1 + ln 2, and |L| |sigma(0)| = 6 besides
-    assert moved.held[0] == 0 and float(moved.held[1]) == pytest.approx(8 + 12 * (1 + math.log(2)) + 6)
-    s = 1 + math.log(2)
-    assert float(moved.start(0)) == pytest.approx(8 + 12 * (math.exp(2 * s) - 1) / 2)
+    # |e| grows by 2 |sigma(0)| = 6 and 2 (mu1 + delta) T_r = 4 at most, |x| by 3 and 2
+    assert moved.held == [0, 18]
+    assert moved.start(0) == still.start(0) == pytest.approx(8)
     with pytest.raises(ValueError, match="still move"):
         moved.bound(peak_above, None, 0, F(0))
-    deviation = Form(F(4), "eps", [0, 1], [F(1), F(1)], None, F(1), [1, 1])
-    with pytest.raises(ValueError, match="reaching phase"):
-        InputBounds(rows, gain, [deviation], [None], starts, [F(0), F(3)], F(1)).start(0)
+    early = Reaching([F(0), F(3)], F(1), F(1), F(1, 2), F(1), F(2), F(1))
+    assert float(early.quiet) == pytest.approx(math.log(2 / (1 + math.exp(-1))))
+    assert early.pushes({0: F(7), 1: F(-2)}) == (6, 4)
+    assert Reaching([F(-1), F(3)], F(1), F(1), F(1), F(1), F(2)).pushes({0: F(7), 1: F(-2)}) == (13, 18)
+    assert Reaching([F(-1), F(3)], F(1), F(1), F(1), F(1), F(2)).pushes({0: F(7), 1: F(2)}) == (7, 14)
+    low, high = early.decay((F(3, 4), F(3, 4)))  # half of T_r
+    assert low < high and float(low) == pytest.approx(math.exp(-0.25) / 2) == float(high)
+    assert early.decay((F(1, 2), F(1, 2))) == (0, 0) and early.decay((F(1), F(1)))[1] == pytest.approx(1)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_no_sliding_variable_within_its_start_moves_the_error_further(seed: int):
-    """``dy/ds = -L (y + sigma)`` with ``sigma`` that switches among ``+-|sigma(0)|``, then 0: ``e`` stays held."""
+def test_no_sliding_variable_moves_the_error_further(seed: int):
+    """``dE = -L E ds - L d sigma``, ``sigma' = -(mu2 + power/(T_r - t)) sigma - s f`` with ``f`` that switches."""
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, "strong", "unbalanced", n=int(rng.integers(2, 6))).graph
     L, n = graph.laplacian().toarray(), graph.n_nodes
@@ -431,21 +507,38 @@ def test_no_sliding_variable_within_its_start_moves_the_error_further(seed: int)
     matrix = [[F(float(x)) for x in row] for row in P]
     form = Form(rate, "E", range(n), None, matrix, F(float(np.linalg.eigvalsh(P)[0])) * F(99, 100))
     gain, T_s = PrescribedGain(F(2), F(1, 4), 2 / rate), F(2) - F(1, int(rng.integers(2, 9)))
-    sizes, y = [abs(x) for x in rationals(rng, n)], rationals(rng, n) if seed % 2 else [F(0)] * n
-    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [None], Starts(y), sizes, T_s)
-    held, start = floats(bounds.held), float(bounds.start(0))
-    quiet = float(gain.clock_above(bounds.quiet))
-    for steps in (1, 3, 10):
-        state, s = floats(y), 0.0
-        for step in range(steps + 5):
-            sigma = floats(sizes) * rng.choice([-1, 1], n) * (step < steps)
-            for share in np.linspace(0, 1, 11):
-                now = -sigma + expm(-L * share * quiet / steps) @ (state + sigma)
-                e, clock = L @ (now + sigma), s + share * quiet / steps
-                assert (np.abs(e) <= held * (1 + 1e-12)).all()
-                if step >= steps:
-                    assert math.sqrt(e @ P @ e) <= math.exp(-float(rate) / 2 * clock) * start * (1 + 1e-9)
-            state, s = now, clock
+    sigma0, x0 = rationals(rng, n), rationals(rng, n) if seed % 2 else [F(0)] * n
+    mu2, power, push = log_uniform(rng, 0.1, 5), F(int(rng.integers(1, 5)), 2), log_uniform(rng, 0.1, 5)
+    reaching = Reaching(sigma0, 2 - T_s, T_s, mu2, power, push)
+    constants = [F(float(x)) * F(1001, 1000) for x in np.diag(np.linalg.inv(P))]
+    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], Starts(x0), reaching)
+    z = bounds.quiet
+    peak, energy, length = (float(bounds.bound(of, None, 0, z)) for of in (peak_above, energy_above, length_above))
+    agents, held = [float(bounds.bound(peak_above, v, 0, z)) for v in range(n)], floats(bounds.held)
+    true, T_r = Decay(gain, F(1), F(1), rate), float(2 - T_s)
+    instants = np.linspace(0, float(z), 2001)
+    for _ in range(3):
+        E, size, u = -L @ floats(x0), np.abs(floats(sigma0)), []
+        sign, f = np.sign(floats(sigma0)), np.zeros(n)
+        for i, (a, b) in enumerate(pairwise(instants.tolist())):
+            u.append(true.gain(a) * E)
+            assert (np.abs(E) <= held * (1 + 1e-3) + 1e-9).all()
+            if i % 200 == 0:
+                f = float(push) * rng.integers(0, 2, n)
+            now, then = (T_r - 2 * (1 - math.exp(-x)) for x in (a, b))
+            kept = math.exp(-float(mu2) * (now - then)) * (max(then, 0) / now) ** float(power)
+            left = np.maximum(size * kept - f * (now - then), 0)
+            moved, step = expm(-L * (true.clock(b) - true.clock(a))), L @ (sign * (size - left))
+            E, size = moved @ (E + step / 2) + step / 2, left
+        later = np.linspace(float(z), 12, 801)
+        for a, b in pairwise(later.tolist()):
+            u.append(true.gain(a) * E)
+            E = expm(-L * (true.clock(b) - true.clock(a))) @ E
+        norm = np.linalg.norm(u, axis=1)
+        t = 2 * (1 - np.exp(-np.append(instants[:-1], later[:-1])))
+        assert norm.max() <= peak * 1.001
+        assert (np.abs(u).max(axis=0) <= np.array(agents) * 1.001).all()
+        assert np.trapezoid(norm**2, t) <= energy * 1.01 and np.trapezoid(norm, t) <= length * 1.01
 
 
 @pytest.mark.parametrize("seed", range(20))

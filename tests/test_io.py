@@ -407,7 +407,7 @@ def test_a_symmetric_matrix_market_file_is_undirected(tmp_path, dense):
     mmwrite(tmp_path / "g.mtx", matrix if dense else sparse.coo_array(matrix), symmetry="symmetric")
     with pytest.raises(FormatError, match="--undirected"):
         read_graph(tmp_path / "g.mtx")
-    assert read_graph(tmp_path / "g.mtx", undirected=True) == SignedDigraph.from_matrix(matrix)
+    assert read_graph(tmp_path / "g.mtx", undirected=True) == SignedDigraph.from_matrix(matrix, orientation="listens")
 
 
 @given(st.integers(1, 6), st.data())
@@ -420,7 +420,7 @@ def test_a_dense_and_a_sparse_matrix_are_the_same_graph(tmp_path_factory, n, dat
     np.save(folder / "g.npy", matrix)
     sparse.save_npz(folder / "g.npz", sparse.csr_array(matrix))
     savemat(folder / "g.mat", {"W": matrix})
-    expected = SignedDigraph.from_matrix(matrix)
+    expected = SignedDigraph.from_matrix(matrix, orientation="listens")
     for name in ("g.npy", "g.npz", "g.mat"):
         assert read_graph(folder / name) == expected
 
@@ -961,12 +961,34 @@ def test_unknown_options_are_refused(options, words):
     one_line(caught.value)
 
 
-@pytest.mark.parametrize("orientation", ["information", "listens"])
-@pytest.mark.parametrize("name", ["g.mtx", "g.npy", "g.npz", "g.mat"])
-def test_a_matrix_takes_no_orientation(put, name, orientation):
-    with pytest.raises(ParameterError, match="needs no orientation") as caught:
-        read_graph(put(name, b""), orientation=orientation)
-    assert name in one_line(caught.value)
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("g.mtx", mmwrite),
+        ("g.mtx", lambda path, matrix: mmwrite(path, sparse.coo_array(matrix))),
+        ("g.npy", np.save),
+        ("g.npz", write_npz),
+        ("g.npz", lambda path, matrix: sparse.save_npz(path, sparse.csc_array(matrix))),
+        ("g.mat", lambda path, matrix: savemat(path, {"W": matrix})),
+    ],
+)
+def test_rows_of_a_matrix_file_listen_unless_it_is_said_that_they_inform(tmp_path, name, write):
+    write(tmp_path / name, MATRIX)
+    turned = {(t, s, w) for s, t, w in edges(read_graph(tmp_path / name))}
+    for orientation, said in ((None, "matrix"), ("listens", "matrix"), ("information", "information")):
+        graph = read_graph(tmp_path / name, orientation=orientation)
+        assert (edges(graph) == turned) == (said == "information")
+        assert graph.read["orientation"] == said
+
+
+def test_a_file_of_a_networkx_matrix_is_the_networkx_graph(tmp_path):
+    graph = nx.DiGraph()
+    graph.add_weighted_edges_from([(1, 2, 2.5), (2, 3, -1.0), (3, 1, 0.5)])
+    np.save(tmp_path / "g.npy", nx.to_numpy_array(graph))
+    assert read_graph(tmp_path / "g.npy", orientation="information") == SignedDigraph.from_networkx(graph)
+    with pytest.raises(FormatError, match="row 2, column 2: self-loop at node 2"):
+        np.save(tmp_path / "g.npy", np.diag([0.0, 1.0]))
+        read_graph(tmp_path / "g.npy", orientation="information")
 
 
 @pytest.mark.parametrize(

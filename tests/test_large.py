@@ -260,8 +260,8 @@ def test_frontier_of_rate_and_prefactor_is_monotone():
     assert prefactors == sorted(prefactors, reverse=True)
 
 
-@pytest.mark.parametrize(("name", "tightness"), [("soc-sign-bitcoinotc.csv.gz", 0.4), ("wiki-elec.txt.gz", 0.99)])
-def test_real_networks_of_thousands_are_certified(name: str, tightness: float, real_data: Path, tmp_path: Path):
+@pytest.mark.parametrize(("name", "ratio"), [("soc-sign-bitcoinotc.csv.gz", 0.4), ("wiki-elec.txt.gz", 0.99)])
+def test_real_networks_of_thousands_are_certified(name: str, ratio: float, real_data: Path, tmp_path: Path):
     graph = read_graph(real_data / name, orientation="listens")
     start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
     cert = certify(graph, NOMINAL, start, simulation=False)
@@ -271,7 +271,7 @@ def test_real_networks_of_thousands_are_certified(name: str, tightness: float, r
     followers = cert.structure.followers
     block = graph.laplacian().tocsc()[followers][:, followers]
     least = float(eigs(block, k=1, sigma=0, return_eigenvectors=False)[0].real)
-    assert tightness * 2 * least <= float(cert.rate) <= 2 * least * (1 + 1e-9)
+    assert ratio * 2 * least <= float(cert.rate) <= 2 * least * (1 + 1e-9)
 
 
 def test_the_screen_tells_how_near_the_final_state_is_known():
@@ -279,8 +279,8 @@ def test_the_screen_tells_how_near_the_final_state_is_known():
     cert = certify(graph, NOMINAL, [1] * 300, simulation=False)
     lines = certificate_lines(cert, "g")
     (said,) = [line for line in lines if line.startswith("ends at")]
-    assert said.endswith("proved)") and "to within" in said
-    assert lines[-1] == "verdict    certified"
+    assert said.endswith("proved; here to 5 digits)") and "to within" in said
+    assert lines[-1].startswith("verdict    certified")
 
 
 def chain(weights: list[Any]) -> SignedDigraph:

@@ -236,7 +236,7 @@ def signed_graph(seed=0, n=5):
     W = rng.integers(-8, 9, (n, n)) * rng.choice([0, 0.1, 1], (n, n))
     np.fill_diagonal(W, 0)
     W[2] = 0  # one agent listens to nobody
-    return SignedDigraph.from_matrix(W)
+    return SignedDigraph.from_matrix(W, orientation="listens")
 
 
 @pytest.mark.parametrize("instant", [0.1, 0.55, 0.8])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -11,6 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from ptcc_certify.batch import certify_many
+from ptcc_certify.certificate import certify
+from ptcc_certify.effort import box, ellipsoid
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import laplacian_spectrum
@@ -23,7 +27,7 @@ from ptcc_certify.outcomes import (
     is_stability,
     outcome,
 )
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation import simulate
 from ptcc_certify.structure import analyse
 
@@ -140,6 +144,62 @@ def test_a_start_by_label():
             outcome(st_, bad)
 
 
+def test_labels_of_a_series_count_wherever_a_state_is_taken():
+    pd = pytest.importorskip("pandas")
+    team = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+    plain, x0 = [3.5, 2.5, 1.5], pd.Series({"eve": 1.5, "bob": 2.5, "ann": 3.5})
+    cert = certify(team, protocol, x0, simulation=False)
+    assert [float(x) for x in cert.start] == plain
+    assert cert.envelope.norm_bound([0.5], x0) == cert.norm_bound([0.5])
+    assert (cert.envelope.outcome_distance([0.5], x0) == cert.outcome_distance([0.5])).all()
+    assert cert.outcome.final_state == outcome(analyse(team), x0).final_state
+    assert simulate(team, protocol, x0).states[:, 0].tolist() == plain
+    run = simulate(team, protocol, pd.DataFrame({"x": x0, "y": 2 * x0}))
+    assert run.states[:, :, 0].tolist() == [[x, 2 * x] for x in plain]
+    robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    slid = certify(team, robust, x0, sigma0=x0, simulation=False)
+    assert slid.sigma0 == slid.start == cert.start
+    assert simulate(team, robust, x0, sigma0=x0).sigma[:, 0].tolist() == plain
+    row, other = certify_many(team, protocol, x0=x0)[0], certify_many(team, protocol, x0=plain)[0]
+    assert row | {"seconds": 0} == other | {"seconds": 0}
+    assert box(x0 - 1, x0, team) == box([2.5, 1.5, 0.5], plain, team)
+    assert ellipsoid(x0, [x0], team) == ellipsoid(plain, [plain])
+    whole = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (3, 1, 1)])
+    assert outcome(analyse(whole), pd.Series([7, 5, 6], index=[3, 1, 2])).final_state == (7, 7, 7)
+
+
+@pytest.mark.parametrize(
+    ("index", "reason"),
+    [
+        (["ann", "bob"], "no value for eve;"),
+        (["ann", "bob", "zoe"], "no value for eve, and zoe is not in the graph"),
+        (["ann", "bob", "eve", "zoe", "max"], "max, zoe are not in the graph|zoe, max are not in the graph"),
+        ([0, 1, 2], "no value for ann, bob, eve, and 0, 1, 2 are not in the graph"),
+        (["ann", "bob", "eve", "ann"], "two values for node ann"),
+    ],
+)
+def test_a_series_with_other_labels_than_the_nodes_is_refused(index, reason):
+    pd = pytest.importorskip("pandas")
+    team = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
+    protocol, x0 = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), pd.Series(1.0, index=index)
+    for ask in (certify, simulate):
+        with pytest.raises(ParameterError, match=reason) as caught:
+            ask(team, protocol, x0)
+        assert str(caught.value).isprintable() and len(str(caught.value)) < 200
+    (row,) = certify_many(team, protocol, x0=x0) if len(set(index)) == len(index) else [{"error": reason}]
+    assert re.search(reason, row["error"])
+
+
+def test_ends_of_a_box_with_labels_need_the_graph():
+    with pytest.raises(ParameterError, match="low has labels"):
+        box({"a": 1}, {"a": 2})
+    with pytest.raises(ParameterError, match="center has labels"):
+        ellipsoid({"a": 1}, [[1]])
+    with pytest.raises(ParameterError, match="list of vectors"):
+        ellipsoid([0], {"a": [1]})
+
+
 def test_the_definitions_on_states():
     pair = analyse(SignedDigraph.from_edges([("a", "f", 1), ("b", "f", 1)]))
     assert is_stability([0, 0, 0], pair) and not is_stability([0, 1e-9, 0], pair)
@@ -148,6 +208,7 @@ def test_the_definitions_on_states():
     order = pair.graph.labels
     state = {"a": 1, "b": -3, "f": 2}
     assert is_bipartite_containment([state[k] for k in order], pair)
+    assert is_bipartite_containment({"f": 2, "b": -3, "a": 1}, pair)
     assert not is_bipartite_containment([dict(state, f=4)[k] for k in order], pair)
     assert not is_bipartite_containment([dict(state, a=0)[k] for k in order], pair)
     assert not is_interval_bipartite_consensus([1, 1, 1], pair)  # two closed components

@@ -309,7 +309,7 @@ def test_frontiers_hold_every_proved_member(name: str) -> None:
     found = sorted((label, *point) for label in set(shown) & set(CLASS_MARKERS) for point in shown[label].get_xydata())  # type: ignore[attr-defined]
     assert found == sorted((m.kind, m.prefactor, m.rate) for m in members)
     for label, rate in (
-        ("no rate exceeds (proved)", cert.rate_limit),
+        ("no rate exceeds (proved)", cert.upper_bound),
         ("spectral rate (numerical)", cert.spectral_rate),
     ):
         assert rate is not None and shown[label].get_ydata()[0] == float(rate)  # type: ignore[attr-defined]

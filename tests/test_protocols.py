@@ -26,7 +26,7 @@ def matrices(n):
 @settings(deadline=None)
 @given(matrices(5), st.sampled_from([0.0, 0.3, 0.599, 0.6, 2.0]), st.integers(0, 99))
 def test_the_input_is_the_gain_times_minus_the_laplacian(W, instant, seed):
-    graph, state = SignedDigraph.from_matrix(W), np.random.default_rng(seed).normal(size=5)
+    graph, state = SignedDigraph.from_matrix(W, orientation="listens"), np.random.default_rng(seed).normal(size=5)
     x, t = ca.SX.sym("x", 5), ca.SX.sym("t")
     u = ca.Function("u", [x, t], [PROTOCOL.input(graph, x, t)])(state, instant)
     L = np.diag(abs(W).sum(axis=1)) - W
@@ -86,7 +86,7 @@ def test_latex_is_for_small_graphs():
 @settings(deadline=None)
 @given(matrices(4), st.sampled_from([0.0, 0.3, 0.499, 0.5, 1.2, 1.5, 2.0]), st.integers(0, 99))
 def test_the_sliding_mode_input_is_48(W, instant, seed):
-    graph, rng = SignedDigraph.from_matrix(W), np.random.default_rng(seed)
+    graph, rng = SignedDigraph.from_matrix(W, orientation="listens"), np.random.default_rng(seed)
     state, varsigma = rng.normal(size=4), rng.normal(size=4)
     varsigma[0] = -state[0]
     x, v, t = ca.SX.sym("x", 4), ca.SX.sym("v", 4), ca.SX.sym("t")

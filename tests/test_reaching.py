@@ -456,7 +456,8 @@ def test_the_bound_holds_for_every_disturbance_vanishes_in_time_and_is_below_pro
     with np.errstate(under="ignore"):
         decay = np.exp(-p.reaching_gain.clock_at_tau(z))
     assert (bound <= np.abs(sigma0)[:, None] * decay * (1 + 1e-12)).all()
-    np.testing.assert_allclose(bound[:, 0], np.abs(sigma0), rtol=1e-14)
+    assert (bound[:, 0] >= np.abs(sigma0)).all()
+    np.testing.assert_allclose(bound[:, 0], np.abs(sigma0), rtol=1e-12)
     for row, last in zip(bound, certain, strict=True):
         assert (row[z >= (math.inf if last is None else float(last))] == 0).all()
         assert (np.diff(row) <= 1e-14 * row[:-1]).all()
@@ -468,6 +469,23 @@ def test_the_bound_holds_for_every_disturbance_vanishes_in_time_and_is_below_pro
     ):
         values = np.abs(ReachingProblem(p, sigma0, d).sigma(z))
         assert (values <= bound * (1 + 1e-9) + 1e-13 * decay * np.abs(sigma0).max()).all()
+
+
+@pytest.mark.parametrize("size", [F(1, 1000), F(1), F(9), F(100)])
+@pytest.mark.parametrize("power", [F(1, 2), F(1), F(9, 5)])
+def test_no_bound_is_below_what_the_adversary_leaves_however_near_the_reaching_time(power, size):
+    p = protocol(power, mu2=F(3, 5), T_r=F(1, 2), mu1=F(6, 5))
+    (reached,) = certified_reaching_times(p, [size])
+    ends = [float(reached.z)] if reached.z is not None else [20.0]
+    z = np.unique([end * (1 - share) for end in ends for share in (*np.geomspace(1e-15, 1, 60), 0, -1e-15, -1e-12)])
+    (bound,) = sliding_bound(p, [size], z)
+    for instant, known in zip(z.tolist(), bound.tolist(), strict=True):
+        at = F(instant)
+        left = ball(size) - ball(p.mu1 - p.delta) * (inverse_decay_integral(p, at) if at else ball(F(0)))
+        clock = ball(p.mu2 * p.T_r) * (1 - (-ball(at)).exp()) + ball(power * at)
+        assert not left * (-clock).exp() > ball(F(max(known, 1e-300)))
+        if left > ball(size) / 10**6 and known > 1e-300:
+            assert known <= float((left * (-clock).exp()).mid()) * (1 + 3e-6)
 
 
 def test_the_bound_holds_along_simulated_runs():

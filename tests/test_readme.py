@@ -74,6 +74,13 @@ def test_the_transcript_is_what_ptcc_prints(tmp_path: Path):
             assert said == seen
 
 
+def test_the_verdict_line_is_what_ptcc_prints(tmp_path: Path):
+    """A refuted expectation, and gains with which the bound would say something."""
+    ((command, shown),) = re.findall(r"\n(ptcc certify [^\n]*)\n\.\.\.\n(verdict [^\n]*)\n", TEXT)
+    done = ptcc(command, tmp_path)
+    assert done.returncode == 3 and done.stdout.splitlines()[-1] == shown
+
+
 def test_the_set_up_commands_are_there():
     first, second = [line for block in blocks("sh") if block not in SESSIONS for line in block.splitlines()]
     assert "pip install" in first and first.endswith("ptcc certify fig1b")

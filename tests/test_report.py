@@ -285,7 +285,7 @@ def test_numbers_are_rounded_to_the_safe_side(tmp_path: Path):
         said = {row[0]: row[1] for row in rows(source, "Rates")}
         assert made.rate * Fraction(99999, 100000) <= number(said["Proved rate"]) <= made.rate
         assert made.limit.value <= number(said["No rate exceeds"]) <= made.limit.value * Fraction(100001, 100000)
-        assert number(said["Tightness"].removeprefix("at least ")) <= made.rate / made.limit.value
+        assert number(said["Optimality ratio"].removeprefix("at least ")) <= made.rate / made.limit.value
         bounds = {row[0]: row[1] for row in rows(source, "Proved bounds")}
         assert made.effort.peak is not None and made.effort.energy is not None
         peak = next(value for key, value in bounds.items() if key.endswith("from this start")).partition("\u2264")[2]

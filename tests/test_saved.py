@@ -67,7 +67,7 @@ def agree(saved: SavedCertificate, made: ptcc.Certificate) -> None:
     assert (saved.protocol, saved.start, saved.sigma0) == (made.protocol, made.start, made.sigma0)
     assert (saved.reaching, saved.verdict, saved.claims) == (made.reaching, made.verdict, made.claims)
     assert (saved.rate, saved.prefactor, saved.paper_rate) == (made.rate, made.prefactor, made.proof.rate)
-    assert saved.rate_limit == (None if made.limit is None else made.limit.value)
+    assert saved.upper_bound == made.upper_bound and saved.optimality_ratio == made.optimality_ratio
     assert type(saved.envelope) is type(made.envelope)
     assert len(saved.envelope.members) == len(made.envelope.members)
     for own, other in zip(saved.envelope.members, made.envelope.members, strict=True):

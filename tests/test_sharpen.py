@@ -285,8 +285,8 @@ def test_a_chain_of_followers_has_a_certificate():
     """Thirty followers in a row: one Jordan chain, for which diagonal matrices need astronomic prefactors."""
     graph = SignedDigraph.from_edges([(i, i + 1, 1) for i in range(30)])
     cert = certify(graph, P, [1] + [0] * 30)
-    assert cert.verdict == "certified" and cert.tightness is not None
-    assert cert.tightness > 0.3
+    assert cert.verdict == "certified" and cert.optimality_ratio is not None
+    assert cert.optimality_ratio > 0.3
     assert cert.comparison is not None and not cert.comparison.violated
     closed = lmi.m_matrix_certificate(ErrorSystem(cert.structure).matrix)
     assert closed.log_condition > 100 and closed.rate == pytest.approx(2, rel=1e-5)

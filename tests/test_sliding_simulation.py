@@ -130,7 +130,9 @@ def campaign(cases, steps, rng):
                 continue
             break
         # In units in which the fastest agent is as fast as the gains: Euler has to resolve it.
-        graph = SignedDigraph.from_matrix(graph.adjacency().toarray() * 4 / (graph.in_weight().max() or 1))
+        graph = SignedDigraph.from_matrix(
+            graph.adjacency().toarray() * 4 / (graph.in_weight().max() or 1), orientation="listens"
+        )
         p = protocol(
             [F(1), F(3, 2), F(2), F(3)][case % 4],
             T_r=F(int(rng.integers(5, 16)), 10),

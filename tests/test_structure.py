@@ -291,7 +291,7 @@ def test_random_sign_matrices_agree_with_the_definitions(negative):
         if i % 5 == 0:  # undirected
             matrix = np.triu(matrix) + np.triu(matrix).T
         weight = {(j, k): Fraction(int(matrix[k, j])) for k in range(n) for j in range(n) if matrix[k, j]}
-        assert_agrees(analyse(SignedDigraph.from_matrix(matrix)), n, weight)
+        assert_agrees(analyse(SignedDigraph.from_matrix(matrix, orientation="listens")), n, weight)
 
 
 # ---------------------------------------------------------------------- against networkx

@@ -1,19 +1,20 @@
 """Many graphs, one table: a row for each graph, on one machine or on many, resumed where it was interrupted.
 
 A row depends on the graph and on the settings alone, not on its place in the list nor on where it was computed, except
-for ``seconds``. Files are read where the batch was started and their bytes are sent; workers neither read nor write.
+for ``seconds``, and for what a time limit cuts off. Files are read where the batch was started and their bytes are
+sent; workers neither read nor write.
 
 :mod:`~ptcc_certify.batch.sources` tells which graphs there are, :mod:`~ptcc_certify.batch.settings` is everything else
 that a row depends on, and :mod:`~ptcc_certify.batch.rows` makes one row; its columns are listed there. Rows are
 computed by one of the :mod:`~ptcc_certify.batch.backends`, kept as they come by :mod:`~ptcc_certify.batch.journal`, and
-written by :mod:`~ptcc_certify.batch.table` when all are there.
+written by :mod:`~ptcc_certify.batch.table` when all are there, or when a batch ends before.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,7 +25,7 @@ from ptcc_certify.batch.settings import Settings, Start, whole_number
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.batch.table import refuse_table, table_bytes
 from ptcc_certify.ensembles import Ensemble
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.io import write_atomically, write_graph
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.rationals import shorten
@@ -49,6 +50,7 @@ def certify_many(
     duplicates: Literal["refuse", "sum", "last"] = "refuse",
     drop_self_loops: bool = False,
     undirected: bool = False,
+    time_limit: float | None = None,
     workers: int = 1,
     scheduler: str | None = None,
     output: str | os.PathLike[str] | None = None,
@@ -67,13 +69,13 @@ def certify_many(
         matches has an error. A file that is named several times, in whatever way or through links, has one row, under
         the first of its names. Paths are read as they are written, and a leading ``./`` is left out of names.
     protocol : NominalProtocol or SlidingModeProtocol
-    x0 : "random", str, sequence of numbers, mapping or None
+    x0 : "random", str, sequence of numbers, mapping, pandas Series or None
         ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
         and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
         an error.
     seed : int
         Of random starts and telegraph signals.
-    sigma0 : "random", str, sequence of numbers, mapping or None
+    sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
         Sliding mode: the sliding variables at 0, like ``x0``; None: 0.
     disturbance : str, optional
         Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the adversary by default.
@@ -93,6 +95,8 @@ def certify_many(
         What becomes of two rows for the same ordered pair.
     drop_self_loops, undirected : bool
         Drop self-loops; let each edge go both ways.
+    time_limit : float, optional
+        Seconds for each graph, as in :func:`ptcc_certify.certify`; the column ``cut_off`` names what they ended.
     workers : int
         Processes on this machine, through joblib; 1: in this process.
     scheduler : str, optional
@@ -100,7 +104,8 @@ def certify_many(
     output : path, optional
         Write the table to this ``.csv`` or ``.parquet`` file. Rows are kept beside it in ``<output>.journal`` as they
         come; called again after an interruption with the same settings, the batch goes on with those that are missing,
-        and with files that have changed since.
+        and with files that have changed since. The list may have changed too: rows of its graphs are used again, others
+        are left out. After an interruption or a failure the file holds the rows so far.
     restart : bool
         Drop such a journal and replace such a table.
     progress : callable
@@ -111,7 +116,8 @@ def certify_many(
     -------
     list of dict
         The rows in the order of ``sources``, with the columns that :mod:`ptcc_certify.batch.rows` lists; ``None`` where
-        an entry is empty.
+        an entry is empty. An exception that ends the work, an interrupt too, has those so far in its attribute
+        ``rows``.
 
     Raises
     ------
@@ -144,6 +150,7 @@ def certify_many(
         duplicates=duplicates,
         drop_self_loops=drop_self_loops,
         undirected=undirected,
+        time_limit=time_limit,
     )
     workers = whole_number(workers, "workers", 1)
     path = None if output is None else Path(output)
@@ -151,7 +158,12 @@ def certify_many(
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
     chosen = chosen_sources(sources, () if path is None else (path, journal_path(path)))
 
-    def complete(rows: dict[int, Row], keep: Callable[[int, str | None, Row], None]) -> list[Row]:
+    rows: dict[int, Row] = {}
+
+    def so_far() -> list[Row]:
+        return [rows[number] for number in sorted(rows)]
+
+    def complete(keep: Callable[[str, Row], None]) -> list[Row]:
         """Compute the rows that are missing and keep each as it comes; return all in their order."""
         errors = sum(row["error"] is not None for row in rows.values())
         progress(len(rows), len(chosen), errors)
@@ -160,23 +172,35 @@ def certify_many(
             tasks = (chosen[number].task(number) for number in missing)
             with closing(compute_rows(tasks, settings, min(workers, len(missing)), scheduler)) as found:
                 for task, row in found:
-                    keep(task.number, task.fingerprint, row)
                     rows[task.number] = row
+                    keep(task.mark, row)
                     errors += row["error"] is not None
                     progress(len(rows), len(chosen), errors)
-        return [rows[number] for number in range(len(chosen))]
+        return so_far()
 
     if path is None:
-        return complete({}, lambda *_: None)
+        try:
+            return complete(lambda *_: None)
+        except BaseException as error:
+            error.rows = so_far()  # type: ignore[attr-defined]
+            raise
     # A table that is being replaced has a journal.
     refuse_table(path, chosen, restart or journal_path(path).exists())
     with closing(Journal(journal_path(path), chosen, settings, restart)) as journal:
         if journal.new:  # another batch may have written the table, and removed its journal, since it was looked for
             refuse_table(path, chosen, restart)
-        rows = complete(journal.current(), journal.append)
-        write_atomically(path, table_bytes(rows, path.suffix.lower()))
+        rows.update(journal.current())
+        try:
+            table = complete(journal.append)
+        except BaseException as error:
+            error.rows = so_far()  # type: ignore[attr-defined]
+            if rows:
+                with suppress(PTCCError, OSError):  # what stopped the batch is told, not what came of it
+                    write_atomically(path, table_bytes(so_far(), path.suffix.lower()))
+            raise
+        write_atomically(path, table_bytes(table, path.suffix.lower()))
         journal.remove()
-    return rows
+    return table
 
 
 def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool = False) -> int:

@@ -1,8 +1,10 @@
-"""Rows as they come, kept beside the table that they will be, so that an interrupted batch goes on where it was."""
+"""Rows as they come, kept beside the table that they will be, so that an interrupted batch goes on where it was.
+
+A row is kept with the mark of its graph, not with its place: a list that has changed finds the rows of its graphs.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
@@ -11,15 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
-from ptcc_certify.batch.rows import COLUMNS, Row, package_version
+from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
 from ptcc_certify.batch.settings import Settings
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.rationals import shorten
 
 #: What the first line of a journal begins with.
-SCHEMA = "ptcc-batch/1"
+SCHEMA = "ptcc-batch/2"
 #: No integer of a table is that large.
 LARGEST_INTEGER = 2**63 - 1
 
@@ -40,9 +41,9 @@ class Journal:
 
     def __init__(self, path: Path, chosen: Sequence[Source], settings: Settings, restart: bool):
         self.path, self.name, self._chosen = path, shorten(os.fspath(path), 200), chosen
-        header = _header(chosen, settings)
+        header = {"schema": SCHEMA, "version": package_version(), **settings.to_dict()}
         self._file = _opened_alone(path, self.name)
-        self._rows: dict[int, tuple[str | None, Row]] = {}
+        self._rows: dict[str, Row] = {}
         try:
             self._read(header, restart)
         except BaseException:
@@ -55,7 +56,7 @@ class Journal:
         self.new = not data
         whole = data.rfind(b"\n") + 1
         lines = data[:whole].split(b"\n")[:-1]
-        mark = json.dumps({"schema": SCHEMA}).encode()[:-1]  # how the first line begins, of which a part may be missing
+        mark = b'{"schema": "ptcc-batch/'  # how the first line begins, of which a part may be missing
         if data[: len(mark)] != mark[: len(data)]:
             raise ParameterError(f"{self.name}: is no journal of ptcc batch; name another -o")
         whole = 0 if restart else whole
@@ -67,9 +68,9 @@ class Journal:
         self._refuse_other(self._object(1, lines[0]), header)
         for number, line in enumerate(lines[1:], start=2):
             entry = self._object(number, line)
-            if not _intact(entry, header["graphs"]):
+            if not _intact(entry):
                 raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
-            self._rows[entry["number"]] = entry["file"], entry["row"]
+            self._rows[entry["of"]] = entry["row"]
 
     def _object(self, number: int, line: bytes) -> dict[str, Any]:
         try:
@@ -83,20 +84,25 @@ class Journal:
     def _refuse_other(self, old: dict[str, Any], new: dict[str, Any]) -> None:
         mend = "go on with that, name another -o, or drop the journal with --restart"
         for key in new:
-            if key == "list" and old.get(key) != new[key]:
-                raise ParameterError(f"{self.name}: was begun with other graphs; {mend}")
             if old.get(key) != new[key]:
                 before, now = (shorten(json.dumps(x), 60) for x in (old.get(key), new[key]))
                 raise ParameterError(f"{self.name}: was begun with {key} {before}, not {now}; {mend}")
 
     def current(self) -> dict[int, Row]:
-        """Return the rows whose files are what they were."""
-        return {n: row for n, (mark, row) in self._rows.items() if self._chosen[n].fingerprint == mark}
+        """Return the rows of the graphs of the list, by their numbers in it; files must be what they were."""
+        files = {mark.rpartition(" ")[0] for mark in self._rows}
+        found = {}
+        for number, source in enumerate(self._chosen):
+            if source.mark or source.named in files:
+                row = self._rows.get(source.mark or source.task(number).mark)
+                if row is not None:  # under another name, perhaps
+                    found[number] = row | {"graph": printable(source.name)}
+        return found
 
-    def append(self, number: int, fingerprint: str | None, row: Row) -> None:
-        """Keep a row."""
+    def append(self, mark: str, row: Row) -> None:
+        """Keep a row of the graph of this mark."""
         self._empty = False
-        self._write({"number": number, "file": fingerprint, "row": row})
+        self._write({"of": mark, "row": row})
 
     def _write(self, entry: dict[str, Any]) -> None:
         self._file.write(json.dumps(entry, allow_nan=False).encode() + b"\n")
@@ -119,14 +125,12 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not a finite number")
 
 
-def _intact(entry: dict[str, Any], graphs: int) -> bool:
+def _intact(entry: dict[str, Any]) -> bool:
     """Tell whether an entry is one that a batch wrote: somebody may have edited it."""
-    place, fingerprint, row = entry.get("number"), entry.get("file"), entry.get("row")
+    row = entry.get("row")
     return (
-        set(entry) == {"number", "file", "row"}
-        and type(place) is int
-        and 0 <= place < graphs
-        and (fingerprint is None or type(fingerprint) is str)
+        set(entry) == {"of", "row"}
+        and type(entry["of"]) is str
         and type(row) is dict
         and list(row) == list(COLUMNS)
         and type(row["graph"]) is str
@@ -143,22 +147,6 @@ def _fits(value: Any, kind: type) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
     return isinstance(value, int) and abs(value) <= LARGEST_INTEGER
-
-
-def _header(chosen: Sequence[Source], settings: Settings) -> dict[str, Any]:
-    """Return what the first line of a journal holds: everything that the rows depend on."""
-    digest = hashlib.sha256()
-    known: dict[int, str] = {}
-    for source in chosen:
-        mark = ""
-        if isinstance(source.origin, SignedDigraph):
-            mark = source.origin.sha256
-        elif isinstance(source.origin, tuple):
-            ensemble = source.origin[0]
-            mark = known.setdefault(id(ensemble), json.dumps(ensemble.to_dict(), sort_keys=True))
-        digest.update(f"{json.dumps([source.name, mark])}\n".encode())
-    graphs = {"graphs": len(chosen), "list": digest.hexdigest()}
-    return {"schema": SCHEMA, "version": package_version(), **graphs, **settings.to_dict()}
 
 
 def _opened_alone(path: Path, name: str) -> IO[bytes]:

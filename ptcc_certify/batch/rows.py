@@ -18,10 +18,11 @@ balanced            bool   whether the whole graph is balanced
 theorem             text   of a disconnected graph those of its components, each once, joined by ``"; "``
 behaviour           text   likewise
 verdict             text   certified or undecided
-asked               text   holds, refuted or undecided: what was expected, and the least rate; empty if nothing was
+useful              bool   whether the bound leaves at most 1 % at 0.99 T with these gains; empty if undecided
+asked               text   met, refuted or left open: what was expected, and the least rate; empty if nothing was
 rate                float  proved, rounded down; per unit of the stretched clock
-rate_limit          float  proved: no rate exceeds it; rounded up
-tightness           float  rate over rate_limit, rounded down
+upper_bound         float  proved: no rate exceeds it; rounded up
+optimality_ratio    float  rate over upper_bound, rounded down
 fastest             text   class of the Lyapunov function with that rate: paper, perron, lmi or full
 prefactor           float  its prefactor, rounded up
 paper_rate          float  of the paper's own certificate, proved, rounded down
@@ -35,6 +36,7 @@ reaching_time       float  sliding mode: when the last sliding variable is prove
 worst_ratio         float  numerical: largest simulated ``sqrt(V)`` over its bound
 bound_kept          bool   numerical: whether the simulated run exceeds no bound
 obligations         int    statements proved
+cut_off             text   the searches that the time limit ended, which a row of more time may do better
 note                text   what kept the verdict from certified, and other remarks
 seconds             float  that the row took
 error               text   why there is no certificate, in one line; empty if there is one
@@ -58,7 +60,8 @@ from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.io import random_states, read_graph, read_state
 from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.rationals import nearest_float
+from ptcc_certify.rounding import float_down, float_up
+from ptcc_certify.verdict import Expectations
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]
@@ -79,10 +82,11 @@ COLUMNS: dict[str, type] = {
     "theorem": str,
     "behaviour": str,
     "verdict": str,
+    "useful": bool,
     "asked": str,
     "rate": float,
-    "rate_limit": float,
-    "tightness": float,
+    "upper_bound": float,
+    "optimality_ratio": float,
     "fastest": str,
     "prefactor": float,
     "paper_rate": float,
@@ -96,12 +100,11 @@ COLUMNS: dict[str, type] = {
     "worst_ratio": float,
     "bound_kept": bool,
     "obligations": int,
+    "cut_off": str,
     "note": str,
     "seconds": float,
     "error": str,
 }
-#: Entries of the column ``asked``.
-HOLDS, REFUTED, UNDECIDED = "holds", "refuted", "undecided"
 # python-flint keeps one working precision for a whole process: its threads take turns.
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -118,14 +121,14 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
     """
     began = time.perf_counter()
     row: Row = dict.fromkeys(COLUMNS)
-    row["graph"] = _printable(name)
+    row["graph"] = printable(name)
     try:
         with _ONE_AT_A_TIME:
             graph = _graph(name, payload, settings)
             negative = int((graph.sign < 0).sum())
             row |= {"sha256": graph.sha256, "nodes": graph.n_nodes, "edges": graph.n_edges, "negative": negative}
             row["seed"] = settings.seed_of(graph)
-            row |= _columns(_certificate(graph, settings, row["seed"]), settings)
+            row |= _columns(_certificate(graph, settings, row["seed"]))
     except Exception as error:
         row["error"] = explain(error)
     row["seconds"] = round(time.perf_counter() - began, 6)
@@ -134,7 +137,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
 
 def failed_row(name: str, why: str) -> Row:
     """Return the row of a graph of which nothing is known but why."""
-    return dict.fromkeys(COLUMNS) | {"graph": _printable(name), "seconds": 0.0, "error": why}
+    return dict.fromkeys(COLUMNS) | {"graph": printable(name), "seconds": 0.0, "error": why}
 
 
 def package_version() -> str:
@@ -179,6 +182,8 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
         method=settings.method,
         simulation=settings.simulation,
         starts=settings.initial_bound,
+        time_limit=settings.time_limit,
+        expectations=Expectations(settings.expect, settings.min_rate),
         **more,
     )
 
@@ -191,9 +196,9 @@ def _start(start: Start, seed: Any, graph: SignedDigraph) -> Any:
     return [x for (x,) in random_states(seed, graph.n_nodes)]
 
 
-def _columns(certificate: Certificate, settings: Settings) -> Row:
+def _columns(certificate: Certificate) -> Row:
     structure, effort, seen = certificate.structure, certificate.effort, certificate.comparison
-    rate, limit = certificate.rate, certificate.rate_limit
+    rate = certificate.rate
     result, reaching = certificate.outcome, certificate.reaching
     return {
         "connectivity": structure.connectivity,
@@ -206,10 +211,11 @@ def _columns(certificate: Certificate, settings: Settings) -> Row:
         "theorem": "; ".join(dict.fromkeys(claim.theorem for claim in certificate.claims)),
         "behaviour": "; ".join(dict.fromkeys(claim.behaviour for claim in certificate.claims)),
         "verdict": certificate.verdict,
-        "asked": _asked(certificate, settings),
+        "useful": certificate.assessment.useful,
+        "asked": certificate.assessment.asked,
         "rate": _down(rate),
-        "rate_limit": _up(limit),
-        "tightness": None if rate is None or not limit else _down(rate / limit),
+        "upper_bound": _up(certificate.upper_bound),
+        "optimality_ratio": certificate.optimality_ratio,
         "fastest": None if rate is None else certificate.fastest[2],
         "prefactor": _up(certificate.prefactor),
         "paper_rate": _down(certificate.proof.rate),
@@ -222,45 +228,25 @@ def _columns(certificate: Certificate, settings: Settings) -> Row:
         "worst_ratio": None if seen is None else _finite(seen.worst_ratio),
         "bound_kept": None if seen is None else not seen.violated,
         "obligations": len(certificate.obligations),
+        "cut_off": one_line("; ".join(certificate.cut_off)) or None,
         "note": one_line("; ".join(certificate.notes)) or None,
     }
 
 
-def _asked(certificate: Certificate, settings: Settings) -> str | None:
-    """Tell whether what was asked for holds: the behaviour by its theorem, the rate by proof."""
-    if settings.expect is None and settings.min_rate is None:
-        return None
-    if settings.expect is not None and not certificate.structure.holds(settings.expect):
-        return REFUTED
-    if settings.min_rate is None or certificate.constant:
-        return HOLDS
-    if certificate.rate is not None and certificate.rate >= settings.min_rate:
-        return HOLDS
-    limit = certificate.rate_limit
-    return REFUTED if limit is not None and settings.min_rate > limit else UNDECIDED
-
-
 def _down(x: Fraction | None) -> float | None:
     """Round a proved number so that it stays true as a lower bound; None beyond float64."""
-    return _rounded(x, -math.inf)
+    return None if x is None else _finite(float_down(x))
 
 
 def _up(x: Fraction | None) -> float | None:
     """Round a proved number so that it stays true as an upper bound; None beyond float64."""
-    return _rounded(x, math.inf)
-
-
-def _rounded(x: Fraction | None, towards: float) -> float | None:
-    if x is None or not math.isfinite(nearest := nearest_float(x)):
-        return None
-    wrong = nearest > x if towards < 0 else nearest < x
-    return _finite(math.nextafter(nearest, towards)) if wrong else nearest
+    return None if x is None else _finite(float_up(x))
 
 
 def _finite(x: float) -> float | None:
     return float(x) if math.isfinite(x) else None
 
 
-def _printable(name: str) -> str:
+def printable(name: str) -> str:
     """Write as escape codes what is no character in the name of a file, or would break the line of a table."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in name)

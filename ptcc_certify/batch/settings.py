@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import operator
 import os
 from collections.abc import Mapping, Sequence
@@ -13,8 +14,9 @@ from typing import Any, Literal
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.io import by_label
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.rationals import as_fraction, format_exact, nearest_float, shorten
 from ptcc_certify.sharpen import METHODS
 from ptcc_certify.structure import behaviour_name
 
@@ -44,6 +46,7 @@ class Settings:
     duplicates: Literal["refuse", "sum", "last"] = "refuse"
     drop_self_loops: bool = False
     undirected: bool = False
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.protocol, Protocol):
@@ -56,6 +59,8 @@ class Settings:
         sliding = isinstance(self.protocol, SlidingModeProtocol)
         for name in ("x0", "sigma0"):
             start = getattr(self, name)
+            if (labelled := by_label(start, name)) is not None:
+                object.__setattr__(self, name, start := labelled)
             if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
                 raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
             try:
@@ -78,6 +83,14 @@ class Settings:
                 if number <= 0:
                     raise ParameterError(f"{name} is outside its domain; it must be > 0")
                 object.__setattr__(self, name, number)
+        if self.time_limit is not None:
+            try:
+                seconds = nearest_float(as_fraction(self.time_limit, "time_limit"))  # type: ignore[arg-type]
+            except NumberError as error:
+                raise ParameterError(f"time_limit: {error}") from None
+            if not 0 < seconds < math.inf:
+                raise ParameterError("time_limit is outside its domain; it must be > 0, in seconds")
+            object.__setattr__(self, "time_limit", seconds)
         if self.expect is not None:
             try:
                 object.__setattr__(self, "expect", behaviour_name(self.expect))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 from collections.abc import Hashable, Iterable, Sequence
@@ -28,47 +29,40 @@ class Task(NamedTuple):
     number: int
     name: str
     payload: Any
-    fingerprint: str | None
+    mark: str
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
     """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
 
-    Sources of one ``key`` are one graph; their names may differ, and those of different graphs may be equal.
+    Sources of one ``key`` are one graph; their names may differ, and those of different graphs may be equal. ``mark``
+    tells what graph it is, whatever else is in the list; that of a file, ``""`` here, depends on its content.
     """
 
     name: str
     origin: Origin
     key: Hashable
+    mark: str = ""
 
-    def load(self) -> tuple[Any, str]:
-        """Return what a worker makes the graph of, and its fingerprint."""
-        if isinstance(self.origin, str):
-            name, path = shorten(self.name, 200), Path(self.origin)
+    def task(self, number: int) -> Task:
+        """Return the task of this graph, the ``number``-th of a batch; of one that cannot be read with the reason."""
+        if not isinstance(self.origin, str):
+            return Task(number, self.name, self.origin, self.mark)
+        name, path = shorten(self.name, 200), Path(self.origin)
+        try:
             # Whoever opens a pipe may wait for ever; a path that is missing is told by read_bytes.
             if os.path.exists(path) and not os.path.isfile(path):  # noqa: PTH110, PTH113 - those of Path may raise
                 raise FormatError(f"{name}: is no regular file; save the graph as one")
             data = read_bytes(path, name)  # a Path: the file "-" is not standard input
-            return data, hashlib.sha256(data).hexdigest()
-        if isinstance(self.origin, SignedDigraph):
-            return self.origin, self.origin.sha256
-        return self.origin, ""  # the ensemble is among the settings
+        except PTCCError as error:
+            return Task(number, self.name, error, f"{self.named} unreadable")
+        return Task(number, self.name, data, f"{self.named} {hashlib.sha256(data).hexdigest()}")
 
     @property
-    def fingerprint(self) -> str | None:
-        """The fingerprint; None if there is nothing to be read."""
-        try:
-            return self.load()[1]
-        except PTCCError:
-            return None
-
-    def task(self, number: int) -> Task:
-        """Return the task of this graph, the ``number``-th of a batch; of one that cannot be read with the reason."""
-        try:
-            return Task(number, self.name, *self.load())
-        except PTCCError as error:
-            return Task(number, self.name, error, None)
+    def named(self) -> str:
+        """How the mark of a file begins: what is wrong with a file is told with its name."""
+        return f"file {self.name}"
 
 
 def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
@@ -81,7 +75,7 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     given = ensembles = 0
     for source in sources:
         if isinstance(source, SignedDigraph):
-            own_sources = [Source(f"graph#{given}", source, ("graph", given))]
+            own_sources = [Source(f"graph#{given}", source, ("graph", given), _mark_of_graph(source))]
             given += 1
         elif isinstance(source, Ensemble):
             ensembles += 1
@@ -134,4 +128,11 @@ def _file(text: str) -> list[Source]:
 
 
 def _members(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
-    return [Source(f"{name}#{i}", (ensemble, i), (key, i)) for i in range(len(ensemble))]
+    mark = hashlib.sha256(json.dumps(ensemble.to_dict(), sort_keys=True).encode()).hexdigest()
+    return [Source(f"{name}#{i}", (ensemble, i), (key, i), f"ensemble {mark} {i}") for i in range(len(ensemble))]
+
+
+def _mark_of_graph(graph: SignedDigraph) -> str:
+    """Tell a graph from others, and from itself with its nodes in another order, which starts obey."""
+    order = hashlib.sha256(json.dumps(graph.labels).encode()).hexdigest()
+    return f"graph {graph.sha256} {order}"

@@ -92,7 +92,7 @@ def refuse_table(path: Path, chosen: Sequence[Source], replace: bool) -> None:
     if path.exists() and not _is_table(path):
         raise ParameterError(f"{name}: is there already, and no table of ptcc batch; name another file")
     if path.exists() and not replace:
-        raise ParameterError(f"{name}: is there already, complete; name another file, or replace it with --restart")
+        raise ParameterError(f"{name}: is there already; name another file, or replace it with --restart")
 
 
 def _is_table(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
@@ -16,8 +17,8 @@ from ptcc_certify.checker.reading import (
     longest,
     need,
     short,
-    shown,
     sized,
+    triangle,
 )
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import (
@@ -25,14 +26,15 @@ from ptcc_certify.input_bounds import (
     InputBounds,
     Limits,
     PrescribedGain,
+    Reaching,
     Starts,
-    decay_above,
     energy_above,
+    integral_above,
     length_above,
-    limited_rate,
     peak_above,
     root_above,
 )
+from ptcc_certify.rounding import down, up
 from ptcc_certify.spectral_line import nonzero_spectrum_beyond, tractable
 from ptcc_certify.work import spend
 
@@ -79,13 +81,18 @@ class EffortCheck(LyapunovCheck):
         sized(count, own, "the rows of L")
         spend(len(whole) * count, own + each, own + each, "the starts")
         rows = [{j: Fraction(x, self.digraph.unit) for j, x in self.digraph.row(v).items()} for v in range(self.n)]
-        if not self.is_sliding:
-            return InputBounds(rows, self.gain, self.forms, constants, starts)
-        sigma0 = list(self._by_agent(self.data["sigma0"], "sigma0"))
-        center = [x - s for x, s in zip(starts.center, sigma0, strict=True)]
-        sizes = [abs(s) for s in sigma0] if any(sigma0) else []
-        starts = Starts(center, starts.radius, starts.axes)
-        return InputBounds(rows, self.gain, self.forms, constants, starts, sizes, self.gains["T_s"])
+        return InputBounds(
+            rows, self.gain, self.forms, constants, starts, self._reaching() if self.is_sliding else None
+        )
+
+    def _reaching(self) -> Reaching | None:
+        """Return how the sliding variables move, by the reaching times that were verified; None if they do not."""
+        g, sigma0 = self.gains, list(self._by_agent(self.data["sigma0"], "sigma0"))
+        if not any(sigma0):
+            return None
+        times = [z for z, s in zip(self.data["reaching_time"]["z"].values(), sigma0, strict=True) if s]
+        last = None if None in times else max(map(exact, times))
+        return Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], g["mu1"] + g["delta"], last)
 
     def _sized(self, said: Mapping[str, Any], bounds: InputBounds) -> None:
         """Verify how large the input gets."""
@@ -96,14 +103,70 @@ class EffortCheck(LyapunovCheck):
         ):
             self.at = f"effort.{key}"
             if said[key] is not None:
-                step = self.open(kind, "effort", ["z"], witness=True)
-                least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
+                if kind == "input-energy" and isinstance(self._next().get("witness"), dict):
+                    least = self._integral(bounds)
+                else:
+                    step = self.open(kind, "effort", ["z"], witness=True)
+                    least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
                 need(exact(said[key]) >= least, "the bound is not proved")
-                self.done(f"at most {shown(exact(said[key]))}")
+                self.done(f"at most {up(exact(said[key]))}")
         need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
         for k, entry in enumerate(said["residual"]):
             self._limited(entry, f"effort.residual[{k}]", said["peak"], bounds)
         self._disturbed(said["disturbed"], bounds)
+
+    def _integral(self, bounds: InputBounds) -> Fraction:
+        """Verify two Lyapunov inequalities, ``L'W + W L - c W > m I`` on the range of ``L``; return what they bound."""
+        step = self.open("input-energy", "effort", ["p", "m0", "m1"], witness=True)
+        said = fields(step["witness"], ("W0", "W1"), "the witness")
+        need(bounds.reaching is None, "sliding variables move")
+        self._bounded_size(self.n)
+        found = []
+        for key, m, c in (("W0", step["m0"], Fraction(0)), ("W1", step["m1"], 1 / self.gain.k)):
+            rows = triangle(said[key], len(self.moving))
+            W, scale = integers(rows)
+            forms = [self._remainder(W, m * scale, c)] + ([W] if c else [])  # W0 > 0 need not be known: E tends to 0
+            for S in forms:
+                need(m > 0 and self.exact.definite(self._on_range(S)), f"the inequality of {key} is not proved")
+            found.append(bounds.largest_form(rows) / m)
+        even, grown = found
+        return integral_above(self.gain, even, grown, step["p"])
+
+    def _remainder(self, W: Sequence[Sequence[int]], m: Fraction, c: Fraction) -> list[list[int]]:
+        """Return ``W L + L'W - c W - m I`` on the nodes that listen, times a positive integer."""
+        place, n, unit = {v: i for i, v in enumerate(self.moving)}, len(W), self.digraph.unit
+        columns: list[dict[int, int]] = [{} for _ in range(n)]
+        for i, v in enumerate(self.moving):
+            for j, x in self.digraph.row(v).items():
+                if j in place:
+                    columns[place[j]][i] = x
+        spend(n * sum(map(len, columns)), longest(x for row in W for x in row), self.digraph.bits, "W L + L'W")
+        moved = [[sum(row[i] * x for i, x in column.items()) for column in columns] for row in W]
+        scale = math.lcm((c * unit).denominator, (m * unit).denominator)
+        own, diagonal = int(c * unit * scale), int(m * unit * scale)
+        bits, each, ratio = longest(x for row in W for x in row), self.digraph.bits, longest((scale, own, diagonal))
+        sized(n * n, bits + each + ratio, "W L + L'W")
+        spend(2 * n * n, bits + each, ratio, "W L + L'W")
+        return [
+            [scale * (moved[i][j] + moved[j][i]) - own * W[i][j] - diagonal * (i == j) for j in range(n)]
+            for i in range(n)
+        ]
+
+    def _on_range(self, S: list[list[int]]) -> list[list[int]]:
+        """Return a form of ``E``, on the nodes that listen, where ``E`` lives: ``L'S L`` on ``kept``, times a scale.
+
+        Where only single nodes are balanced closed components, ``E`` may be anything on the nodes that listen.
+        """
+        if all(len(group) == 1 or gauge is None for group, gauge in zip(self.closed, self.gauges, strict=True)):
+            return S
+        named = zip(self.moving, (dict(zip(self.moving, row, strict=True)) for row in S), strict=True)
+        F = self._state_form(dict(named))
+        return [[F[i][j] for j in self.kept] for i in self.kept]
+
+    def _next(self) -> dict[str, Any]:
+        """Return the obligation that comes next, not verified."""
+        step = self.data["proof"][self.next] if self.next < len(self.data["proof"]) else None
+        return step if isinstance(step, dict) else {}
 
     def _member(self, k: Any) -> int:
         """Return the number of a member."""
@@ -129,7 +192,7 @@ class EffortCheck(LyapunovCheck):
             holds = not self.moving or (best is not None and exact(best) * k >= 2)
             need(said["bounded"] and holds, "no rate proves that the input stays bounded")
         elif by == "limit":
-            below = limit is not None and exact(limit) * k <= 2
+            below = limit is not None and exact(limit) * k < 2
             need(not said["bounded"] and below, "no limit of rates proves that the input grows")
         else:
             need(by == "spectrum", "another proof")
@@ -152,7 +215,7 @@ class EffortCheck(LyapunovCheck):
                     seen[w] = True
         balanced = [group for group, gauge in zip(self.closed, self.gauges, strict=True) if gauge is not None]
         still = {k for k, nodes in enumerate(components) if nodes in balanced}
-        return nonzero_spectrum_beyond(rows, self.digraph.unit, components, still, line)
+        return nonzero_spectrum_beyond(rows, self.digraph.unit, components, still, line, self.exact.characteristic)
 
     # ------------------------------------------------------------------ starts and constants
 
@@ -202,7 +265,7 @@ class EffortCheck(LyapunovCheck):
                 forms.append((row, q * p))
             failed = self.exact.bounded(P, forms)
             need(failed is None, f"the constant of agent {short(self.labels[failed or 0])} is not proved")
-            self.done(f"at most {shown(max(found[-1] or []))}")
+            self.done(f"at most {up(max(found[-1] or []))}")
         return found
 
     # ------------------------------------------------------------------ peak
@@ -226,7 +289,7 @@ class EffortCheck(LyapunovCheck):
         least = bounds.bound(peak_above, None, self._member(witness["norm"]), step["z"])
         least += root_above(sum((x * x for x in own), Fraction(0)))
         need(exact(said["norm"]) >= least, "the peak of the norm is not proved")
-        self.done(f"at most {shown(max(claimed))}, norm {shown(exact(said['norm']))}")
+        self.done(f"at most {up(max(claimed))}, norm {up(exact(said['norm']))}")
 
     def _own(self) -> list[Fraction]:
         """Return what the sliding-mode protocol adds to the input of every agent at most."""
@@ -273,20 +336,20 @@ class EffortCheck(LyapunovCheck):
         k = self._member(chosen[0])
         form = bounds.form(k)
         need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
-        rate = limited_rate(form.rate, step["growth"], limits, self.gain)
-        need(rate > 0, "the period is too long for the certificate")
         if period is not None:
             self._growth(form, step["growth"])
         clock = exact(said["clock"])
         need(0 <= clock <= limits.clock_below(self.gain), "the clock does not come so far")
-        left = decay_above(rate / 2 * clock) * bounds.start(k)
+        left = bounds.share(k, limits, clock, step["growth"]) * bounds.start(k)
         need(exact(said["norm"]) >= bounds.root_constant(k, None) * left, "what is left is not proved")
         if said["agents"] is not None:
             distance = self.data["lyapunov"]["members"][k]["distance"]
             need(distance is not None, "distances without constants")
             roots = map(root_above, self._each(distance["agents"], "agents"))
+            most = None if period is not None else self._largest_deviation(bounds.starts)
             for label, x, root in zip(self.labels, self._each(said["agents"], "agents"), roots, strict=True):
-                need(x >= root * left, f"what is left of agent {short(label)} is not proved")
+                kept = most is not None and x >= most
+                need(kept or x >= root * left, f"what is left of agent {short(label)} is not proved")
         need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
         if said["largest"] is not None:
             ends = [top * max(bounds.held)] + ([exact(peak["largest"])] if peak is not None else [])
@@ -299,7 +362,15 @@ class EffortCheck(LyapunovCheck):
             need(noise["norm"] >= bounds.root_constant(k, None) * left + whole, "what is left by noise is not proved")
             largest = exact(said["largest"]) + top * max(each)
             need(noise["largest"] >= largest, "the largest input under noise is not proved")
-        self.done(f"||E|| at most {shown(exact(said['norm']))} at the deadline")
+        self.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
+
+    def _largest_deviation(self, starts: Starts) -> Fraction:
+        """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
+        rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(self.projection())]
+        bits = longest(n for row in rows for x in row.values() for n in x.as_integer_ratio())
+        bits += longest(n for x in starts.center for n in x.as_integer_ratio())
+        spend(5 * sum(map(len, rows)) * (2 + len(starts.axes)), bits, bits, "deviations of all starts")
+        return max(map(starts.largest, rows))
 
     def _growth(self, form: Form, growth: Fraction) -> None:
         """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
@@ -350,4 +421,4 @@ class EffortCheck(LyapunovCheck):
             for label, x, row in zip(self.labels, drift, self.projection(), strict=True):
                 moved = delta * self.gain.T * sum(map(abs, row.values()), Fraction(0))
                 need(x >= moved, f"the drift of agent {short(label)} is not proved")
-        self.done(f"for every disturbance within {shown(delta)}")
+        self.done(f"for every disturbance within {down(delta)}")

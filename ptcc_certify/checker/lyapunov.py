@@ -21,12 +21,12 @@ from ptcc_certify.checker.reading import (
     need,
     same,
     short,
-    shown,
     sized,
     triangle,
 )
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import Form
+from ptcc_certify.rounding import down, up
 from ptcc_certify.sparse_definite import residual_definite
 from ptcc_certify.work import fits, spend
 
@@ -87,8 +87,9 @@ class LyapunovCheck(OutcomeCheck):
 
     def _margin(self, S: Sequence[Sequence[Fraction]], m: Fraction) -> bool:
         """Tell whether ``S - m I > 0`` is proved."""
-        n = len(S)
-        return self.exact.definite(integers([[S[i][j] - m * (i == j) for j in range(n)] for i in range(n)])[0])
+        rows, scale = integers(S)
+        p, q = (m * scale).as_integer_ratio()
+        return self.exact.definite([[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(rows)])
 
     # ------------------------------------------------------------------ the paper's own certificate
 
@@ -155,14 +156,14 @@ class LyapunovCheck(OutcomeCheck):
             self._null_vector(*self.blocks[0][1:3])
             need(self.exact.definite(self._decrease(self._deviation()[0], b, self.kept)), "not proved definite")
             need(said["rho_interval"] is None, "an interval without rho")
-            self.done(f"b = {shown(b)}")
+            self.done(f"b = {down(b)}")
             return
         gamma = self._leaders() if self.theorem in ("2.1", "3.1", "5.1", "6.1") else None
         numbers = self.open("margin", "paper", ["m"] if said["rho"] is None else ["m", "rho"])
         need(numbers.get("rho", self.rho) == self.rho, "another rho")
         need(self._margin(self._coupled(gamma, self.rho), numbers["m"]), "not proved definite")
         need(self.paper_rate == numbers["m"] / max(self.weights.values()), "the rate is not m / largest weight")
-        self.done(f"m = {shown(numbers['m'])}, rate {shown(self.paper_rate)}")
+        self.done(f"m = {down(numbers['m'])}, rate {down(self.paper_rate)}")
         self._interval(gamma)
 
     def _deviation(self) -> tuple[Matrix, Fraction]:
@@ -187,7 +188,7 @@ class LyapunovCheck(OutcomeCheck):
                 m = self.open("leader-margin", f"paper.{name}", ["m"])["m"]
                 need(m > 0 and self._margin(self._lyapunov(nodes, weights), m), "not proved definite")
                 gamma.update(dict.fromkeys(nodes, m))
-                self.done(f"m = {shown(m)}")
+                self.done(f"m = {down(m)}")
                 continue
             b = self.open("leader-decrease", f"paper.{name}", ["b"])["b"]
             self._null_vector(nodes, weights)
@@ -196,7 +197,7 @@ class LyapunovCheck(OutcomeCheck):
             least = min(weights)
             phi = self.theorem in ("2.1", "5.1")
             gamma.update({v: b * (w if phi else least) for v, w in zip(nodes, weights, strict=True)})
-            self.done(f"b = {shown(b)}")
+            self.done(f"b = {down(b)}")
         return gamma
 
     def _null_vector(self, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
@@ -255,7 +256,7 @@ class LyapunovCheck(OutcomeCheck):
         for end in ends.values():
             need(end > 0 and self._margin(self._coupled(gamma, end), Fraction(0)), "an end is not proved admissible")
         need(self.rho <= ends.get("exact", math.inf), "rho lies beyond the interval")
-        self.done(", ".join(f"{key} end {shown(end)}" for key, end in ends.items()))
+        self.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))
 
     # ------------------------------------------------------------------ the envelope
 
@@ -325,8 +326,7 @@ class LyapunovCheck(OutcomeCheck):
             named = {v: dict(zip(nodes, row, strict=True)) for v, row in zip(nodes, P, strict=True)}
             form, scale = self._state_form(named), Fraction(common * self.digraph.unit**2)
         else:
-            following = self.data["proof"][self.next] if self.next < len(self.data["proof"]) else None
-            dominates = isinstance(following, dict) and following.get("kind") == "dominance"
+            dominates = self.following() == "dominance"
             need(dominates or not beside(block[shape]), "a side vector where it has no place")
             diagonal = self.files.numbers(block[shape], shape, len(nodes))
             need(diagonal.positive(), "a weight is not positive")
@@ -341,14 +341,14 @@ class LyapunovCheck(OutcomeCheck):
             form, scale = self._weighted(dict(zip(nodes, weights, strict=True)))
         need(self.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
         need(self.exact.definite(self._decrease(form, rate, self.kept)), "not proved definite")
-        self.done(f"b = {shown(rate)}, class {kind}")
+        self.done(f"b = {down(rate)}, class {kind}")
         if kind == "full":
             ends = self.open("prefactor", of, ["lowest", "highest"])
             low, high = ends["lowest"], ends["highest"]
             need(low > 0 and self._margin(rows, low), "the lower end is not proved")
             need(self._margin([[-x for x in row] for row in rows], -high), "the upper end is not proved")
             need(low <= high, "the ends are in the wrong order")
-            self.done(f"{shown(high / low)}")
+            self.done(f"at most {up(high / low)}")
         need(exact(member["prefactor"]) == high / low, "the prefactor is another")
         self.found.append((rate, high / low, kind, "E"))
         full = kind == "full"
@@ -387,7 +387,7 @@ class LyapunovCheck(OutcomeCheck):
                 top, bottom = spare[self.number[v]]
                 left = top * W[v] * D[v] - bottom * pushed[v]
             need(left > 0, "a row is not dominated by its diagonal")
-        self.done(f"b = {shown(rate)}, {len(nodes)} rows")
+        self.done(f"b = {down(rate)}, {len(nodes)} rows")
 
     def _group(self, k: int, weights: Sequence[int], scale: int, said: Any) -> Fraction:
         """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
@@ -540,8 +540,7 @@ class LyapunovCheck(OutcomeCheck):
             sized((len(forms) + 1) * len(row), longest((q,)) + longest(row), "distances")
             spend(len(row), longest((q,)), longest(row), "distances")
             forms.append(([q * x for x in row], q * p))
-        need(self.exact.definite(S), "V is not proved definite")
-        failed = self.exact.bounded(S, forms)
+        failed = self.exact.bounded(S, forms)  # proves V > 0 besides
         need(failed is None, f"the constant of agent {short(self.labels[failed or 0])} is not proved")
         p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
         bits, ratio = max(longest(x for row in part for x in row) for part in (S, gram)), longest((p, q))
@@ -549,17 +548,23 @@ class LyapunovCheck(OutcomeCheck):
         spend(2 * len(S) ** 2, bits, ratio, "the distance of the norm")
         N = [[p * s - q * g for s, g in zip(r, t, strict=True)] for r, t in zip(S, gram, strict=True)]
         need(p >= 0 and self.exact.definite(N), "the constant of the norm is not proved")
-        self.done(f"norm {shown(exact(said['norm']))}")
+        self.done(f"norm at most {up(exact(said['norm']))}")
 
     @cached_property
     def _beyond(self) -> tuple[Matrix, int, Matrix]:
         """``D = I - Q`` on the columns ``kept``, times a scale; the scale; ``D'D``."""
-        Q = self.projection()
-        D, scale = integers([[(i == j) - Q[i].get(j, Fraction(0)) for j in self.kept] for i in range(self.n)])
-        columns, bits = list(zip(*D, strict=True)), longest(x for row in D for x in row)
-        sized(len(columns) ** 2, 2 * bits, "D'D")
-        spend(len(columns) ** 2 * self.n, bits, bits, "D'D")
-        return D, scale, [[sum(map(mul, x, y)) for y in columns] for x in columns]
+        place, Q = {v: j for j, v in enumerate(self.kept)}, self.projection()
+        rows = [{j: (i == j) - Q[i].get(j, Fraction(0)) for j in {i, *Q[i]} & place.keys()} for i in range(self.n)]
+        (flat,), scale = integers([[x for row in rows for x in row.values()]])
+        left, D = iter(flat), [[0] * len(place) for _ in rows]
+        for full, row in zip(D, rows, strict=True):
+            for j in row:
+                full[place[j]] = next(left)
+        columns, bits = list(zip(*D, strict=True)), longest(flat)
+        sized(len(columns) ** 2 + self.n * len(columns), 2 * bits, "D'D")
+        spend(len(columns) ** 2 * self.n // 2, bits, bits, "D'D")
+        half = [[sum(map(mul, x, y)) for y in columns[: i + 1]] for i, x in enumerate(columns)]
+        return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
 
     def rates(self) -> None:
         """Verify that the rates and the prefactor are those of the members."""
@@ -578,19 +583,42 @@ class LyapunovCheck(OutcomeCheck):
             need(exact(said["value"]) == best[1] and said["of"] == f"||{best[3]}||^2", "not that of the largest rate")
 
     def limit(self) -> None:
-        """Verify that no rate exceeds the limit: ``H B + B'H > 0`` gives ``H`` and ``B`` the same inertia."""
+        """Verify the upper bound on every rate: by the mean nonzero eigenvalue of a strong component, or by inertia."""
         if self.data["rates"]["limit"] is None:
             return
-        limit = self.open("rate-limit", "rates", ["limit"], witness=True)
+        mean = self.following() == "rate-mean"
+        limit = self.open("rate-mean" if mean else "rate-limit", "rates", ["limit"], witness=True)
         need(exact(self.data["rates"]["limit"]) == limit["limit"], "the limit is another")
-        said = fields(limit["witness"], ("nodes", "lower_triangle", "vectors"), "the witness")
+        if mean:
+            self._mean(limit["limit"], fields(limit["witness"], ("node",), "the witness")["node"])
+        else:
+            self._inertia(limit["limit"], limit["witness"])
+        self.done(f"no rate exceeds {up(limit['limit'])}")
+
+    def _strong_component(self, v: int) -> tuple[list[int], bool]:
+        """Return the strong component of a node, and whether it is closed and balanced, so that 0 is an eigenvalue."""
+        there, back = (self.digraph.reached([v], back) for back in (False, True))
+        own = [u for u, both in enumerate(zip(there, back, strict=True)) if all(both)]
+        return own, self.number[v] >= 0 and self.gauges[self.number[v]] is not None
+
+    def _mean(self, limit: Fraction, node: Any) -> None:
+        """Verify that the limit is twice the mean of the nonzero eigenvalues, whose sum is the trace."""
+        (v,) = self._numbers([node], "node")
+        own, still = self._strong_component(v)
+        trace = Fraction(sum(self.digraph.diagonal[u] for u in own), self.digraph.unit)
+        need(v == own[0], "not the first node of a strong component")
+        need(len(own) > still and limit * (len(own) - still) == 2 * trace, "not twice the mean nonzero eigenvalue")
+
+    def _inertia(self, limit: Fraction, witness: Any) -> None:
+        """Verify ``H B + B'H > 0``, which gives ``H`` and ``B = A - (limit/2) I`` the same inertia."""
+        said = fields(witness, ("nodes", "lower_triangle", "vectors"), "the witness")
         nodes = self._numbers(said["nodes"], "nodes")
-        there, back = (self.digraph.reached(nodes[:1], back) for back in (False, True))
-        own = [v for v, both in enumerate(zip(there, back, strict=True)) if all(both)]
-        need(nodes == own and bool(nodes), "the nodes are not a strong component")
+        need(bool(nodes), "no nodes")
+        own, still = self._strong_component(nodes[0])
+        need(nodes == own, "the nodes are not a strong component")
         self._bounded_size(len(nodes))
         H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
-        p, q = (limit["limit"] / 2 * self.digraph.unit).as_integer_ratio()
+        p, q = (limit / 2 * self.digraph.unit).as_integer_ratio()
         bits, entry = longest(x for row in H for x in row), self.digraph.bits + longest((p, q))
         sized(len(nodes) ** 2, bits + entry, "H B")
         spend(2 * len(nodes) ** 2, entry, entry, "H B")
@@ -603,7 +631,6 @@ class LyapunovCheck(OutcomeCheck):
         ]
         need(self.exact.definite(S), "not proved definite")
         # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
-        still = nodes in self.closed and self.gauges[self.closed.index(nodes)] is not None
         vectors = [
             [exact(x) for x in entries(row, "a vector", len(nodes))]
             for row in entries(said["vectors"], "vectors", 2 if still else 1)
@@ -612,7 +639,6 @@ class LyapunovCheck(OutcomeCheck):
         spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
         below = product(X, product(H, [list(column) for column in zip(*X, strict=True)]))
         need(self.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
-        self.done(f"no rate exceeds {shown(limit['limit'])}")
 
 
 def _length(values: Iterable[Fraction]) -> int:

@@ -28,6 +28,10 @@ OBLIGATIONS = {
     "prefactor": ("lowest I < P < highest I", "Rayleigh quotient"),
     "distance": ("(x_k - (Q x)_k)^2 <= c_k V for every agent, ||x - Q x||^2 <= c V", "Schur complement"),
     "rate-limit": ("H B + B'H > 0, B = A - (limit/2) I, H negative on the vectors", "inertia of Lyapunov equations"),
+    "rate-mean": (
+        "limit = 2 trace(A)/r, A the block of L of a strong component, r of whose eigenvalues are not 0",
+        "the least real part is not above the mean",
+    ),
     "sliding-bound": ("mu1 > delta, mu2, mu3 > 0, so the bound holds and sigma = 0 from T_r on", "Proposition 1"),
     "reaching-time": ("|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at z_k", "comparison with the adversary"),
     "input-threshold": (
@@ -36,7 +40,7 @@ OBLIGATIONS = {
     ),
     "input-constants": ("e_k^2 <= c_k E'P E for every agent", "Schur complement"),
     "input-peak": ("gain |e_k| <= peak_k up to the deadline", "|e_k| <= min(held_k, sqrt(c_k V(0)) e^(-rate s / 2))"),
-    "input-energy": ("int ||gain E||^2 dt <= energy", "the same in norm"),
+    "input-energy": ("int ||gain E||^2 dt <= energy", "the same in norm, or two Lyapunov equations"),
     "input-length": ("int ||gain E|| dt <= path length", "the same in norm"),
     "input-sliding": ("|u_k - gain e_k| <= mu1 + (mu2 + mu3 kappa/T_r) |sigma_k(0)|", "Proposition 1"),
     "limited-gain": ("what is left at the deadline if the gain is capped, stopped or held", "Lyapunov decrease"),

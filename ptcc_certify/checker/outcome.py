@@ -20,12 +20,12 @@ from ptcc_certify.checker.reading import (
     need,
     same,
     short,
-    shown,
     sized,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.enclosure import decay_integrals_below
+from ptcc_certify.rounding import up
 from ptcc_certify.work import spend
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -145,7 +145,7 @@ class OutcomeCheck(StructureCheck):
         elif start is None:
             self.done("influence of leader groups")
         else:
-            self.done(f"enclosed, radius at most {shown(widest)}")
+            self.done(f"enclosed, radius at most {up(widest)}")
 
     def projection(self) -> list[dict[int, Fraction]]:
         """Return the rows of ``Q``, which are exact."""

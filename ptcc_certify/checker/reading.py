@@ -8,7 +8,6 @@ import math
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from decimal import Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -191,17 +190,6 @@ def short(text: str, limit: int = 40) -> str:
     """Return a text fit for a message: printable, and cut."""
     clean = "".join(c if c.isprintable() else "?" for c in text[: limit + 1])
     return clean if len(clean) <= limit else clean[:limit] + "..."
-
-
-def shown(x: Fraction) -> str:
-    """Return six digits of a rational of any size.
-
-    Examples
-    --------
-    >>> shown(Fraction(1, 3)), shown(Fraction(10) ** 500)
-    ('0.333333', '1.00000e+500')
-    """
-    return f"{Context(prec=6).divide(Decimal(x.numerator), Decimal(x.denominator)):g}"
 
 
 def need(holds: bool, reason: str) -> None:

@@ -53,6 +53,11 @@ class StructureCheck:
         found: dict[str, Any] = {k: exact(x) for k, x in fields(step["numbers"], numbers, "numbers").items()}
         return {**found, "witness": step["witness"]}
 
+    def following(self) -> Any:
+        """Return the kind of the next obligation, which is not verified yet; None if there is none."""
+        step = self.data["proof"][self.next] if self.next < len(self.data["proof"]) else None
+        return step.get("kind") if isinstance(step, dict) else None
+
     def done(self, detail: str) -> None:
         """Close the obligation that was opened last."""
         kind, _, of = self.at.partition(" of ")

@@ -7,12 +7,14 @@ the graph; so a rule of the reader holds for all formats, and a refusal names fi
 from ptcc_certify.io.files import MAX_BYTES, MAX_LINE, write_atomically
 from ptcc_certify.io.graph_files import read_graph, write_graph
 from ptcc_certify.io.matrices import MAX_NODES
-from ptcc_certify.io.state import random_states, read_state
+from ptcc_certify.io.state import by_label, in_node_order, random_states, read_state
 
 __all__ = [
     "MAX_BYTES",
     "MAX_LINE",
     "MAX_NODES",
+    "by_label",
+    "in_node_order",
     "random_states",
     "read_graph",
     "read_state",

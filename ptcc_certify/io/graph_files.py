@@ -38,7 +38,7 @@ def read_graph(
     weight, sign, rating, value, w) is a header, and columns are then found by name. Columns beyond the three are
     ignored, which ``graph.read["notes"]`` says. **GraphML, GML and Pajek** edges need an attribute ``weight``
     (or ``sign``), in Pajek the third column. A **matrix** (Matrix Market, ``.npz``, ``.npy``, ``.mat``) has
-    listeners as rows: entry (k, l) is what k makes of l.
+    listeners as rows unless ``orientation`` says otherwise: entry (k, l) is what k makes of l.
 
     Weights are exact. In an edge list ``0.1``, ``1/3`` and ``0x1p-2`` are the numbers that they say. GraphML, GML,
     Pajek and Matrix Market go through float64, and a float is then the shortest decimal that names it: ``0.1`` is
@@ -51,7 +51,8 @@ def read_graph(
         ``"-"`` is standard input. The ending tells the format, its content gzip; anything else is an edge list.
     orientation : {"information", "listens"}, optional
         Does a row ``a,b,w`` say that information flows a -> b (the default), or that a listens to b, as in trust
-        and rating data? A matrix needs no orientation, and none may be given.
+        and rating data? Entry (k, l) of a matrix is such a row ``k,l,w``, where k listens to l by default; a matrix
+        of networkx needs ``"information"``.
     duplicates : {"refuse", "sum", "last"}
         What becomes of two rows for the same ordered pair.
     drop_self_loops, undirected : bool
@@ -63,7 +64,7 @@ def read_graph(
     Returns
     -------
     SignedDigraph
-        ``graph.read`` tells how the file was read: ``orientation`` ("matrix" for a matrix), ``duplicates``
+        ``graph.read`` tells how the file was read: ``orientation`` ("matrix" for one whose rows listen), ``duplicates``
         ("refused", "sum" or "last"), ``self_loops`` ("refused" or "dropped N"), ``undirected`` and ``notes``.
 
     Raises
@@ -72,7 +73,7 @@ def read_graph(
         The file cannot be opened, is no file of its format, or is no signed digraph: a weight that is not a finite
         number, a weight 0 (an unknown sign is not an edge), a repeated edge, a self-loop, no node at all.
     ParameterError
-        An option has an unknown value, or an orientation is given for a matrix.
+        An option has an unknown value.
 
     Examples
     --------
@@ -90,10 +91,8 @@ def read_graph(
     _refuse_unknown("orientation", orientation or "information", ("information", "listens"))
     _refuse_unknown("duplicates", duplicates, ("refuse", "sum", "last"))
     _refuse_unknown("format", ending if format else "csv", _READERS)
-    if ending in _MATRICES and orientation is not None:
-        raise ParameterError(f"{name}: a matrix needs no orientation, for its rows are the listeners; leave it out")
     rows = _READERS.get(ending, read_edge_list)(read_bytes(path, name), name)
-    way = "matrix" if ending in _MATRICES else orientation or "information"
+    way = "matrix" if ending in _MATRICES and orientation != "information" else orientation or "information"
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
 
 

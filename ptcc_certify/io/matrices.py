@@ -1,4 +1,4 @@
-"""Adjacency matrices, rows are listeners: Matrix Market, NumPy's ``.npy`` and ``.npz``, MATLAB's ``.mat``.
+"""Adjacency matrices: Matrix Market, NumPy's ``.npy`` and ``.npz``, MATLAB's ``.mat``.
 
 SciPy's readers (``mmread``, ``load_npz``, ``loadmat``) crash the process on damaged files, and ``mmread`` reads
 ``1/3`` and ``1,5`` as 1; its sparse arrays trust an ``indptr`` that ends below 0. So only NumPy reads here.
@@ -48,12 +48,12 @@ def _dense(matrix: Array, labels: Array | None, name: str) -> Rows:
     return _entries(target, source, matrix[target, source], matrix.shape[0], labels, name)
 
 
-def _entries(target: Array, source: Array, entries: Array, n: int, labels: Array | None, name: str) -> Rows:
-    """Turn the entries of an n x n matrix into rows; entry (k, l) is the edge l -> k."""
-    target, source = (index.astype(np.int64, casting="same_kind") for index in (target, source))
-    if not target.shape == source.shape == entries.shape == (entries.size,):
+def _entries(row: Array, column: Array, entries: Array, n: int, labels: Array | None, name: str) -> Rows:
+    """Turn the entries of an n x n matrix into rows ``k, l, entry``."""
+    row, column = (index.astype(np.int64, casting="same_kind") for index in (row, column))
+    if not row.shape == column.shape == entries.shape == (entries.size,):
         raise ValueError("its indices and entries differ in number")
-    if entries.size and (min(target.min(), source.min()) < 0 or max(target.max(), source.max()) >= n):
+    if entries.size and (min(row.min(), column.min()) < 0 or max(row.max(), column.max()) >= n):
         raise ValueError(f"an entry lies outside the {n} x {n} matrix")
     if labels is None:
         labels = np.arange(1, n + 1)
@@ -61,7 +61,7 @@ def _entries(target: Array, source: Array, entries: Array, n: int, labels: Array
         raise FormatError(f"{name}: labels must be {n} texts or integers")
     names = [label.decode("utf-8") if isinstance(label, bytes) else str(label) for label in labels.tolist()]
     weights, codes = np.unique(entries, return_inverse=True)
-    return Rows(names, source, target, weights, codes, lambda e: f"row {target[e] + 1}, column {source[e] + 1}")
+    return Rows(names, row, column, weights, codes, lambda e: f"row {row[e] + 1}, column {column[e] + 1}")
 
 
 def _columns(start: Array, n: int, size: int) -> Array:

@@ -54,7 +54,7 @@ def graph_of(
         raise FormatError(f'{name}: two nodes have the label "{shorten(label)}"; rename one')
     if rows.undirected and not undirected:
         raise FormatError(f"{name}: {rows.undirected} means undirected edges; let each go both ways with --undirected")
-    draft = _Draft(rows, name, listens=orientation == "listens")
+    draft = _Draft(rows, name, listens=orientation != "information")
     loops = draft.drop_self_loops(drop_self_loops)
     draft.refuse_zeros("weight 0")
     notes = draft.merge_duplicates(duplicates, undirected)

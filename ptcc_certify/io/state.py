@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError
-from ptcc_certify.graph import SignedDigraph
+from ptcc_certify.graph import SignedDigraph, labels_beside
 from ptcc_certify.io.edge_list import column, records
 from ptcc_certify.io.files import name_and_ending, read_bytes
 from ptcc_certify.rationals import parse_exact, shorten
@@ -65,6 +65,74 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
         size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
         raise ParameterError(f"{place}: no such file, and {size}; give one for each of {_some(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
+
+
+def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
+    """Put one entry for each node in node order: by label where there are labels, otherwise as they come.
+
+    Every state that a user hands in passes here, so that a label counts wherever there is one.
+
+    Parameters
+    ----------
+    values : mapping of label to entry, pandas Series or DataFrame, or anything else
+        A Series has its labels in its index, a DataFrame has one row for each node; labels are compared as texts.
+        Anything else is returned as it is.
+    graph : SignedDigraph
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    list, or ``values`` as they are
+
+    Raises
+    ------
+    ParameterError
+        A node has no entry, or two; or a label is that of no node.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> in_node_order({"b": 2, "a": 1}, graph), in_node_order([1, 2], graph)
+    ([1, 2], [1, 2])
+    """
+    found = by_label(values, name)
+    if found is None:
+        return values
+    missing = [label for label in graph.labels if label not in found]
+    unknown = [label for label in found if label not in graph.index]
+    if missing or unknown:
+        wrong = [f"no value for {_some(missing)}"] * bool(missing)
+        wrong += [f"{_some(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
+        mend = "give each node one value, or values without labels in node order"
+        raise ParameterError(f"the start {name}: {', and '.join(wrong)}; {mend}")
+    return [found[label] for label in graph.labels]
+
+
+def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
+    """Return the entries of a mapping, Series or DataFrame by label; None of what has no labels.
+
+    Raises
+    ------
+    ParameterError
+        Two labels are written alike.
+
+    Examples
+    --------
+    >>> by_label({1: 5, 2: 3}), by_label([5, 3])
+    ({'1': 5, '2': 3}, None)
+    """
+    if isinstance(values, Mapping):
+        labels, entries = [str(label) for label in values], list(values.values())
+    elif (beside := labels_beside(values)) is not None:
+        labels, entries = beside, list(values.to_numpy())
+    else:
+        return None
+    found = dict(zip(labels, entries, strict=True))
+    if len(found) < len(labels):
+        twice = next(label for label in found if labels.count(label) > 1)
+        raise ParameterError(f"the start {name} has two values for node {shorten(twice)}; keep one")
+    return found
 
 
 def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]:

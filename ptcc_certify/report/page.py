@@ -45,8 +45,9 @@ from ptcc_certify.report.texts import (
     rational,
     subscripts,
 )
+from ptcc_certify.rounding import up
 from ptcc_certify.saved import RejectedCertificate, SavedCertificate
-from ptcc_certify.summary import remarks_on, structure_text, up
+from ptcc_certify.summary import remarks_on, structure_text
 from ptcc_certify.theorems import THEOREMS
 from ptcc_certify.trajectory import SlidingTrajectory
 
@@ -186,9 +187,13 @@ class _Page:
         count = f"{len(report.steps)} obligation(s) in exact arithmetic ({escaped(report.arithmetic)})"
         if self.saved.verdict == "certified":
             said = f"The independent check verified {count}, without a solver. What follows from them is proved."
-            return verdict_box("good", "\u2714", "CERTIFIED", said)
+            found = self.saved.assessment
+            fine = found.exit_code == 0 and found.useful
+            kind, mark, word = ("good", "\u2714", "CERTIFIED") if fine else ("doubt", "!", found.word.upper())
+            return verdict_box(kind, mark, word, f"{said} Verdict: {escaped(found.text)}.")
         missing = self.missing()
-        said = f"The independent check verified {count}; what these state is proved. But {missing}."
+        said = f"The independent check verified {count}; what these state is proved. But {missing}. "
+        said += f"Verdict: {escaped(self.saved.assessment.text)}."
         return verdict_box("doubt", "?", "UNDECIDED", said)
 
     def missing(self) -> str:
@@ -323,11 +328,12 @@ class _Page:
             return f"<p>No agent listens to another: each keeps {self.kept()}, and there is nothing to decay.</p>"
         if saved.rate is None:
             return "<p>No rate of decay was proved.</p>"
-        limit, rows = saved.rate_limit, []
+        limit, rows = saved.upper_bound, []
         rows.append(("Proved rate", f"{below(saved.rate)} per unit of the stretched clock s, rounded down"))
         if limit is not None:
             rows.append(("No rate exceeds", f"{above(limit, 8)}, proved, rounded up"))
-            rows.append(("Tightness", f"at least {below(saved.rate / limit, 4)} (proved rate over that limit)"))
+            ratio = f"at least {below(saved.rate / limit, 4)} (proved rate over that upper bound)"
+            rows.append(("Optimality ratio", ratio))
         if saved.prefactor is not None:
             z = "E" if saved.document["prefactor"]["of"] == "||E||^2" else "\u03b5"
             rows.append(("Prefactor at that rate", f"{above(saved.prefactor, 4)} of \u2016{z}\u2016\u00b2"))

@@ -138,14 +138,16 @@ def _decay(saved: SavedCertificate, T: str) -> list[str]:
         rf"s(t) = \rho_{{1}} t + \rho_{{2}} \kappa \ln\frac{{{T}}}{{{T} - t}}.",
         r"\end{gather*}",
     ]
-    if saved.rate_limit is not None:
-        lines.append(f"The rate of no Lyapunov function exceeds ${_above(saved.rate_limit, 8)}$.")
+    if saved.upper_bound is not None:
+        lines.append(f"The rate of no Lyapunov function exceeds ${_above(saved.upper_bound, 8)}$.")
     if saved.direct:
         shares = ((f, saved.envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS)
         left = ", ".join(f"${_above(share, 2)}$ at $t = {f}\\,{whole}$" for f, share in shares)
         name = "E" if saved.envelope.coordinates == "E" else r"\varepsilon"
         norm = rf"$\|{name}(0)\|$" + ("" if name == z else f", {said[name].rstrip(',')},")
         lines.append(f"Of {norm} at most the following share is left: {left}.")
+    if saved.assessment.useful is False:
+        lines.append("With these gains the bound says little by the deadline.")
     if not saved.direct and saved.reaching is not None:
         late = sum(r.z is None for r in saved.reaching)
         last = max((r.time for r in saved.reaching if r.z is not None), default=0.0)

@@ -15,9 +15,9 @@ from fractions import Fraction
 from ptcc_certify.effort import Limited, Starts
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.rationals import format_exact, nearest_float, writable
+from ptcc_certify.rounding import down, up
 from ptcc_certify.saved import SavedCertificate
 from ptcc_certify.structure import Claim, ClosedComponent
-from ptcc_certify.summary import down, up
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
@@ -242,8 +242,8 @@ def caveats(saved: SavedCertificate, no_run: str) -> list[str]:
             said.append("The input stays bounded, but by which number is not proved.")
     if saved.final_state is not None and any(radius for _, radius in saved.final_state):
         said.append("The final state is proved to lie in the intervals, and no nearer.")
-    if saved.rate is not None and saved.rate_limit is None:
-        said.append("No limit of rates is proved: a faster certificate may exist.")
+    if saved.rate is not None and saved.upper_bound is None:
+        said.append("No upper bound on the rate is proved: a faster certificate may exist.")
     if len(saved.claims) > 1:
         said.append(
             "The article leaves disconnected graphs out; components are treated one by one, by the same proofs."

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from ptcc_certify.checker import Statement
 from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
 from ptcc_certify.structure import ClosedComponent, Structure
+
+if TYPE_CHECKING:
+    import flint
 
 Matrix = list[list[Fraction]]
 #: Significant bits to which the search's floats are rounded before anything is proved about them.
@@ -255,12 +258,22 @@ def transpose(A: Matrix) -> Matrix:
 
 def multiply(A: Matrix, B: Matrix) -> Matrix:
     """Return ``A B``, formed in integers over common denominators."""
-    a, b = (math.lcm(*(x.denominator for row in M for x in row)) for M in (A, B))
-    numerators = [
-        np.array([[x.numerator * (scale // x.denominator) for x in row] for row in M], dtype=object)
-        for M, scale in ((A, a), (B, b))
-    ]
-    return [[Fraction(x, a * b) for x in row] for row in (numerators[0] @ numerators[1]).tolist()]
+    (left, a), (right, b) = integer_matrix(A), integer_matrix(B)
+    return [[Fraction(x, a * b) for x in row] for row in integer_rows(left * right)]
+
+
+def integer_matrix(M: Sequence[Sequence[Fraction]]) -> tuple[flint.fmpz_mat, int]:
+    """Return a rational matrix as integers over its common denominator, and that."""
+    import flint
+
+    scale = math.lcm(*{x.denominator for row in M for x in row})
+    whole = [[x.numerator * (scale // x.denominator) for x in row] for row in M]
+    return flint.fmpz_mat(len(M), len(M[0]) if M else 0, [x for row in whole for x in row]), scale
+
+
+def integer_rows(M: flint.fmpz_mat) -> list[list[int]]:
+    """Return the rows of an integer matrix."""
+    return [[int(x) for x in row] for row in M.tolist()]
 
 
 def diagonal_matrix(weights: Iterable[Fraction]) -> Matrix:

@@ -1,0 +1,116 @@
+"""Work in a child process, which a time limit or Ctrl-C ends even where native code holds the interpreter."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from lmi.deadline import checkpoint, seconds_left
+from lmi.errors import LMIError
+
+_HEAD = 8
+_ITEM, _ERROR, _END = range(3)
+
+
+def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
+    """Yield what ``work()`` yields, computed in a child process.
+
+    The child is a copy of this process, so that ``work`` may be any callable; what it yields is handed over by pickle.
+    Where processes cannot be copied safely (elsewhere than on Linux, or in another thread than the main one) the work
+    is done here, and the limit waits until native code returns.
+
+    Parameters
+    ----------
+    work : callable
+        Without arguments, returning an iterable.
+
+    Yields
+    ------
+    object
+        As soon as it is there: what came before a limit is kept.
+
+    Raises
+    ------
+    OutOfTime
+        The time limit is reached (:func:`lmi.time_limit`).
+    LMIError
+        The child died.
+    Exception
+        What ``work`` raised.
+
+    Examples
+    --------
+    >>> list(apart(lambda: (n * n for n in range(3))))
+    [0, 1, 4]
+    """
+    checkpoint()
+    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+        yield from work()
+        return
+    here, there = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a solver keeps: the child uses none
+        child = os.fork()
+    if child == 0:
+        _work(work, here, there)
+    os.close(there)
+    try:
+        while True:
+            kind, value = _received(here)
+            if kind == _END:
+                return
+            if kind == _ERROR:
+                raise value
+            yield value
+    finally:
+        os.close(here)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+
+def _work(work: Callable[[], Iterable[Any]], here: int, there: int) -> None:
+    """Do the work in the child, send what it yields, and leave without cleaning up what belongs to the parent."""
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told, and ends the child
+        os.close(here)
+        try:
+            for value in work():
+                _send(there, _ITEM, value)
+            _send(there, _END, None)
+        except BaseException as error:
+            _send(there, _ERROR, error)
+    finally:
+        os._exit(0)
+
+
+def _send(there: int, kind: int, value: Any) -> None:
+    content = pickle.dumps((kind, value))
+    content = len(content).to_bytes(_HEAD, "little") + content
+    while content:
+        content = content[os.write(there, content) :]
+
+
+def _received(here: int) -> tuple[int, Any]:
+    size = int.from_bytes(_bytes(here, _HEAD), "little")
+    return pickle.loads(_bytes(here, size))  # noqa: S301  from the process that was started above
+
+
+def _bytes(here: int, count: int) -> bytes:
+    """Read so many bytes before the time limit."""
+    content = b""
+    while len(content) < count:
+        checkpoint()
+        left = seconds_left()
+        if select.select([here], [], [], min(left, 3600.0))[0]:
+            part = os.read(here, min(count - len(content), 1 << 20))
+            if not part:
+                raise LMIError("its process ended without an answer")
+            content += part
+    return content

@@ -1,0 +1,94 @@
+"""How long a search may take: an instant that loops ask about, and that ends them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from lmi.errors import OutOfTime
+
+_until: ContextVar[float] = ContextVar("until", default=math.inf)
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Let the searches and proofs inside take so long at most, and no longer than the limits around them.
+
+    Parameters
+    ----------
+    seconds : float
+        Of wall time; infinity for no limit.
+
+    Returns
+    -------
+    context manager
+
+    Raises
+    ------
+    OutOfTime
+        Raised inside, at the next step of a search, once the time is over.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import lmi
+    >>> try:
+    ...     with time_limit(0):
+    ...         lmi.diagonal_lyapunov(np.eye(50))
+    ... except lmi.OutOfTime as error:
+    ...     print(error)
+    the time limit is reached
+    """
+    token = _until.set(min(_until.get(), time.monotonic() + seconds))
+    try:
+        yield
+    finally:
+        _until.reset(token)
+
+
+@contextmanager
+def share_of_time(share: float, name: str, cut_off: list[str]) -> Iterator[None]:
+    """Give a part of the work a share of the time that is left, and note its name where that was not enough.
+
+    Parameters
+    ----------
+    share : float
+        Between 0 and 1.
+    name : str
+    cut_off : list of str
+        To which the name is appended.
+
+    Examples
+    --------
+    >>> from lmi.deadline import checkpoint
+    >>> cut_off = []
+    >>> with time_limit(0), share_of_time(0.5, "a search", cut_off):
+    ...     checkpoint()
+    >>> cut_off
+    ['a search']
+    """
+    try:
+        with time_limit(share * max(seconds_left(), 0.0)):
+            yield
+    except OutOfTime:
+        cut_off.append(name)
+
+
+def seconds_left() -> float:
+    """Return how many seconds are left, infinity without a limit.
+
+    Examples
+    --------
+    >>> seconds_left()
+    inf
+    """
+    return _until.get() - time.monotonic()
+
+
+def checkpoint() -> None:
+    """Raise :class:`lmi.OutOfTime` if no time is left."""
+    if seconds_left() <= 0:
+        raise OutOfTime("the time limit is reached")
