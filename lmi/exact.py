@@ -35,6 +35,8 @@ IntegerRows = Sequence[Sequence[int]]
 RESIDUAL_ROWS = 20
 #: Above this many rows a looser rate by the residual test is preferred to the elimination.
 ELIMINATION_ROWS = 60
+#: Entries longer than these bits go to the residual test whatever the rows.
+LONG_BITS = 2000
 
 
 #: Sums of integers up to this size are exact in float64, and with :data:`INT64_SAFE` in int64.
@@ -177,12 +179,21 @@ def prove_positive_definite(S: Any) -> DefinitenessProof:
     else:
         scaled = _scaled_array(array)
     n = len(S)
-    if n > RESIDUAL_ROWS and scaled is not None:
+    if scaled is not None and (n > RESIDUAL_ROWS or (rows is not None and _long(rows))):
         if (witness := _residual_witness(scaled)) is not None:
             return DefinitenessProof(True, n, witness=witness)
         if n > ELIMINATION_ROWS and (direction := _refuting_direction(scaled)) is not None:
             return DefinitenessProof(False, n, direction=direction)
     return _eliminate(_scaled_lower_triangle(_rationals(S)) if rows is None else rows)
+
+
+def _bits(x: Fraction | int) -> int:
+    return max(x.numerator.bit_length(), x.denominator.bit_length())
+
+
+def _long(rows: list[list[int]]) -> bool:
+    """Tell whether entries are so long that the residual test costs less than elimination."""
+    return max((x.bit_length() for row in rows for x in row), default=0) > LONG_BITS
 
 
 def _eliminate(rows: list[list[int]]) -> DefinitenessProof:
@@ -574,9 +585,10 @@ def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess
         return [[q * x - p * z for x, z in zip(*rows, strict=True)] for rows in zip(*whole, strict=True)]
 
     candidates = [b for loss in LOSSES if (b := Fraction(guess - abs(guess) * loss)) * Fraction(guess) > 0]
-    if n > RESIDUAL_ROWS:
+    long = any(_bits(x) > LONG_BITS for M in (S, Z) for row in M for x in row)
+    if n > RESIDUAL_ROWS or long:
         # Elimination takes seconds to minutes here: it comes last, after all that the residual test can give.
-        for b in candidates if n > ELIMINATION_ROWS else candidates[:4]:
+        for b in candidates if long or n > ELIMINATION_ROWS else candidates[:4]:
             checkpoint()
             if _residual_test(lowered(b)):
                 return b

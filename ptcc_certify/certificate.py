@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, partial
@@ -25,6 +25,7 @@ from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member, remaining_part
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
+from ptcc_certify.checker.reading import MAX_SCALE_BITS
 from ptcc_certify.distance import DistanceBound, OutcomeGeometry
 from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.document import Writer, certificate_document, outcome_witness
@@ -74,6 +75,10 @@ SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
 SETTLED = 1e-6
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
+#: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
+LONGEST_BITS = 470_000
+#: GB that the check of a large graph may take while it is certified.
+LARGE_MEMORY = 16
 
 
 @dataclass(frozen=True, repr=False)
@@ -319,7 +324,7 @@ class Certificate:
         if not (proved and ended):
             return None
         document, written = self._document(CERTIFIED)
-        return check(document, files=written.files)
+        return check(document, files=written.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
 
     def _document(self, verdict: str) -> tuple[dict[str, Any], Writer]:
         """Return the JSON of a verdict and its side files, made once."""
@@ -588,6 +593,7 @@ ReachingTime(0, 1 before T_r)))
     if method not in METHODS:
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
     instant = None if at is None else _instant(at, protocol)
+    _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
     structure = analyse(graph)
     region = _starts(structure, starts)
     if sliding and (limits or delta is not None or noise is not None):
@@ -684,6 +690,9 @@ ReachingTime(0, 1 before T_r)))
     )
     progress(STEPS[5])
     report = certificate.checked
+    if report is not None and report.accepted and report.memory > 1:
+        note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
+        certificate = replace(certificate, notes=(*certificate.notes, note))
     if report is not None and not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
         certificate = replace(certificate, notes=(note, *certificate.notes))
@@ -726,6 +735,41 @@ def _starts(structure: Structure, starts: Any) -> Starts | None:
     return starts
 
 
+def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
+    """Return the weights that may be long, each once."""
+    table, _ = graph.weight_table()
+    if table is None:
+        return (graph.exact_weight(i) for i in range(graph.n_edges))
+    return map(Fraction, np.unique(table).tolist()) if table.dtype.kind == "f" else ()
+
+
+def _bits(value: Fraction) -> int:
+    return value.numerator.bit_length() + value.denominator.bit_length()
+
+
+def _longest_edge(graph: SignedDigraph) -> str:
+    edge = max(range(graph.n_edges), key=lambda i: _bits(graph.exact_weight(i)))
+    ends = (graph.labels[int(part[edge])] for part in (graph.source, graph.target))
+    return " -> ".join(map(shorten, ends))
+
+
+def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[[], str]) -> None:
+    """Refuse numbers of ``n`` agents whose exact arithmetic would take long: judged over a common denominator.
+
+    Large graphs are proved row by row, in short numbers: only what their check refuses is refused.
+    """
+    most = int(LONGEST_BITS / n**1.25) if n <= EXACT_NODES else MAX_SCALE_BITS
+    common, longest = 1, 0
+    for value in values:
+        common = math.lcm(common, value.denominator)
+        longest = max(longest, value.numerator.bit_length() - value.denominator.bit_length())
+        if common.bit_length() + longest > most:
+            raise ParameterError(
+                f"{what} take more than {most:,} bits over a common denominator, too many for exact proofs of {n:,} "
+                f"agents (the longest is that of {where()}); round them, to 17 digits say"
+            )
+
+
 def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
     start = tuple(exact_start(structure, values, name))
     for label, value in zip(structure.graph.labels, start, strict=True):
@@ -733,6 +777,8 @@ def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name
             raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
         if not writable(value):
             raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
+    longest = max(zip(structure.graph.labels, start, strict=True), key=lambda entry: _bits(entry[1]))[0]
+    _refuse_long(start, len(start), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
     return start
 
 

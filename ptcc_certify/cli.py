@@ -21,12 +21,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from ptcc_certify.errors import ParameterError, PTCCError, explain, one_line
 
 if TYPE_CHECKING:
     from ptcc_certify.actuator import Actuator
     from ptcc_certify.certificate import Certificate
+    from ptcc_certify.checker import CheckReport
     from ptcc_certify.gain_design import Design
     from ptcc_certify.graph import SignedDigraph
     from ptcc_certify.protocols import Protocol
@@ -100,6 +102,14 @@ _method_option = click.option(
 )
 _starts_option = click.option(
     "--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0."
+)
+_memory_option = click.option(
+    "--memory",
+    type=click.FloatRange(min=0, min_open=True, max=1000),
+    default=1,
+    show_default=True,
+    metavar="GB",
+    help="What the check may take; a certificate that may take more is refused.",
 )
 _time_limit_option = click.option(
     "--time-limit",
@@ -250,29 +260,51 @@ def certify(
 @click.argument("graph", required=False)
 @_reading_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
+@_memory_option
 @_json_option
-def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **read: Any) -> int:
+def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, **read: Any) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
+    GRAPH is read as the certificate says that it was read, which is printed; the options about reading override that.
     Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
     certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
     """
-    from ptcc_certify.checker import check as run
+    from ptcc_certify.checker import read_and_check
 
-    signed = None if graph is None else _read(graph, **read)
     with _progress(("independent check",)) as begin:
         begin("independent check")
-        report = run(certificate, stdlib=stdlib)
-    if signed is not None and report.accepted and report.sha256 != signed.sha256:
-        reason = f"the certificate is about another graph than {graph}"
-        report = replace(report, accepted=False, steps=(), rejected="graph", reason=reason)
+        document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
+    how: dict[str, str] = {}
+    if graph is not None and report.accepted:
+        report, how = _same_graph(certificate, document, report, graph, read)
     if as_json:
-        _print_json(report.to_dict())
+        _print_json(report.to_dict() | how)
     else:
-        _print(report.lines())
+        _print([*(f"graph      {how[key]}" for key in how), *report.lines()])
     if not report.accepted:
         return REJECTED
     return OK if report.verdict == "certified" else UNDECIDED
+
+
+def _same_graph(
+    certificate: str, document: dict[str, Any], report: CheckReport, graph: str, read: dict[str, Any]
+) -> tuple[CheckReport, dict[str, str]]:
+    """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
+    from ptcc_certify.graph_difference import difference
+    from ptcc_certify.io.graph_files import read_graph_as, reading_flags
+    from ptcc_certify.saved import certificate_graph
+
+    source = click.get_current_context().get_parameter_source
+    names = {"orientation": "edges", **{name: name for name in ("duplicates", "drop_self_loops", "undirected")}}
+    given = {key: read[name] for key, name in names.items() if source(name) is ParameterSource.COMMANDLINE}
+    told = document["graph"]["read"]
+    signed = read_graph_as(_graph_file(graph), told, **given)
+    way = "as the options say" if given else "as the certificate says"
+    how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
+    if signed.sha256 == report.sha256:
+        return report, how
+    reason = f"another graph than {graph}: {difference(certificate_graph(document, Path(certificate).parent), signed)}"
+    return replace(report, accepted=False, steps=(), rejected="graph", reason=reason), how
 
 
 @cli.command()
@@ -283,7 +315,8 @@ def check(certificate: str, graph: str | None, stdlib: bool, as_json: bool, **re
 @click.option(
     "--simulation/--no-simulation", default=None, help="Repeat the CVODES run.  [default: up to 1,000 agents]"
 )
-def report(certificate: str, output: str, simulation: bool | None) -> int:
+@_memory_option
+def report(certificate: str, output: str, simulation: bool | None, memory: float) -> int:
     """Check CERTIFICATE and write a report to send to somebody: a page of HTML, or a statement in LaTeX.
 
     The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
@@ -294,7 +327,7 @@ def report(certificate: str, output: str, simulation: bool | None) -> int:
 
     try:
         with _progress(("independent check", "simulation", "report")) as begin:
-            verdict = write_report(certificate, output, simulation=simulation, progress=begin)
+            verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
     except RejectedCertificate as error:
         click.echo(f"rejected: {error}", err=True)
         return REJECTED
@@ -635,19 +668,25 @@ def _read(
     undirected: bool = False,
     **_: Any,
 ) -> SignedDigraph:
-    from ptcc_certify.examples import GRAPHS, graph_path
     from ptcc_certify.io import read_graph
 
-    if graph == "-" and sys.stdin is None:
-        raise ParameterError("standard input is closed; name a file")
-    packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
     return read_graph(
-        graph_path(graph) if packaged else graph,
+        _graph_file(graph),
         orientation=edges,
         duplicates=duplicates,
         drop_self_loops=drop_self_loops,
         undirected=undirected,
     )
+
+
+def _graph_file(graph: str) -> Any:
+    """Return the file of a graph, of a packaged one where no such file exists."""
+    from ptcc_certify.examples import GRAPHS, graph_path
+
+    if graph == "-" and sys.stdin is None:
+        raise ParameterError("standard input is closed; name a file")
+    packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
+    return graph_path(graph) if packaged else graph
 
 
 def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

@@ -18,6 +18,7 @@ from typing import Any
 
 from ptcc_certify.sparse_definite import dense_definite
 from ptcc_certify.spectral_line import characteristic
+from ptcc_certify.work import affordable, fits, spend
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the factor, one after the other, until the proof succeeds.
@@ -29,7 +30,7 @@ FLINT_BITS = 40_000
 #: Above this many rows NumPy, where it is installed, forms factor and remainder, or solves.
 NUMPY_ROWS = 24
 #: Bits of all entries up to which python-flint multiplies large matrices.
-LONGEST = 500_000_000
+LONGEST = 200_000_000
 #: Bits of an inverse factor in floats, and how near it takes a matrix to the identity: ``2^-CONGRUENCE``.
 FLOAT_BITS, CONGRUENCE = 53, 30
 
@@ -124,8 +125,11 @@ class Standard:
 
     def factor(self, S: Rows, first: int = BITS[0]) -> Factor | None:
         """Return the factor that proves a matrix definite, with ``first`` bits or more; None if none does."""
+        n = len(S)
         for bits in BITS:
-            if bits >= first:
+            # Every precision costs more than the one before.
+            if bits >= first and affordable(n**3 // 6, bits, bits):
+                spend(n**3 // 6, bits, bits)
                 try:
                     return Factor(S, bits)
                 except ArithmeticError:
@@ -159,7 +163,10 @@ class Standard:
         [1.0, 8.0]
         """
         factor = self.factor(S, bits)
-        return None if factor is None else [factor.above(d) for d in D]
+        if factor is None:
+            return None
+        spend(len(D) * len(S) ** 2 // 2, factor.bits, factor.bits, "constants of many agents")
+        return [factor.above(d) for d in D]
 
     def bounded(self, S: Rows, forms: Sequence[tuple[Sequence[int], int]]) -> int | None:
         """Return the first ``k`` for which ``(d_k'x)^2 < c_k x'S x`` is not proved for all ``x``; None if all are.
@@ -200,7 +207,7 @@ class Flint(Standard):
         self.name = f"python-flint {self.flint.__version__} and the standard library"
         with contextlib.suppress(ImportError):
             self.name = f"python-flint {self.flint.__version__}, NumPy {importlib.import_module('numpy').__version__}"
-            self.rows, self.products, self.numpy = 1000, 10_000_000_000, True
+            self.products, self.numpy = 10_000_000_000, True
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Standard.definite`."""
@@ -242,8 +249,9 @@ class Flint(Standard):
         # Y = 2^-power U found, U diagonal, in integers: columns of S and D are multiplied by U first
         up = [max(halves) - half for half in halves]
         bits = len(S) * longest(S) + len(D) * longest(D) + 2 * (len(S) + len(D)) * max(up)
-        if bits * len(S) > LONGEST or not np.isfinite(found).all():
+        if not fits(bits * len(S), LONGEST) or not np.isfinite(found).all():
             return None
+        spend((len(S) + len(D)) * len(S) ** 2 // 10, bits // len(S), FLOAT_BITS, "constants of many agents")
         power = FLOAT_BITS - int(np.frexp(np.abs(found).max())[1])
         Y = matrix([[int(x) for x in row] for row in np.ldexp(found, power).tolist()])
         SU = matrix([[x << i + j for x, j in zip(row, up, strict=True)] for row, i in zip(S, up, strict=True)])

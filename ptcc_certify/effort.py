@@ -471,7 +471,7 @@ def _bounded(
         return None, None
     unit = math.lcm(*{graph.exact_weight(i).denominator for i in range(graph.n_edges)})
     rows = [{j: int(x * unit) for j, x in row.items()} for row in graph.exact_rows(range(graph.n_nodes))]
-    if not tractable(rows, unit):
+    if not tractable(rows, unit, 1 / k):
         return None, None
     labels = structure.strong_component
     components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]

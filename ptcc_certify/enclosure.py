@@ -203,7 +203,9 @@ def decay_integrals_below(
     positive coefficients, so that cutting them off keeps a lower bound. Where ``w q`` is negligible the rest is
     elementary. The bounds are 0 where ``w + m`` is above ``LARGEST_PUSH``.
     """
-    w, total, near = mu2 * T_r, Fraction(0), Fraction(1)
+    # Smaller factors give a lower bound too, and short ones cost less.
+    T_r, mu2, m = (rounded(x, 4 * bits) for x in (T_r, mu2, m))
+    w, total, near = rounded(mu2 * T_r, 4 * bits), Fraction(0), Fraction(1)
     if w + m > LARGEST_PUSH:
         return dict.fromkeys(instants, Fraction(0))
     elementary = Fraction(1, 2**bits) / max(w, Fraction(1))

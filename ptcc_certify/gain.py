@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _PARAMETERS = ("T", "rho1", "rho2", "kappa")
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
+#: Bits of the longest parameter, whose products are written in certificates.
+LONGEST_BITS = 3000
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -293,6 +295,8 @@ def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
             f"{name} = {shorten(str(given))} is not a finite number; {name} must be a number {domain}"
         ) from None
     _refuse_out_of_range(name, value)
+    if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
+        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
     if value < 0 or (value == 0 and not zero_allowed):
         raise ParameterError(f"{name} = {readable(value)} is outside its domain; {name} must be {domain}")
     return value

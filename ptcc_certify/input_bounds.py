@@ -10,7 +10,7 @@ arguments are rationals, every rounding is upwards (or downwards where a name sa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -18,6 +18,7 @@ from operator import mul
 from typing import Any, NamedTuple
 
 from ptcc_certify.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
+from ptcc_certify.work import spend
 
 #: Bits to which bounds are rounded.
 BITS = 64
@@ -285,7 +286,8 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
     end = gain.T - (limits.stop_before or 0)
     count = -(-end // h)
     first = max(count - LAST_PERIODS, 0)
-    factor = Fraction(1)
+    factor, bits = Fraction(1), _bits((gain.T, gain.rho1, gain.k, h, end, rate, growth, limits.gain_cap or h))
+    spend(300 * (count - first), bits, bits, "held gains")
     if first:
         early = Limits(limits.gain_cap, gain.T - h * first)
         lost = h * ((early.largest_gain(gain) or g0) - min(g0, limits.gain_cap or g0))
@@ -524,6 +526,8 @@ class InputBounds:
     def _squared(self, sizes: Sequence[Fraction]) -> list[Fraction]:
         """Return ``|L^2| sizes``."""
         pushed = []
+        bits = 2 * _bits(x for row in self.rows for x in row.values()) + _bits(sizes)
+        spend(5 * sum(len(self.rows[j]) for row in self.rows for j in row), bits, bits, "L^2")
         for row in self.rows:
             square: dict[int, Fraction] = {}
             for j, x in row.items():
@@ -558,7 +562,9 @@ class InputBounds:
         """Bound ``sqrt(V(0))`` for all starts; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
         if ("start", k) not in self._kept:
             form = self.form(k)
-            self._kept["start", k] = rounded(_largest_root(form, self._coordinates(form), self.starts), BITS, up=True)
+            rows = self._coordinates(form)
+            _count(form, rows, self.starts)
+            self._kept["start", k] = rounded(_largest_root(form, rows, self.starts), BITS, up=True)
         return self._kept["start", k]
 
     def _coordinates(self, form: Form) -> list[Linear]:
@@ -569,6 +575,8 @@ class InputBounds:
         """Return what the pieces of the time up to ``z`` have in common."""
         if z not in self._kept:
             assert self.reaching is not None
+            bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, z, self.reaching.T_r, self.reaching.mu2))
+            spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
             (T, rho1, k), up = (self.gain.T, self.gain.rho1, self.gain.k), True
             instants = [z * j / PIECES for j in range(PIECES + 1)]
             remaining = [exp(-x, BITS) for x in instants]  # 1 - t/T
@@ -645,6 +653,8 @@ class InputBounds:
         """
         if not self.quiet <= z <= LARGEST_EXPONENT:
             raise ValueError("an instant at which sliding variables still move, or one too late")
+        bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
+        spend(50, bits, bits, "bounds of the input")
         held = self.held_norm if v is None else self.held[v]
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
@@ -671,6 +681,7 @@ class InputBounds:
         """Bound ``E(0)'W E(0)`` over the starts, ``E`` on the nodes that listen, in order."""
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
         form = Form(one, "E", nodes, None, W, one)
+        _count(form, [self.rows[v] for v in nodes], self.starts)
         return _largest_root(form, [self.rows[v] for v in nodes], self.starts) ** 2
 
     def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
@@ -711,6 +722,24 @@ class InputBounds:
         own = (2 * row.get(v, Fraction(0)) * noise for v, row in enumerate(self.rows))
         each = [root_above(c) * added + x for c, x in zip(self.constant(k), own, strict=True)]
         return self.root_constant(k, None) * added, each
+
+
+def _bits(values: Iterable[Fraction]) -> int:
+    """Return the bits of the longest numerator or denominator."""
+    return max((max(x.numerator.bit_length(), x.denominator.bit_length()) for x in values), default=0)
+
+
+def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
+    """Count the work of :func:`_largest_root`."""
+    n, matrix = len(rows), [*([form.diagonal] if form.diagonal is not None else form.matrix or ())]
+    vectors = [starts.center, *([starts.radius] if starts.radius else []), *starts.axes]
+    bits = _bits(x for row in rows for x in row.values()) + _bits(x for vector in vectors for x in vector)
+    entries = sum(map(len, rows))
+    spend(
+        5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts"
+    )
+    if starts.radius:
+        spend((entries + n * len(matrix)) * len(starts.center), bits, bits, "starts")
 
 
 def _largest_root(form: Form, rows: Sequence[Linear], starts: Starts) -> Fraction:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds import Comparison, Envelope, Member, float_above, float_below
-from ptcc_certify.checker import CheckReport, check, read
+from ptcc_certify.checker import CheckReport, read_and_check
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.vectors import Numbers, SideFiles, beside
 from ptcc_certify.distance import DistanceBound
@@ -400,7 +400,7 @@ class SavedCertificate:
         return f"SavedCertificate({said}, rate {rate}, {self.verdict}, {self.graph.n_nodes} nodes)"
 
 
-def read_certificate(path: str | Path, *, stdlib: bool = False) -> SavedCertificate:
+def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 1) -> SavedCertificate:
     """Check a certificate's file with the independent check, and read it back.
 
     Parameters
@@ -409,6 +409,8 @@ def read_certificate(path: str | Path, *, stdlib: bool = False) -> SavedCertific
         A file of schema ``ptcc-certificate/1``; its side files are in the same folder.
     stdlib : bool
         Let the check use the standard library alone.
+    memory : float
+        GB that the check may take; see :func:`ptcc_certify.checker.check`.
 
     Returns
     -------
@@ -438,9 +440,8 @@ def read_certificate(path: str | Path, *, stdlib: bool = False) -> SavedCertific
     ['-1', '1']
     """
     path = Path(path)
-    document = read(path)
     sha256 = _file_hash(path)
-    report = check(path, stdlib=stdlib)
+    document, report = read_and_check(path, stdlib=stdlib, memory=memory)
     if _file_hash(path) != sha256:
         raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
     if not report.accepted:
@@ -456,6 +457,45 @@ def _file_hash(path: Path) -> str:
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
 
 
+def certificate_graph(document: Document, folder: Path) -> SignedDigraph:
+    """Return the graph of an accepted certificate.
+
+    Parameters
+    ----------
+    document : dict
+        The parsed JSON.
+    folder : Path
+        Of its side files.
+
+    Returns
+    -------
+    SignedDigraph
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
+    >>> certificate_graph(document, Path()) == foes
+    True
+    """
+    said, files = document["graph"], SideFiles(folder, None)
+    labels, edges = said["nodes"], said["edges"]
+    if isinstance(edges, dict):
+        source, target, weight = (
+            np.array(files.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
+        )
+        scale = exact(edges["scale"])
+        values, codes = np.unique(weight, return_inverse=True)
+        weights = Weights([Fraction(x) / scale for x in values.tolist()], codes)
+    else:
+        index = {label: i for i, label in enumerate(labels)}
+        source = np.array([index[s] for s, _, _ in edges], dtype=np.int64)
+        target = np.array([index[t] for _, t, _ in edges], dtype=np.int64)
+        weights = Weights([exact(w) for _, _, w in edges])
+    return SignedDigraph(labels, source, target, weights, said["read"])
+
+
 def _maybe(text: str | None) -> Fraction | None:
     return None if text is None else exact(text)
 
@@ -466,7 +506,7 @@ class _Reader:
     def __init__(self, path: Path, document: Document):
         self.path, self.document = path, document
         self.files = SideFiles(path.parent, None)
-        self.graph = self._graph()
+        self.graph = certificate_graph(document, path.parent)
         self.structure = analyse(self.graph)
         self.steps = {(step["kind"], step["of"]): step for step in document["proof"]}
 
@@ -526,23 +566,6 @@ class _Reader:
         }
 
     # ------------------------------------------------------------------ graph, protocol, states
-
-    def _graph(self) -> SignedDigraph:
-        said = self.document["graph"]
-        labels, edges = said["nodes"], said["edges"]
-        if isinstance(edges, dict):
-            source, target, weight = (
-                np.array(self.files.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
-            )
-            scale = exact(edges["scale"])
-            values, codes = np.unique(weight, return_inverse=True)
-            weights = Weights([Fraction(x) / scale for x in values.tolist()], codes)
-        else:
-            index = {label: i for i, label in enumerate(labels)}
-            source = np.array([index[s] for s, _, _ in edges], dtype=np.int64)
-            target = np.array([index[t] for _, t, _ in edges], dtype=np.int64)
-            weights = Weights([exact(w) for _, _, w in edges])
-        return SignedDigraph(labels, source, target, weights, said["read"])
 
     def _protocol(self) -> Protocol:
         said = {key: value for key, value in self.document["protocol"].items() if key not in ("kind", "disturbance")}

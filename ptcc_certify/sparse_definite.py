@@ -16,6 +16,8 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from ptcc_certify.work import fits
+
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
 #: Bits of a slice of :func:`dense_definite`: three of them fit in an int64.
@@ -23,11 +25,11 @@ SLICE = 20
 #: Exponents beyond this are refused, lest a witness fill the memory.
 LARGEST_SHIFT = 2**16
 #: Bits that the entries may be shifted by, or multiplied by, in all.
-LARGEST_BITS = 4_000_000_000
+LARGEST_BITS = 400_000_000
 #: Pairs of entries of a column of the factor that are multiplied: in all, and kept at a time by the standard library.
-LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 20_000_000
-#: NumPy: longest column that is multiplied pair by pair, and largest dense block at the end.
-LONGEST_COLUMN, LARGEST_BLOCK = 4000, 6000
+LARGEST_PAIRS, LARGEST_KEPT = 200_000_000, 2_000_000
+#: NumPy: longest column that is multiplied pair by pair, and entries of the largest dense block at the end.
+LONGEST_COLUMN, LARGEST_BLOCK = 4000, 2_000_000
 #: Pairs of entries multiplied at a time.
 CHUNK = 2_000_000
 
@@ -279,7 +281,7 @@ def residual_definite(
         place[node] = k
     shifts = [exponents[i] + exponents[j] + power + 2 * bits for i, j in zip(rows, cols, strict=True)]
     up = max(0, -min(shifts, default=0))
-    if (max(shifts, default=0) + up) * len(shifts) > LARGEST_BITS:
+    if not fits((max(shifts, default=0) + up) * len(shifts), LARGEST_BITS):
         return False
     T: dict[tuple[int, int], int] = defaultdict(int)
     for i, j, value, shift in zip(rows, cols, values, shifts, strict=True):
@@ -296,16 +298,21 @@ Factor = tuple[list[int], list[int], list[int]]
 def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
     indptr, indices, data = factor
     pairs = sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(indptr))
-    if pairs > LARGEST_PAIRS or min(pairs, n * (n + 1) // 2) > LARGEST_KEPT:
+    if pairs > LARGEST_PAIRS:
         return False
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(n)]
+    kept = 0
     for k in range(n):
         part = list(zip(indices[indptr[k] : indptr[k + 1]], data[indptr[k] : indptr[k + 1]], strict=True))
         for number, (i, x) in enumerate(part, 1):
             row = E[i]
+            kept -= len(row)
             for j, y in part[:number]:
                 row[j] -= x * y
-    if sum(map(len, E)) * times.bit_length() > LARGEST_BITS:
+            kept += len(row)
+            if not fits(kept, LARGEST_KEPT):
+                return False
+    if not fits(sum(map(len, E)) * times.bit_length(), LARGEST_BITS):
         return False
     if times != 1:
         E = [{j: value * times for j, value in row.items()} for row in E]
@@ -334,7 +341,7 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     before = np.concatenate([[0.0], np.cumsum(counts.astype(float) ** 2)])
     first = int(np.argmin(100 * before + 0.1 * left**3 + 500 * left**2))
     long = int(counts[:first].max(initial=0)) > LONGEST_COLUMN
-    if long or before[first] > 2 * LARGEST_PAIRS or n - first > LARGEST_BLOCK:
+    if long or before[first] > 2 * LARGEST_PAIRS or not fits((n - first) ** 2, LARGEST_BLOCK):
         return False
     width = min(21, (53 - max(n - first, 1).bit_length()) // 2 + 1)
     slices = max(-(-(int(np.abs(data).max(initial=0)).bit_length() + 1) // width), 1)
@@ -346,7 +353,7 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     sums = _pair_products(n, first, indptr, indices, _slices_of(data, width, slices))
     if squares is None or sums is None:
         return _residual_plain(n, T, factor, times, d)
-    if (len(sums[0]) + corner.size) * times.bit_length() > LARGEST_BITS:
+    if not fits((len(sums[0]) + corner.size) * times.bit_length(), LARGEST_BITS):
         return False
     block = sum(square.astype(object) << (width * m) for m, square in enumerate(squares))
     keys, limbs = sums
@@ -505,6 +512,27 @@ def _eliminates(rows: list[list[int]]) -> bool:
     return True
 
 
+def _dense_square(R: Any) -> Any:
+    """Return ``R R'`` of int64 entries in integers; None unless every product, sum and shift is exact.
+
+    Rows of the factor of a matrix scaled to a unit diagonal have norms of about ``2^57``, and 16 times that is room
+    enough; a row beyond it would wrap around in the last shift, and prove what is not true.
+    """
+    products = _slice_products(_slices_of(R, SLICE, 3))
+    if products is None:
+        return None
+    # Carried, three limbs in [0, 2^SLICE) make one int64, and so do the two above them, if the last is short
+    for m in range(4):
+        carry = products[m] >> SLICE
+        products[m] -= carry << SLICE
+        products[m + 1] += carry
+    if max(-int(products[4].min()), int(products[4].max())) > INT64_SAFE >> SLICE:
+        return None
+    low = products[0] + (products[1] << SLICE) + (products[2] << 2 * SLICE)
+    high = products[3] + (products[4] << SLICE)
+    return (high.astype(object) << 3 * SLICE) + low.astype(object)
+
+
 def _dense_residual(S: Sequence[Sequence[int]]) -> bool:
     import numpy as np
 
@@ -531,17 +559,9 @@ def _dense_residual(S: Sequence[Sequence[int]]) -> bool:
             R = np.linalg.cholesky(unit - shift * np.eye(n))
         except np.linalg.LinAlgError:
             return False
-        products = _slice_products(_slices_of(np.rint(np.ldexp(R, bits)).astype(np.int64), SLICE, 3))
-        if products is None:
+        whole = np.rint(np.ldexp(R, bits))
+        if not np.abs(whole).max() <= INT64_SAFE or (square := _dense_square(whole.astype(np.int64))) is None:
             return False
-        # Carried, three limbs in [0, 2^SLICE) make one int64, and so do the two above them
-        for m in range(4):
-            carry = products[m] >> SLICE
-            products[m] -= carry << SLICE
-            products[m + 1] += carry
-        low = products[0] + (products[1] << SLICE) + (products[2] << 2 * SLICE)
-        high = products[3] + (products[4] << SLICE)
-        square = (high.astype(object) << 3 * SLICE) + low.astype(object)
         E = T - (square << -spare if spare < 0 else square)
         diagonal = np.diag(E).copy()
         short = (np.abs(E).sum(axis=1) - np.abs(diagonal) - diagonal).tolist()

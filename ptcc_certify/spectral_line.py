@@ -15,10 +15,14 @@ from itertools import pairwise
 from math import gcd
 from typing import Literal, NamedTuple
 
+from ptcc_certify.work import cost
+
 #: Largest number of nodes for which the decision is meant to be asked; it takes seconds there.
 LARGEST = 120
 #: Largest product of N^3 and the bits of an entry of ``rows`` for which it takes seconds.
 MOST_WORK = 300_000_000
+#: Largest cost of the characteristic polynomial, by :func:`ptcc_certify.work.cost`.
+MOST_COST = 6_000_000_000
 #: Bits with which the array of Routh is enclosed, one after the other, before it is formed exactly.
 BITS = (512, 2048, 8192)
 
@@ -36,7 +40,7 @@ class OnLine(NamedTuple):
     pairs: Polynomial  #: coefficients of ``G``, with its multiple roots
 
 
-def tractable(rows: Matrix, unit: int) -> bool:
+def tractable(rows: Matrix, unit: int, line: Fraction = Fraction(1)) -> bool:
     """Tell whether :func:`nonzero_spectrum_beyond` takes some seconds at most.
 
     Examples
@@ -45,7 +49,8 @@ def tractable(rows: Matrix, unit: int) -> bool:
     (True, False)
     """
     longest = max((abs(x).bit_length() for row in rows for x in row.values()), default=0)
-    return len(rows) <= LARGEST and len(rows) ** 3 * max(longest, unit.bit_length()) <= MOST_WORK
+    n, bits = len(rows), max(longest, (unit * line).numerator.bit_length(), line.denominator.bit_length())
+    return n <= LARGEST and n**3 * bits <= MOST_WORK and cost(n**3, n * bits, bits) <= MOST_COST
 
 
 def nonzero_spectrum_beyond(

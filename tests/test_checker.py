@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections import Counter
 from collections.abc import Callable
 from fractions import Fraction
@@ -943,6 +944,60 @@ def test_long_numbers_and_many_rows_take_bounded_time():
     timed(changed(slow, ("reaching_time", "z"), z), 20)
 
 
+def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
+    """A star of 300 nodes: eight of 45,000 entries have denominators of 12,000 bits without a common factor."""
+    n = 300
+    star = [("0", str(i), 1) for i in range(1, n)] + [("1", "0", 1), ("2", "0", 1)]
+    data = json.loads(certify(SignedDigraph.from_edges(star), NOMINAL, method="paper", simulation=False).to_json())
+    nodes = data["graph"]["nodes"]
+    lower = [["1"] * (i + 1) for i in range(n)]
+    for k in range(8):
+        lower[30 * k + 9][7] = f"1/{10**3600 + 2 * k + 1}"
+    block = {"name": "P", "nodes": nodes, "lower_triangle": lower, "times_rho": False}
+    member = {"class": "full", "coordinates": "E", "blocks": [block], "rho": None, "rate": "1", "prefactor": "1"}
+    statement, lemma = checker.OBLIGATIONS["rate"]
+    step = {"kind": "rate", "of": "lyapunov.members[0]", "statement": statement, "lemma": lemma, "witness": None}
+    data["lyapunov"]["members"] = [{**member, "distance": None}]
+    data["proof"] = [*data["proof"][:3], {**step, "numbers": {"b": "1"}}]
+    tracemalloc.start()
+    for stdlib in (True, False):
+        assert "common denominator" in (check(resealed(data), stdlib=stdlib).reason or "")
+    assert tracemalloc.get_traced_memory()[1] < 10**8
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("piece", ["[]", "{}", '"a"', "257", '{"a":1}', "[[1.5]]"])
+def test_json_that_would_fill_the_memory_is_refused_before_it_is_parsed(piece: str, tmp_path: Path):
+    path = tmp_path / "c.json"
+    wide = ",".join([piece] * (100_000_000 // (len(piece) + 1)))
+    path.write_text(f'{{"schema": "ptcc-certificate/1", "unverified": [{wide}]}}')
+    tracemalloc.start()
+    try:
+        with pytest.raises(FormatError, match="GB in memory; allow more by --memory"):
+            check(path)
+        assert tracemalloc.get_traced_memory()[1] < 3 * 10**8
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_check_tells_the_memory_that_it_needs(tmp_path: Path):
+    """What is refused with less is accepted with that much."""
+    (tmp_path / "c.json").write_text(json.dumps(made("2.2", 5)))
+    needed = check(tmp_path / "c.json").memory
+    assert 0 < needed < 0.1
+    report = check(tmp_path / "c.json", memory=1.01 * needed)
+    assert report.accepted and report.memory == pytest.approx(needed)
+    try:
+        assert not check(tmp_path / "c.json", memory=0.9 * needed).accepted
+    except FormatError as error:
+        assert "memory" in str(error)
+    module = [sys.executable, "-m", "ptcc_certify.checker", str(tmp_path / "c.json")]
+    for words, code in (((), 0), (("--memory", "2"), 0), (("--memory", "0.00001"), 2), (("--memory", "no"), 2)):
+        environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+        done = subprocess.run([*module, *words], capture_output=True, env=environment, text=True)
+        assert done.returncode == code and len(done.stderr.splitlines()) == (code == 2)
+
+
 def test_a_label_that_the_terminal_cannot_show(tmp_path: Path):
     graph = SignedDigraph.from_edges([("\U0001f600", "b", 1), ("b", "\U0001f600", 1)])
     data = json.loads(certify(graph, NOMINAL, [1, 2], simulation=False).to_json())
@@ -989,6 +1044,7 @@ STANDARD = {
     "re",
     "sys",
     "traceback",
+    "contextvars",
     "typing",
 }
 OWN = {
@@ -999,6 +1055,7 @@ OWN = {
     "ptcc_certify.rounding",
     "ptcc_certify.sparse_definite",
     "ptcc_certify.spectral_line",
+    "ptcc_certify.work",
 }
 
 

@@ -229,6 +229,86 @@ def test_a_refuted_expectation_is_3(command: str):
         assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
 
 
+def test_check_reads_the_graph_as_the_certificate_says(folder: Path):
+    """Orientation, repeated edges, self-loops and ties without direction; options of the command override."""
+    Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
+    reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
+    assert ptcc("certify", "g.csv", *reading, "--no-simulation", "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", "g.csv")
+    assert run.code == 0
+    assert run.out.splitlines()[0] == f"graph      g.csv, read as the certificate says: {' '.join(reading)}"
+    assert one_object(ptcc("check", "c.json", "g.csv", "--json").out)["graph_read"].endswith(" ".join(reading))
+    run = ptcc("check", "c.json", "g.csv", "--duplicates", "last")
+    assert run.code == 1 and "read as the options say: --edges listens --duplicates last" in run.out
+    assert "another weight" in run.out
+    Path("ties.csv").write_text("a,b,1\nb,c,2\n")
+    assert ptcc("certify", "ties.csv", "--undirected", "--no-simulation", "-o", "t.json").code == 0
+    assert ptcc("check", "t.json", "ties.csv").code == 0
+
+
+@pytest.mark.parametrize(
+    ("edges", "said"),
+    [
+        ("b,a,1 c,b,-0.123456789 a,c,2 d,c,3", "every edge points the other way: read it with --edges listens?"),
+        ("a,b,1 b,c,0.123456789 c,a,2 c,d,3", "1 of 4 edges has another sign (the signs are dropped), such as b -> c"),
+        (
+            "a,b,1 b,c,-0.123456789 c,a,-2 c,d,-3",
+            "2 of 4 edges have another sign, such as c -> a: 2 in the certificate",
+        ),
+        ("a,b,1 b,c,-0.12346 c,a,2 c,d,3", "1 of 4 edges has another weight, as if rounded: the largest relative"),
+        (
+            "a,b,1 b,c,-0.12346 c,a,4 c,d,3",
+            "2 of 4 edges have another weight: the largest relative difference is 1, of c",
+        ),
+        ("a,b,1 b,c,-0.123456789 c,a,2 d,c,3", "1 of 4 edges points the other way, such as c -> d in the certificate"),
+        ("a,b,1 b,c,-0.123456789 c,a,2 a,d,3", "1 edge of the certificate alone, such as c -> d; 1 edge of the graph"),
+        ("a,b,1 b,c,-0.123456789 c,a,2 c,e,3", "1 node of the certificate alone, such as d; 1 node of the graph alone"),
+        (
+            "b,a,1 c,b,0.123456789 a,c,2 d,c,3",
+            "every edge points the other way: read it with --edges listens? Then 1 of 4",
+        ),
+    ],
+)
+def test_a_graph_that_is_another_one_is_told_apart(folder: Path, edges: str, said: str):
+    Path("g.csv").write_text("a,b,1\nb,c,-0.123456789\nc,a,2\nc,d,3\n")
+    assert ptcc("certify", "g.csv", "--no-simulation", "-o", "c.json").code == 0
+    Path("h.csv").write_text(edges.replace(" ", "\n") + "\n")
+    run = ptcc("check", "c.json", "h.csv")
+    assert run.code == 1 and run.err == ""
+    assert run.out.splitlines()[-1].startswith(f"rejected   graph: another graph than h.csv: {said}")
+
+
+@pytest.mark.parametrize(("nodes", "digits"), [(6, 1800), (30, 300), (130, 1800)])
+def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: Path, nodes: int, digits: int):
+    """Quotients of long numbers without a common factor."""
+    ends = [(i, (i + k) % nodes) for i in range(nodes) for k in (1, 2)]
+    rows = [f"n{i},n{j},{10**digits + 2 * k + 1}/{10**digits + 6 * k + 7}" for k, (i, j) in enumerate(ends)]
+    Path("g.csv").write_text("\n".join(rows) + "\n")
+    run = ptcc("certify", "g.csv")
+    assert run.code == 2 and run.out == "" and len(run.err.splitlines()) == 1
+    assert f"too many for exact proofs of {nodes} agents (the longest is that of edge n" in run.err
+    assert run.err.rstrip().endswith("round them, to 17 digits say")
+
+
+@pytest.mark.parametrize("digits", [50, 200, 400])
+def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int):
+    rows = [
+        f"n{i},n{(i + k) % 6},{10**digits + 2 * i + 1}/{10**digits + 6 * i + 7 * k}" for i in range(6) for k in (1, 2)
+    ]
+    Path("g.csv").write_text("\n".join(rows) + "\n")
+    start = ",".join(f"{k}.{10**digits + k}" for k in range(6))
+    run = ptcc("certify", "g.csv", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
+    assert run.code == 0 and run.out.splitlines()[-1].split() == ["verdict", "certified"]
+
+
+def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):
+    long = "1." + "123456789" * 300
+    for flag, name in (("--T", "T"), ("--rho1", "rho1"), ("--kappa", "kappa")):
+        run = ptcc("certify", "fig1a", flag, long, "--no-simulation")
+        assert run.code == 2 and len(run.err.splitlines()) == 1, run.err
+        assert name in run.err and "round it" in run.err
+
+
 def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path):
     """0 proved, 1 rejected (a changed field, another graph), 4 undecided; the same from the module."""
     assert ptcc("certify", "fig5b", "-o", "c.json").code == 0
@@ -236,6 +316,8 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
         run = ptcc("check", "c.json", *options)
         assert run.code == 0 and run.err == ""
         lines = run.out.splitlines()
+        if options == ("fig5b",):
+            assert lines.pop(0) == "graph      fig5b, read as the certificate says: --edges information"
         assert len(lines) == len(read("c.json")["proof"]) + 1
         assert all(line.startswith("verified   ") for line in lines[:-1])
         assert lines[-1].startswith("accepted   certified;")
@@ -247,7 +329,7 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
     ]
     run = ptcc("check", "c.json", "fig5a")
     assert run.code == 1
-    assert run.out.splitlines()[-1] == "rejected   graph: the certificate is about another graph than fig5a"
+    assert run.out.splitlines()[-1].startswith("rejected   graph: another graph than fig5a: ")
     data = read("c.json")
     data["rates"]["certified"] = "1000"
     Path("false.json").write_text(json.dumps(data))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from fractions import Fraction
@@ -16,6 +17,7 @@ from scipy import sparse
 import lmi
 import ptcc_certify
 from lmi import exact
+from ptcc_certify import sparse_definite
 from ptcc_certify.sparse_definite import dense_definite, dominates, residual_definite
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -202,6 +204,25 @@ def test_a_changed_factor_is_refused():
     assert not exact.ResidualWitness(witness.R, witness.exponents, witness.bits - 1).proves(S)
     assert not witness.proves(S + 1e-3 * np.eye(60)[::-1])
     assert not witness.proves(S[:50, :50])
+
+
+def test_a_factor_with_long_rows_proves_nothing(monkeypatch: pytest.MonkeyPatch):
+    """``R R' = S/2`` up to multiples of 1024, the place where a shifted int64 would wrap around; S is indefinite."""
+    S = [[1, 2], [2, 1]]
+    least = 2.0**-20
+    factor = np.array([[math.sqrt(0.5 - least), 0], [1 / math.sqrt(0.5 - least), 0]])
+    factor[1, 1] = math.sqrt(1024.5 - factor[1, 0] ** 2 - least)
+    monkeypatch.setattr(np.linalg, "cholesky", lambda matrix: factor)
+    assert not dense_definite(S)
+
+
+@given(st.integers(0, 2**32), st.integers(1, 6), st.integers(1, 62))
+def test_squares_of_factors_are_exact_or_not_formed(seed: int, n: int, bits: int):
+    rng = np.random.default_rng(seed)
+    R = rng.integers(-(2**bits), 2**bits, (n, n), endpoint=True)
+    found = sparse_definite._dense_square(R)
+    assert found is None or (found == R.astype(object) @ R.T.astype(object)).all()
+    assert bits > 57 or found is not None
 
 
 def test_slices_stay_within_the_exact_integers_of_float64():

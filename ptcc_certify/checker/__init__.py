@@ -6,14 +6,16 @@ arithmetic, nothing that makes certificates; python-flint and NumPy are used whe
 specifies the file. The modules, in the order of the proof: ``reading``, ``vectors``, ``digraph``, ``structure``,
 ``outcome``, ``lyapunov``, ``effort``.
 
-    python -m ptcc_certify.checker certificate.json [--stdlib]
+    python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]
 """
 
 from __future__ import annotations
 
 import io
+import math
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +26,9 @@ from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries,
 from ptcc_certify.checker.structure import MANY_COMPONENTS
 from ptcc_certify.checker.vectors import SideFiles
 from ptcc_certify.errors import FormatError
+from ptcc_certify.work import WorkError, limited
 
-USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib]"
+USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib] [--memory GB]"
 
 __all__ = [
     "INPUT_NODES",
@@ -45,7 +48,11 @@ __all__ = [
 
 
 def check(
-    source: str | Path | Mapping[str, Any], *, stdlib: bool = False, files: Mapping[str, bytes] | None = None
+    source: str | Path | Mapping[str, Any],
+    *,
+    stdlib: bool = False,
+    files: Mapping[str, bytes] | None = None,
+    memory: float = 1,
 ) -> CheckReport:
     """Check a certificate.
 
@@ -57,6 +64,9 @@ def check(
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional
         The side files by name, in place of those in the folder of the certificate.
+    memory : float
+        GB that the check may take; what would take more is rejected before it is formed. The work that is allowed, some
+        seconds for each GB, grows with it.
 
     Returns
     -------
@@ -72,14 +82,42 @@ def check(
     >>> check({"schema": SCHEMA}).reason
     'the key "producer" is missing'
     """
-    if isinstance(source, Mapping):
-        data, folder = dict(source), Path()
-    else:
-        data, folder = read(source), Path(source).parent
-    run = _Check(data, SideFiles(folder, files), stdlib)
+    return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
+
+
+def read_and_check(
+    source: str | Path | Mapping[str, Any],
+    *,
+    stdlib: bool = False,
+    files: Mapping[str, bytes] | None = None,
+    memory: float = 1,
+) -> tuple[dict[str, Any], CheckReport]:
+    """Return the parsed JSON object beside the report of :func:`check`, whose parameters these are.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> read_and_check({"schema": SCHEMA})[0]
+    {'schema': 'ptcc-certificate/1'}
+    """
+    with limited(memory) as account:
+        if isinstance(source, Mapping):
+            data, folder = dict(source), Path()
+        else:
+            data, folder = read(source), Path(source).parent
+        report = _check(data, SideFiles(folder, files), stdlib)
+        return data, replace(report, memory=account.needed)
+
+
+def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
+    run = _Check(data, files, stdlib)
     try:
         run.everything()
-    except RejectedError as error:
+    except (RejectedError, WorkError) as error:
         reason = str(error)
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         reason = f"malformed ({type(error).__name__})"
@@ -127,16 +165,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     words = list(sys.argv[1:] if arguments is None else arguments)
-    stdlib = "--stdlib" in words
+    stdlib, memory = "--stdlib" in words, 1.0
+    if "--memory" in words[:-1]:
+        place = words.index("--memory")
+        try:
+            memory = float(words[place + 1])
+        except ValueError:
+            memory = 0
+        del words[place : place + 2]
     paths = [word for word in words if word != "--stdlib"]
     if paths in (["-h"], ["--help"]):
         print(USAGE)
         return 0
-    if len(paths) != 1 or paths[0].startswith("-") or not paths[0]:
+    if len(paths) != 1 or paths[0].startswith("-") or not paths[0] or not 0 < memory < math.inf:
         print(USAGE, file=sys.stderr)
         return 2
     try:
-        report = check(paths[0], stdlib=stdlib)
+        report = check(paths[0], stdlib=stdlib, memory=memory)
     except FormatError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""Run the check: ``python -m ptcc_certify.checker certificate.json [--stdlib]``."""
+"""Run the check: ``python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]``."""
 
 import sys
 

@@ -16,7 +16,8 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
-from ptcc_certify.checker.reading import MAX_SCALE_BITS, MAX_TOTAL_BITS, need
+from ptcc_certify.checker.reading import common_denominator, longest, need, sized
+from ptcc_certify.work import spend
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000
@@ -75,6 +76,7 @@ class Digraph:
         self.n, self.source, self.target, self.scale = n, source, target, scale
         self.n_edges = len(source)
         self._rows: dict[int, dict[int, int]] = {}
+        self._formed = 0  # entries of these rows
         self._read(weights)
         self.ratios = [w.as_integer_ratio() for w in self.distinct]
 
@@ -100,11 +102,8 @@ class Digraph:
     @cached_property
     def unit(self) -> int:
         """A positive integer that makes every weight one."""
-        unit = 1
-        for q in {q for _, q in self.ratios}:
-            unit = math.lcm(unit, q)
-            need(unit.bit_length() <= MAX_SCALE_BITS, "the weights have no common denominator of moderate length")
-        need(unit.bit_length() * len(self.ratios) <= MAX_TOTAL_BITS, "the weights are too long over one denominator")
+        unit = common_denominator({q for _, q in self.ratios}, len(self.ratios), "the weights")
+        sized(len(self.ratios), longest(p for p, _ in self.ratios) + unit.bit_length(), "the weights")
         return unit * self.scale
 
     @cached_property
@@ -113,11 +112,18 @@ class Digraph:
         unit = self.unit // self.scale
         return [p * (unit // q) for p, q in self.ratios]
 
+    @cached_property
+    def bits(self) -> int:
+        """Bits of the longest entry of the Laplacian, times ``unit``."""
+        return longest(self.values) + self.n.bit_length()
+
     def row(self, v: int) -> dict[int, int]:
         """Return row ``v`` of the signed Laplacian, times ``unit``, without zeros."""
         if v not in self._rows:
             starts, ends, _ = self.into
             first, last = starts[v], starts[v + 1]
+            self._formed += last - first + 1
+            sized(self._formed, self.bits, "the weights")
             own = {s: -self.values[k] for s, k in zip(ends[first:last], self.which[first:last], strict=True)}
             self._rows[v] = {v: sum(map(abs, own.values())), **{int(s): x for s, x in own.items()}} if own else {}
         return self._rows[v]
@@ -148,7 +154,9 @@ class Digraph:
         return self._sums(self.target, self.source, x, False)
 
     def _sums(self, of: Any, to: Any, x: Sequence[int], signed: bool) -> list[int]:
-        values = self.values if signed else [abs(w) for w in self.values]
+        values, bits = self.values if signed else [abs(w) for w in self.values], longest(x)
+        sized(self.n, self.bits + bits)
+        spend(self.n_edges, self.bits, bits, "sums over edges")
         total = [0] * self.n
         for i, j, k in zip(of, to, self.which, strict=True):
             total[j] += values[k] * x[i]

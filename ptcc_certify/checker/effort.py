@@ -8,7 +8,18 @@ from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.checker.lyapunov import LyapunovCheck
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, integers, need, short, triangle
+from ptcc_certify.checker.reading import (
+    RejectedError,
+    entries,
+    exact,
+    fields,
+    integers,
+    longest,
+    need,
+    short,
+    sized,
+    triangle,
+)
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import (
     Form,
@@ -25,10 +36,13 @@ from ptcc_certify.input_bounds import (
 )
 from ptcc_certify.rounding import down, up
 from ptcc_certify.spectral_line import nonzero_spectrum_beyond, tractable
+from ptcc_certify.work import spend
 
 KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
 #: Graphs up to this size have bounds of the input.
 INPUT_NODES = 400
+#: Limits of actuators that are read.
+MANY_LIMITS = 100
 
 
 class EffortCheck(LyapunovCheck):
@@ -61,7 +75,11 @@ class EffortCheck(LyapunovCheck):
 
     def _bounds(self, starts: Starts, constants: list[list[Fraction] | None]) -> InputBounds:
         """Return what bounds the input over the starts."""
-        integers([starts.center, starts.radius, *starts.axes])  # refused where they have no moderate denominator
+        whole, _ = integers([starts.center, starts.radius, *starts.axes])
+        own, each = self.digraph.bits + self.digraph.unit.bit_length(), longest(x for row in whole for x in row)
+        count = self.digraph.n_edges + self.n
+        sized(count, own, "the rows of L")
+        spend(len(whole) * count, own + each, own + each, "the starts")
         rows = [{j: Fraction(x, self.digraph.unit) for j, x in self.digraph.row(v).items()} for v in range(self.n)]
         return InputBounds(
             rows, self.gain, self.forms, constants, starts, self._reaching() if self.is_sliding else None
@@ -92,7 +110,8 @@ class EffortCheck(LyapunovCheck):
                     least = bounds.bound(of, None, self._member(step["witness"]), step["z"])
                 need(exact(said[key]) >= least, "the bound is not proved")
                 self.done(f"at most {up(exact(said[key]))}")
-        for k, entry in enumerate(entries(said["residual"], "residual")):
+        need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
+        for k, entry in enumerate(said["residual"]):
             self._limited(entry, f"effort.residual[{k}]", said["peak"], bounds)
         self._disturbed(said["disturbed"], bounds)
 
@@ -121,9 +140,13 @@ class EffortCheck(LyapunovCheck):
             for j, x in self.digraph.row(v).items():
                 if j in place:
                     columns[place[j]][i] = x
+        spend(n * sum(map(len, columns)), longest(x for row in W for x in row), self.digraph.bits, "W L + L'W")
         moved = [[sum(row[i] * x for i, x in column.items()) for column in columns] for row in W]
         scale = math.lcm((c * unit).denominator, (m * unit).denominator)
         own, diagonal = int(c * unit * scale), int(m * unit * scale)
+        bits, each, ratio = longest(x for row in W for x in row), self.digraph.bits, longest((scale, own, diagonal))
+        sized(n * n, bits + each + ratio, "W L + L'W")
+        spend(2 * n * n, bits + each, ratio, "W L + L'W")
         return [
             [scale * (moved[i][j] + moved[j][i]) - own * W[i][j] - diagonal * (i == j) for j in range(n)]
             for i in range(n)
@@ -180,7 +203,9 @@ class EffortCheck(LyapunovCheck):
     def _spectrum(self, line: Fraction) -> str:
         """Return where the nonzero eigenvalues of ``L`` lie, exactly."""
         rows = [dict(self.digraph.row(v)) for v in range(min(self.n, INPUT_NODES))]
-        need(self.n <= INPUT_NODES and tractable(rows, self.digraph.unit), "too large a graph, or too long numbers")
+        need(
+            self.n <= INPUT_NODES and tractable(rows, self.digraph.unit, line), "too large a graph, or too long numbers"
+        )
         components, seen = [], [False] * self.n
         for v in range(self.n):
             if not seen[v]:
@@ -233,6 +258,7 @@ class EffortCheck(LyapunovCheck):
             place, forms = {v: i for i, v in enumerate(form.nodes)}, []
             for v, c in enumerate(found[-1] or []):
                 p, q = (c / scale).as_integer_ratio()
+                sized(v + 1, longest((q, q * p)), "constants")
                 row = [0] * len(P)
                 if v in place:
                     row[place[v]] = q
@@ -341,6 +367,9 @@ class EffortCheck(LyapunovCheck):
     def _largest_deviation(self, starts: Starts) -> Fraction:
         """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
         rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(self.projection())]
+        bits = longest(n for row in rows for x in row.values() for n in x.as_integer_ratio())
+        bits += longest(n for x in starts.center for n in x.as_integer_ratio())
+        spend(5 * sum(map(len, rows)) * (2 + len(starts.axes)), bits, bits, "deviations of all starts")
         return max(map(starts.largest, rows))
 
     def _growth(self, form: Form, growth: Fraction) -> None:
@@ -354,6 +383,11 @@ class EffortCheck(LyapunovCheck):
         P, _ = integers(matrix)
         F = self._state_form({v: dict(zip(form.nodes, row, strict=True)) for v, row in zip(form.nodes, P, strict=True)})
         moved = [self.digraph.row(v) for v in range(self.n)]
+        p, q = (growth * self.digraph.unit**2).as_integer_ratio()
+        bits, own, ratio = longest(x for row in F for x in row), self.digraph.bits, longest((p, q))
+        sized(self.n**2, bits + 2 * own + ratio, "L'F L")
+        spend(2 * self.n * sum(map(len, moved)), bits + own, own, "L'F L")
+        spend(2 * len(self.kept) ** 2, bits + 2 * own, ratio, "L'F L")
         right = [[0] * self.n for _ in range(self.n)]  # F L
         for row, total in zip(F, right, strict=True):
             for x, laplacian in zip(row, moved, strict=True):
@@ -364,7 +398,6 @@ class EffortCheck(LyapunovCheck):
         for laplacian, row in zip(moved, right, strict=True):
             for i, y in laplacian.items():
                 step[i] = [a + y * x for a, x in zip(step[i], row, strict=True)]
-        p, q = (growth * self.digraph.unit**2).as_integer_ratio()
         S = [[p * F[i][j] - q * step[i][j] for j in self.kept] for i in self.kept]
         need(self.exact.definite(S), "the growth of a step is not proved")
 

@@ -12,18 +12,34 @@ from operator import mul
 from typing import Any
 
 from ptcc_certify.checker.outcome import OutcomeCheck
-from ptcc_certify.checker.reading import entries, exact, fields, integers, need, same, short, triangle
+from ptcc_certify.checker.reading import (
+    entries,
+    exact,
+    fields,
+    integers,
+    longest,
+    need,
+    same,
+    short,
+    sized,
+    triangle,
+)
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.input_bounds import Form
 from ptcc_certify.rounding import down, up
 from ptcc_certify.sparse_definite import residual_definite
+from ptcc_certify.work import fits, spend
 
 Matrix = list[list[int]]
 Sparse = list[dict[int, int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
 
-#: Products of entries up to which sparse matrices are multiplied.
-LARGEST_PRODUCT = 50_000_000
+#: Products of entries up to which sparse matrices are multiplied, and entries of one that are kept.
+LARGEST_PRODUCT, LARGEST_KEPT = 50_000_000, 3_000_000
+#: Entries of the factor of a leader group, and of the matrix that it is of.
+LARGEST_FACTOR, LARGEST_FORM = 2_000_000, 700_000
+#: Lyapunov functions that are read.
+MANY_MEMBERS = 100
 
 
 class LyapunovCheck(OutcomeCheck):
@@ -35,13 +51,13 @@ class LyapunovCheck(OutcomeCheck):
         """Return rows and columns of ``L``, times unit."""
         return [[row.get(j, 0) for j in nodes] for row in map(self.digraph.row, nodes)]
 
-    def _bounded_size(self, rows: int) -> None:
-        """Refuse matrices for which the arithmetic at hand would take long."""
-        need(rows <= self.exact.rows, f"a matrix of {rows} rows; {self.exact.name} takes {self.exact.rows}")
-
     def _state_form(self, P: Mapping[int, Mapping[int, int]]) -> Matrix:
         """Return ``L'P L``: the form ``E'P E`` in the state, times unit squared."""
         self._bounded_size(self.n)
+        bits, own = longest(x for row in P.values() for x in row.values()), self.digraph.bits
+        sized(self.n**2, bits + 2 * own, "L'P L")
+        spend(sum(len(self.digraph.row(b)) for row in P.values() for b in row), bits, own, "L'P L")
+        spend(sum(len(self.digraph.row(a)) for a in P) * self.n, bits + own, own, "L'P L")
         F = [[0] * self.n for _ in range(self.n)]
         for a, row in P.items():
             moved = [0] * self.n
@@ -55,6 +71,11 @@ class LyapunovCheck(OutcomeCheck):
     def _decrease(self, F: Matrix, b: Fraction, nodes: Sequence[int]) -> Matrix:
         """Return ``F L + L'F - b F`` on some nodes, times a positive integer; ``F`` is symmetric."""
         moved, L = [], [self.digraph.row(v) for v in range(self.n)]
+        p, q = (b * self.digraph.unit).as_integer_ratio()
+        bits, own, ratio = longest(x for row in F for x in row), self.digraph.bits, longest((p, q))
+        sized(self.n**2, bits + own + ratio, "F L + L'F - b F")
+        spend(self.n * sum(map(len, L)), bits, own, "F L + L'F - b F")
+        spend(2 * len(nodes) ** 2, bits + own, ratio, "F L + L'F - b F")
         for row in F:
             product = [0] * self.n
             for x, laplacian in zip(row, L, strict=True):
@@ -62,7 +83,6 @@ class LyapunovCheck(OutcomeCheck):
                     for j, y in laplacian.items():
                         product[j] += x * y
             moved.append(product)
-        p, q = (b * self.digraph.unit).as_integer_ratio()
         return [[q * (moved[i][j] + moved[j][i]) - p * F[i][j] for j in nodes] for i in nodes]
 
     def _margin(self, S: Sequence[Sequence[Fraction]], m: Fraction) -> bool:
@@ -103,6 +123,7 @@ class LyapunovCheck(OutcomeCheck):
         if said is None:
             return
         keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "prefactor")
+        self._bounded_size(self.n)
         said, (objective, coordinates, expected) = fields(said, keys, "paper"), self._row()
         need(said["theorem"] == self.theorem and said["objective"] == objective, "another theorem or objective")
         need(said["coordinates"] == coordinates, "other coordinates")
@@ -149,6 +170,9 @@ class LyapunovCheck(OutcomeCheck):
         """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale, and the scale."""
         self._bounded_size(self.n)
         (_, nodes, p, _), gauge = self.blocks[0], self.gauges[0] or []
+        bits = 2 * _length(p)
+        spend(4 * len(nodes) ** 2, bits, bits, "deviations")
+        sized(len(nodes) ** 2, 2 * bits, "deviations")
         total, n = sum(p), len(nodes)
         Z = [[gauge[i] * gauge[j] * (total * p[i] * (i == j) - p[i] * p[j]) for j in range(n)] for i in range(n)]
         form, scale = integers(Z)
@@ -178,7 +202,9 @@ class LyapunovCheck(OutcomeCheck):
 
     def _null_vector(self, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
         """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term, as the paper's formula asks."""
-        weight = dict(zip(nodes, p, strict=True))
+        (scaled,), _ = integers([list(p)])
+        weight = dict(zip(nodes, scaled, strict=True))
+        spend(2 * sum(len(self.digraph.row(v)) for v in nodes), self.digraph.bits, longest(scaled), "left null vectors")
         L = {v: self.digraph.row(v) for v in nodes}
         left = {v: weight[v] * L[v][v] for v in nodes}
         for v in nodes:
@@ -191,7 +217,9 @@ class LyapunovCheck(OutcomeCheck):
     def _lyapunov(self, nodes: Sequence[int], weights: Sequence[Fraction]) -> list[list[Fraction]]:
         """Return ``W A + A'W`` on some rows of ``L``."""
         self._bounded_size(len(nodes))
-        A = self._block(nodes)
+        A, bits = self._block(nodes), 2 * _length(weights) + self.digraph.bits
+        sized(len(nodes) ** 2, bits + self.digraph.unit.bit_length(), "W A + A'W")
+        spend(4 * len(nodes) ** 2, bits, bits, "W A + A'W")
         return [
             [(weights[i] * A[i][j] + weights[j] * A[j][i]) / self.digraph.unit for j in range(len(A))]
             for i in range(len(A))
@@ -239,6 +267,7 @@ class LyapunovCheck(OutcomeCheck):
         self.found: list[tuple[Fraction, Fraction, str, str]] = []  # rate, prefactor, class, coordinates
         self.forms: list[Form | None] = []  # None: by rows, in a large graph
         self.proved: set[tuple[int, Fraction, tuple[int, ...]]] = set()  # group, its rate and weights
+        need(len(members) <= MANY_MEMBERS, f"more than {MANY_MEMBERS} Lyapunov functions")
         need(self.paper_rate is None or bool(members), "the paper's certificate is not among the members")
         need(bool(self.moving) or not members, "a Lyapunov function where nothing moves")
         for k, member in enumerate(members):
@@ -291,6 +320,7 @@ class LyapunovCheck(OutcomeCheck):
         need(sorted(nodes) == self.moving, "nodes of a block")
         rate = exact(member["rate"])
         if kind == "full":
+            self._bounded_size(len(nodes))
             rows = triangle(block[shape], len(nodes))
             P, common = integers(rows)
             named = {v: dict(zip(nodes, row, strict=True)) for v, row in zip(nodes, P, strict=True)}
@@ -343,6 +373,10 @@ class LyapunovCheck(OutcomeCheck):
         }
         # w_i d_i times rate, less what the others push, times q and unit
         p, q = (rate * self.digraph.unit).as_integer_ratio()
+        spare = {k: ((g - rate) * self.digraph.unit).as_integer_ratio() for k, g in known.items()}
+        bits = longest((p, q, *(x for pair in spare.values() for x in pair))) + self.digraph.bits
+        if bits > 1000:
+            spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
         heard, diagonal = self.digraph.heard(D), self.digraph.diagonal
         pushes = [0 if k >= 0 else w * d for k, w, d in zip(self.number, W, D, strict=True)]
         pushed = self.digraph.hearing(pushes)
@@ -350,8 +384,8 @@ class LyapunovCheck(OutcomeCheck):
             if self.number[v] < 0:
                 left = (2 * q * diagonal[v] - p) * pushes[v] - q * (W[v] * heard[v] + pushed[v])
             else:
-                spare = (known[self.number[v]] - rate) * self.digraph.unit
-                left = spare.numerator * W[v] * D[v] - spare.denominator * pushed[v]
+                top, bottom = spare[self.number[v]]
+                left = top * W[v] * D[v] - bottom * pushed[v]
             need(left > 0, "a row is not dominated by its diagonal")
         self.done(f"b = {down(rate)}, {len(nodes)} rows")
 
@@ -391,7 +425,8 @@ class LyapunovCheck(OutcomeCheck):
             read(said[key], key, count) for key, count in (("order", n), ("exponents", n), ("indptr", n + 1))
         )
         vector = None if said["weights"] is None else read(said["weights"], "weights", n)
-        need(0 <= indptr[-1] <= n * (n + 1) // 2, "the factor has too many entries")
+        few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
+        need(few, "the factor has too many entries")
         work = sum((b - a) ** 2 for a, b in pairwise(indptr))
         need(work <= self.exact.products, f"a factor of {work} products; {self.exact.name} takes {self.exact.products}")
         columns = indptr, *(read(said[key], key, indptr[-1]) for key in ("indices", "data"))
@@ -459,12 +494,15 @@ class LyapunovCheck(OutcomeCheck):
             for i, row in enumerate(basis):
                 for j, x in row.items():
                     columns[j][i] = x
-            need(sum(len(basis[j]) for row in S for j in row) <= LARGEST_PRODUCT, "a leader group of too many edges")
+            work = sum(len(basis[j]) for row in S for j in row)
+            few = work <= LARGEST_PRODUCT and fits(min(work, len(A) ** 2), LARGEST_KEPT)
+            need(few, "a leader group of too many edges")
             SB = list(multiplied(S, basis))
             need(sum(map(mul, map(len, basis), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
             rows = multiplied(columns, SB)
         lower: tuple[list[int], list[int], list[int]] = [], [], []
         for i, row in enumerate(rows):
+            need(fits(len(lower[0]), LARGEST_FORM), "a leader group of too many edges")
             for j, x in row.items():
                 if j <= i:
                     for part, value in zip(lower, (i, j, x), strict=True):
@@ -478,10 +516,15 @@ class LyapunovCheck(OutcomeCheck):
         self._bounded_size(len(group))
         A = self._block(group)
         (scaled,), _ = integers([list(weights)])
+        p, q = (g * self.digraph.unit).as_integer_ratio()
+        size, own, bits, ratio = len(A), self.digraph.bits, longest(scaled), longest((p, q))
+        sized(size**2, 3 * own + bits + ratio, "the form of a leader group")
+        spend(size**3, own, own + bits, "the form of a leader group")
+        spend(size**3, own, 2 * own + bits, "the form of a leader group")
+        spend(2 * size**2, 3 * own + bits, ratio, "the form of a leader group")
         columns = [list(column) for column in zip(*A, strict=True)]
         F = product(columns, [[x * y for y in row] for x, row in zip(scaled, A, strict=True)])
         FL = product(F, A)
-        p, q = (g * self.digraph.unit).as_integer_ratio()
         return [[q * (FL[i][j] + FL[j][i]) - p * F[i][j] for j in kept] for i in kept]
 
     def _distance(self, said: Any, form: Matrix, scale: Fraction, of: str) -> None:
@@ -491,13 +534,18 @@ class LyapunovCheck(OutcomeCheck):
         need(list(fields(said["agents"], self.labels, "agents")) == self.labels, "agents are in another order")
         D, common, gram = self._beyond
         S = [[form[i][j] for j in self.kept] for i in self.kept]
-        forms = []
+        forms: list[tuple[list[int], int]] = []
         for row, text in zip(D, said["agents"].values(), strict=True):
             p, q = (exact(text) * common**2 / scale).as_integer_ratio()
+            sized((len(forms) + 1) * len(row), longest((q,)) + longest(row), "distances")
+            spend(len(row), longest((q,)), longest(row), "distances")
             forms.append(([q * x for x in row], q * p))
         failed = self.exact.bounded(S, forms)  # proves V > 0 besides
         need(failed is None, f"the constant of agent {short(self.labels[failed or 0])} is not proved")
         p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
+        bits, ratio = max(longest(x for row in part for x in row) for part in (S, gram)), longest((p, q))
+        sized(len(S) ** 2, bits + ratio, "the distance of the norm")
+        spend(2 * len(S) ** 2, bits, ratio, "the distance of the norm")
         N = [[p * s - q * g for s, g in zip(r, t, strict=True)] for r, t in zip(S, gram, strict=True)]
         need(p >= 0 and self.exact.definite(N), "the constant of the norm is not proved")
         self.done(f"norm at most {up(exact(said['norm']))}")
@@ -512,7 +560,9 @@ class LyapunovCheck(OutcomeCheck):
         for full, row in zip(D, rows, strict=True):
             for j in row:
                 full[place[j]] = next(left)
-        columns = list(zip(*D, strict=True))
+        columns, bits = list(zip(*D, strict=True)), longest(flat)
+        sized(len(columns) ** 2 + self.n * len(columns), 2 * bits, "D'D")
+        spend(len(columns) ** 2 * self.n // 2, bits, bits, "D'D")
         half = [[sum(map(mul, x, y)) for y in columns[: i + 1]] for i, x in enumerate(columns)]
         return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
 
@@ -569,6 +619,10 @@ class LyapunovCheck(OutcomeCheck):
         self._bounded_size(len(nodes))
         H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
         p, q = (limit / 2 * self.digraph.unit).as_integer_ratio()
+        bits, entry = longest(x for row in H for x in row), self.digraph.bits + longest((p, q))
+        sized(len(nodes) ** 2, bits + entry, "H B")
+        spend(2 * len(nodes) ** 2, entry, entry, "H B")
+        spend(len(nodes) ** 3, bits, entry, "H B")
         B = [[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(self._block(nodes))]
         HB = product(H, B)
         S = [
@@ -582,8 +636,14 @@ class LyapunovCheck(OutcomeCheck):
             for row in entries(said["vectors"], "vectors", 2 if still else 1)
         ]
         X, _ = integers(vectors)
+        spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
         below = product(X, product(H, [list(column) for column in zip(*X, strict=True)]))
         need(self.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
+
+
+def _length(values: Iterable[Fraction]) -> int:
+    """Return the bits of the longest numerator or denominator."""
+    return longest(n for x in values for n in x.as_integer_ratio())
 
 
 def product(A: Matrix, B: Matrix) -> Matrix:

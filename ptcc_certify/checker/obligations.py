@@ -97,6 +97,8 @@ class CheckReport:
         What the numbers were computed with.
     sha256 : str
         Of the graph.
+    memory : float
+        The ``memory``, in GB, for which all that was checked is allowed.
 
     Examples
     --------
@@ -114,6 +116,7 @@ class CheckReport:
     reason: str | None
     arithmetic: str
     sha256: str
+    memory: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as JSON-ready data."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from operator import mul
 from typing import Any
 
 from ptcc_certify.checker.reading import (
@@ -15,14 +16,17 @@ from ptcc_certify.checker.reading import (
     fields,
     integers,
     interval,
+    longest,
     need,
     same,
     short,
+    sized,
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.checker.vectors import Numbers, beside
 from ptcc_certify.enclosure import decay_integrals_below
 from ptcc_certify.rounding import up
+from ptcc_certify.work import spend
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
@@ -32,6 +36,8 @@ REACHING_BITS = 64
 WIDEST = Fraction(1, 10**6)
 #: Bits to which the values of leader groups are rounded, beyond the common scale of states, in the large form.
 GRID_BITS = 128
+#: Products of short integers that an instant of a reaching time costs, about.
+EACH_INSTANT = 12_000
 #: The voices of a group of one.
 ALONE = [(Fraction(1), Fraction(0))]
 
@@ -73,6 +79,7 @@ class OutcomeCheck(StructureCheck):
         g = self.gains
         need(all(end is None or end >= 0 for end in z), "a reaching time before the start")
         asked = [end for end, s in zip(z, sigma0, strict=True) if s and end is not None]
+        spend(len(set(asked)) * EACH_INSTANT, what="the reaching times of many agents")
         known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)
         for label, size, end in zip(self.labels, map(abs, sigma0), z, strict=True):
             if end is None or not size:
@@ -143,7 +150,13 @@ class OutcomeCheck(StructureCheck):
     def projection(self) -> list[dict[int, Fraction]]:
         """Return the rows of ``Q``, which are exact."""
         need(self.weights_of_leaders is not None, "a distance to an outcome that is not exact")
-        balanced, voices, pulls = self.weights_of_leaders
+        balanced, *parts = self.weights_of_leaders
+        voices, pulls = parts
+        self._bounded_size(self.n)
+        each, more = (2 * longest(n for row in rows for x, _ in row for n in x.as_integer_ratio()) for rows in parts)
+        entries = self.n * sum(len(group) for _, group, _ in balanced)
+        sized(entries, each + more, "the weights of leaders")
+        spend(entries, each + more, each + more, "the weights of leaders")
         Q: list[dict[int, Fraction]] = [{} for _ in range(self.n)]
         for k, (_, group, gauge) in enumerate(balanced):
             weights = {v: Fraction(g) for v, g in zip(group, gauge, strict=True)}
@@ -273,6 +286,7 @@ class OutcomeCheck(StructureCheck):
     def _kept(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
         """Return ``x' M(L_k)``, times ``unit``."""
         sums = dict.fromkeys(group, 0)
+        spend(sum(len(self.digraph.row(v)) for v in group), self.digraph.bits, longest(x), "voices")
         for v, weight in zip(group, x, strict=True):
             for j, a in self.digraph.row(v).items():
                 sums[j] += weight * (a if j == v else -abs(a))
@@ -280,31 +294,38 @@ class OutcomeCheck(StructureCheck):
 
     def _pulls(self, camp: Mapping[int, int], column: Sequence[Interval]) -> None:
         """Verify ``L_F w = -L_FLk G_k 1``: exactly, or by ``|w - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
-        mids = dict(zip(self.followers, (x for x, _ in column), strict=True))
-        known = {**{v: Fraction(g) for v, g in camp.items()}, **mids}
-        left = {
-            v: sum(
-                (x * known.get(j, Fraction(0)) for j, x in self.digraph.row(v).items()), Fraction(0)
-            )  # unbalanced leaders end at 0
-            for v in self.followers
-        }
+        (scaled,), scale = integers([[x for x, _ in column]])
+        mids = dict(zip(self.followers, scaled, strict=True))
+        known = {**{v: g * scale for v, g in camp.items()}, **mids}  # unbalanced leaders end at 0
+        rows = {v: self.digraph.row(v) for v in self.followers}
+        spend(sum(map(len, rows.values())), self.digraph.bits, longest(known.values()), "followers")
+        left = {v: sum(x * known.get(j, 0) for j, x in row.items()) for v, row in rows.items()}
         astray = [v for v, r in left.items() if r]
         if not astray:
             return
         if self.u is None:
             raise RejectedError(f"agent {short(self.labels[astray[0]])} is not where its neighbours pull it")
-        error = Fraction(0)
-        for v in self.followers:
-            row, u = self.digraph.row(v), self.u
-            pushed = sum((u[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in mids), Fraction(0))
+        each, _ = self.u.over(self.followers)
+        u = dict(zip(self.followers, each, strict=True))
+        spend(2 * sum(map(len, rows.values())), self.digraph.bits, longest(each), "followers")
+        worst, least = 0, 1  # max |r_i| / (M(L_F) u)_i, without the scales
+        for v, row in rows.items():
+            pushed = sum(u[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in u)
             need(pushed > 0, "u is no witness")
-            error = max(error, abs(left[v]) / pushed)
-        within = all(error * self.u[v] <= r for v, (_, r) in zip(self.followers, column, strict=True))
+            if abs(left[v]) * least > worst * pushed:
+                worst, least = abs(left[v]), pushed
+        error = Fraction(worst, least * scale)
+        within = all(error * u[v] <= r for v, (_, r) in zip(self.followers, column, strict=True))
         need(within, "followers are not enclosed")
 
 
 def combined(weights: Sequence[Interval], values: Sequence[Interval]) -> Interval:
     """Return an interval that holds the sum of the products."""
-    pairs = list(zip(weights, values, strict=True))
-    middle = sum((a * x for (a, _), (x, _) in pairs), Fraction(0))
-    return middle, sum((abs(a) * s + r * abs(x) + r * s for (a, r), (x, s) in pairs if r or s), Fraction(0))
+    if len(weights) == 1:
+        ((a, r),), ((x, s),) = weights, values
+        return a * x, abs(a) * s + r * abs(x) + r * s
+    (A, R), fine = integers([[a for a, _ in weights], [r for _, r in weights]])
+    (X, S), scale = integers([[x for x, _ in values], [s for _, s in values]])
+    spend(4 * len(A), longest(A) + longest(R), longest(X) + longest(S), "sums of intervals")
+    radius = sum(abs(a) * s + r * abs(x) + r * s for a, r, x, s in zip(A, R, X, S, strict=True)) if any(R + S) else 0
+    return Fraction(sum(map(mul, A, X)), fine * scale), Fraction(radius, fine * scale)

@@ -6,19 +6,27 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ptcc_certify.errors import FormatError
+from ptcc_certify.work import fits, keeps, spend
 
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.
 MAX_BYTES, MAX_CHARACTERS, MAX_EXPONENT, MAX_BINARY_EXPONENT = 200_000_000, 4000, 400, 1400
-#: Longest common denominator that is formed, and bits that a vector may take over one.
-MAX_SCALE_BITS, MAX_TOTAL_BITS = 100_000, 8_000_000_000
+#: Longest common denominator that is formed, and bits that a vector or a whole matrix of integers may take.
+MAX_SCALE_BITS, MAX_TOTAL_BITS = 100_000, 400_000_000
+#: Bytes that the JSON may take in memory, by :func:`loaded_bytes`.
+MAX_LOADED = 800_000_000
+#: Texts of numbers up to this length are kept once they are read.
+CACHED = 64
+#: Entries of an array that are hashed at a time.
+PIECE = 10_000
 INTEGER, SIGNED = re.compile(r"[0-9]+", re.ASCII), re.compile(r"[+-]?[0-9]+", re.ASCII)
 DECIMAL = re.compile(r"([+-]?[0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
 HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,5})", re.ASCII)
@@ -53,12 +61,17 @@ def read(path: str | Path) -> dict[str, Any]:
     name = short(str(path), 200)
     try:
         with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = _content(file)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
+        text = content.decode("utf-8")
+        loaded = loaded_bytes(content, text)
+        if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
+            raise ValueError(f"it may take {loaded / 1e9:.1f} GB in memory; allow more by --memory")
+        del content
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(
-            content.decode("utf-8"),
+            text,
             object_pairs_hook=unique,
             parse_constant=number,
             parse_float=number,
@@ -72,10 +85,58 @@ def read(path: str | Path) -> dict[str, Any]:
     return data
 
 
+def _content(file: BinaryIO) -> bytearray:
+    """Read a file up to one byte more than is taken."""
+    found = bytearray()
+    while len(found) <= MAX_BYTES and (part := file.read(2**20)):
+        found += part
+    return found
+
+
+def loaded_bytes(content: bytes | bytearray, text: str) -> int:
+    """Bound the memory of a JSON text and of what it becomes, from its brackets, commas, colons and quotes.
+
+    Examples
+    --------
+    >>> loaded_bytes(b"[[], []]", "[[], []]")
+    237
+    """
+    objects, arrays, keys, commas, quotes = (content.count(x) for x in (b"{", b"[", b":", b",", b'"'))
+    width = 1 if text.isascii() else -(-(sys.getsizeof(text) - 80) // len(text))  # bytes of a character
+    numbers = max(0, commas + 1 + keys - quotes // 2)
+    return 190 * objects + 90 * arrays + 70 * keys + 9 * commas + 26 * quotes + 32 * numbers + 2 * width * len(text)
+
+
 def digest(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of everything but ``digest`` and ``unverified``, as JSON with sorted keys and no blanks."""
     said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
-    return hashlib.sha256(json.dumps(said, sort_keys=True, separators=(",", ":")).encode("ascii")).hexdigest()
+    hashed = hashlib.sha256()
+    for part in _canonical(said):
+        hashed.update(part.encode("ascii"))
+    return hashed.hexdigest()
+
+
+def _canonical(value: Any) -> Iterator[str]:
+    """Yield JSON with sorted keys and no blanks in pieces, lest the whole stand in memory once more."""
+    plain: dict[str, Any] = {"sort_keys": True, "separators": (",", ":")}
+    items = sorted(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    if len(items) <= PIECE and not any(isinstance(value[k], dict | list) for k in items):
+        yield json.dumps(value, **plain)
+        return
+    yield "{" if isinstance(value, dict) else "["
+    part: Any
+    for first in range(0, len(items), PIECE):
+        piece = items[first : first + PIECE]
+        mark = "," if first else ""
+        if any(isinstance(value[k], dict | list) for k in piece):
+            for k in piece:
+                yield mark + f"{json.dumps(k)}:" if isinstance(value, dict) else mark
+                yield from _canonical(value[k])
+                mark = ","
+        else:
+            part = {k: value[k] for k in piece} if isinstance(value, dict) else value[piece[0] : piece[-1] + 1]
+            yield mark + json.dumps(part, **plain)[1:-1]
+    yield "}" if isinstance(value, dict) else "]"
 
 
 def exact(text: Any) -> Fraction:
@@ -91,12 +152,23 @@ def exact(text: Any) -> Fraction:
     >>> exact("-3/4"), exact("2.5e-1"), exact("0x1.8p-1")
     (Fraction(-3, 4), Fraction(1, 4), Fraction(3, 4))
     """
-    if isinstance(text, str) and len(text) <= MAX_CHARACTERS and (value := _parsed(text)) is not None:
-        return value
-    raise RejectedError(f"{short(str(text))} is not an exact number")
+    if not isinstance(text, str):
+        raise RejectedError(f"a value of type {type(text).__name__} is not an exact number")
+    if len(text) <= CACHED:
+        value = _short_number(text)
+    else:
+        spend(1, 2 * len(text), 2 * len(text), "reading long numbers")
+        value = _parsed(text) if len(text) <= MAX_CHARACTERS else None
+    if value is None:
+        raise RejectedError(f"{short(text)} is not an exact number")
+    return value
 
 
 @lru_cache(maxsize=10_000)
+def _short_number(text: str) -> Fraction | None:
+    return _parsed(text)
+
+
 def _parsed(text: str) -> Fraction | None:
     top, slash, bottom = text.partition("/")
     if SIGNED.fullmatch(top) and (not slash or (INTEGER.fullmatch(bottom) and int(bottom))):
@@ -177,10 +249,38 @@ def interval(said: Any) -> Interval:
 
 
 def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
-    """Return rational rows times their common denominator, and that."""
-    scale = 1
-    for row in rows:
-        scale = math.lcm(scale, *{x.denominator for x in row})
-        moderate = scale.bit_length() <= min(MAX_SCALE_BITS, MAX_TOTAL_BITS // (len(row) + 1))
-        need(moderate, "the numbers have no common denominator of moderate length")
+    """Return rational rows times their common denominator, and that; the size of the whole is judged before."""
+    count, bits = sum(map(len, rows)), longest(x.numerator for row in rows for x in row)
+    scale = common_denominator({x.denominator for row in rows for x in row}, count)
+    size = scale.bit_length()
+    sized(count, bits + size)
+    spend(count, bits, size)
     return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
+
+
+def common_denominator(denominators: Collection[int], count: int, what: str = "the numbers") -> int:
+    """Return the least common multiple, by which ``count`` numbers are multiplied."""
+    scale = 1
+    for q in denominators:
+        spend(2, scale.bit_length(), q.bit_length(), "a common denominator")
+        scale = math.lcm(scale, q)
+        short = scale.bit_length() <= MAX_SCALE_BITS and fits(scale.bit_length() * count, MAX_TOTAL_BITS)
+        need(short, f"{what} have no common denominator of moderate length")
+    spend(count, scale.bit_length(), longest(denominators), "a common denominator")
+    return scale
+
+
+def sized(count: int, bits: int, what: str = "the numbers") -> None:
+    """Refuse a matrix or a vector of so many integers of so many bits, if it would take much memory."""
+    need(fits(count * bits, MAX_TOTAL_BITS), f"{what} are too long over one denominator")
+
+
+def longest(values: Iterable[int]) -> int:
+    """Return the bits of the longest integer.
+
+    Examples
+    --------
+    >>> longest([1, -8])
+    4
+    """
+    return max((x.bit_length() for x in values), default=0)

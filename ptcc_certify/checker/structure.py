@@ -14,9 +14,12 @@ from ptcc_certify.checker.obligations import OBLIGATIONS, Step
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same
 from ptcc_certify.checker.vectors import SideFiles, beside
 from ptcc_certify.definite import arithmetic
+from ptcc_certify.work import keeps
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100
+#: Bytes that a node takes, at most about, and an edge in a side file, or in the JSON.
+NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 NOMINAL = ("T", "rho1", "rho2", "kappa")
 SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
 COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
@@ -31,6 +34,10 @@ class StructureCheck:
         self.steps: list[Step] = []
         self.at, self.sha256, self.next = "format", "", 0
         self.theorem = ""
+
+    def _bounded_size(self, rows: int) -> None:
+        """Refuse matrices for which the arithmetic at hand would take long."""
+        need(rows <= self.exact.rows, f"a matrix of {rows} rows; {self.exact.name} takes {self.exact.rows}")
 
     def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: bool = False) -> dict[str, Any]:
         """Take the next obligation of the proof, which must be this one; return its numbers."""
@@ -66,7 +73,9 @@ class StructureCheck:
         how = fields(said["read"], ("orientation", "duplicates", "self_loops", "undirected"), "read")
         need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
         need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
-        need(re.fullmatch(r"refused|dropped [0-9]{1,12}", str(how["self_loops"])) is not None, "read: self_loops")
+        loops = how["self_loops"]
+        kept = isinstance(loops, str) and re.fullmatch(r"refused|dropped [0-9]{1,12}", loops) is not None
+        need(kept, "read: self_loops")
         need(isinstance(how["undirected"], bool), "read: undirected")
         self.labels = entries(said["nodes"], "nodes")
         need(
@@ -75,9 +84,14 @@ class StructureCheck:
         self.index = {label: i for i, label in enumerate(self.labels)}
         need(len(self.index) == len(self.labels), "a node occurs twice")
         self.n = len(self.labels)
+        self._fit(NODE_BYTES * self.n)
         self.digraph = digraph(self.n, *self._edges(said["edges"]), self.exact.numpy)
         self.sha256 = self.digraph.sha256(self.labels)
         need(said["sha256"] == self.sha256, "the SHA-256 of the edge list is another")
+
+    def _fit(self, size: int) -> None:
+        """Refuse a graph for which the memory does not suffice."""
+        need(keeps(size), "a graph that may take more memory than is allowed; allow more by --memory")
 
     def _edges(self, said: Any) -> tuple[Any, Any, Any, int]:
         """Return sources, targets, weights and what divides the weights."""
@@ -86,10 +100,12 @@ class StructureCheck:
             count, scale = said["count"], exact(said["scale"])
             need(type(count) is int and 0 < count <= self.n**2, "edges: count is no number of edges")
             need(scale > 0 and scale.denominator == 1, "scale is not a positive integer")
+            self._fit(EDGE_BYTES[0] * count)
             source, target, weight = (self.files.column(said[key], count) for key in ("source", "target", "weight"))
             need(source.typecode == target.typecode == "q", "ends of edges are not integers")
             return source, target, weight, int(scale)
-        rows = [entries(row, "an edge", 3) for row in entries(said, "edges")]
+        self._fit(EDGE_BYTES[1] * len(entries(said, "edges")))
+        rows = [entries(row, "an edge", 3) for row in said]
         need(all(isinstance(x, str) and x in self.index for row in rows for x in row[:2]), "an edge of an unknown node")
         return [self.index[r[0]] for r in rows], [self.index[r[1]] for r in rows], [exact(r[2]) for r in rows], 1
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.checker.reading import RejectedError, exact, fields, integers, need
+from ptcc_certify.checker.reading import RejectedError, exact, fields, integers, longest, need, sized
 
 NPY = re.compile(r"\{'descr': '(<i8|<f8)', 'fortran_order': False, 'shape': \(([0-9]{1,12}),\), \} *\n")
 
@@ -102,10 +102,12 @@ class SideFiles:
             return self.files[name]
         try:
             need((self.folder / name).is_file(), f"side file {name} cannot be read")
-            need((self.folder / name).stat().st_size <= largest, f"side file {name} is not a vector of so few numbers")
-            return (self.folder / name).read_bytes()
+            with (self.folder / name).open("rb") as file:
+                content = file.read(largest + 1)
         except OSError:
             raise RejectedError(f"side file {name} cannot be read") from None
+        need(len(content) <= largest, f"side file {name} is not a vector of so few numbers")
+        return content
 
     def _vector(self, said: dict[str, Any], what: str, count: int) -> array[Any]:
         need(said["count"] == count, f"{what} has not {count} entries")
@@ -130,10 +132,11 @@ class SideFiles:
         values = self._vector(said, what, count)
         if values.typecode == "d":
             need("scale" not in said, f"{what}: only integers have a scale")
-            ratios = [x.as_integer_ratio() for x in values]
-            common = max((q for _, q in ratios), default=1)  # they are powers of two
-            return Numbers([p * (common // q) for p, q in ratios], common)
+            common = max((x.as_integer_ratio()[1] for x in values), default=1)  # they are powers of two
+            sized(count, common.bit_length() + longest(int(end(values)) for end in (min, max) if count), what)
+            return Numbers([p * (common // q) for p, q in map(float.as_integer_ratio, values)], common)
         scale = exact(said.get("scale", "1"))
         need(scale > 0, f"{what}: the scale is not positive")
         factor = scale.denominator
+        sized(count, 64 + factor.bit_length(), what)
         return Numbers(values.tolist() if factor == 1 else [factor * x for x in values], scale.numerator)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gzip
 import os
-from collections.abc import Iterable
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
 
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graph import SignedDigraph
@@ -94,6 +94,78 @@ def read_graph(
     rows = _READERS.get(ending, read_edge_list)(read_bytes(path, name), name)
     way = "matrix" if ending in _MATRICES and orientation != "information" else orientation or "information"
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
+
+
+def read_graph_as(
+    path: Source,
+    read: Mapping[str, Any],
+    *,
+    orientation: str | None = None,
+    duplicates: Literal["refuse", "sum", "last"] | None = None,
+    drop_self_loops: bool | None = None,
+    undirected: bool | None = None,
+) -> SignedDigraph:
+    """Read a file as another graph was read; see :func:`read_graph`.
+
+    Parameters
+    ----------
+    path : str, Path or file object
+    read : mapping
+        ``graph.read`` of the other graph, or of its certificate.
+    orientation, duplicates, drop_self_loops, undirected : optional
+        Count in place of what ``read`` says.
+
+    Returns
+    -------
+    SignedDigraph
+
+    Raises
+    ------
+    FormatError, ParameterError
+        See :func:`read_graph`.
+
+    Examples
+    --------
+    >>> from io import StringIO
+    >>> graph = read_graph(StringIO("a,b,1"), orientation="listens")
+    >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
+    True
+    """
+    if orientation is None and read["orientation"] == "listens" and name_and_ending(path)[1] not in _MATRICES:
+        orientation = "listens"
+    told: Any = {"refused": "refuse"}.get(read["duplicates"], read["duplicates"])
+    return read_graph(
+        path,
+        orientation=orientation,
+        duplicates=told if duplicates is None else duplicates,
+        drop_self_loops=read["self_loops"] != "refused" if drop_self_loops is None else drop_self_loops,
+        undirected=read["undirected"] if undirected is None else undirected,
+    )
+
+
+def reading_flags(read: Mapping[str, Any]) -> str:
+    """Return how a graph was read, as flags of the command line.
+
+    Parameters
+    ----------
+    read : mapping
+        ``graph.read``.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from io import StringIO
+    >>> reading_flags(read_graph(StringIO("a,b,1"), orientation="listens", duplicates="sum").read)
+    '--edges listens --duplicates sum'
+    """
+    words = ["a matrix" if read["orientation"] == "matrix" else f"--edges {read['orientation']}"]
+    words += [f"--duplicates {read['duplicates']}"] * (read["duplicates"] != "refused")
+    words += ["--drop-self-loops"] * (read["self_loops"] != "refused")
+    words += ["--undirected"] * bool(read["undirected"])
+    return " ".join(words)
 
 
 def _refuse_unknown(option: str, value: str, choices: Iterable[str]) -> None:

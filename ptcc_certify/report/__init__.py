@@ -38,6 +38,7 @@ def write_report(
     *,
     simulation: bool | None = None,
     progress: Callable[[str], None] = lambda step: None,
+    memory: float = 1,
 ) -> str:
     """Check a certificate's file and write a report of it: a page (``.html``) or a statement in LaTeX (``.tex``).
 
@@ -54,6 +55,8 @@ def write_report(
         Whether to repeat the CVODES run for the figures; by default up to 1,000 agents.
     progress : callable
         Told which of ``independent check``, ``simulation``, ``report`` begins.
+    memory : float
+        GB that the check may take; see :func:`ptcc_certify.checker.check`.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def write_report(
         raise ParameterError(f"{output}: LaTeX wants a plain name; use letters, digits, -, _ and .")
     progress("independent check")
     try:
-        saved = read_certificate(certificate)
+        saved = read_certificate(certificate, memory=memory)
     except RejectedCertificate as error:
         if suffix == ".tex":
             raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import shlex
 from collections import Counter
 from fractions import Fraction
@@ -11,6 +12,7 @@ from itertools import islice
 from ptcc_certify.bounds import FRACTIONS
 from ptcc_certify.document import producer
 from ptcc_certify.effort import Effort
+from ptcc_certify.io.graph_files import reading_flags
 from ptcc_certify.plots import DRAWN_NODES
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.rationals import nearest_float
@@ -565,6 +567,8 @@ class _Page:
     def check(self) -> str:
         """Return how a stranger verifies the file, and by which hashes it is known."""
         saved, name = self.saved, shlex.quote(self.saved.path.name)
+        name = f"./{name}" if name.startswith("-") else name
+        more = f" --memory {math.ceil(saved.report.memory)}" if saved.report.memory > 1 else ""
         rows = [
             ("SHA-256 of the file", f"<code>{saved.sha256}</code>"),
             ("SHA-256 of the graph", f"<code>{escaped(saved.report.sha256)}</code>"),
@@ -572,10 +576,12 @@ class _Page:
             ("Written by, as the file says", escaped(saved.document["producer"], 200)),
             ("Checked by", producer()),
         ]
-        commands = [f"ptcc check {name} YOUR_GRAPH.csv", f"python -m ptcc_certify.checker {name} --stdlib"]
+        commands = [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]
         return (
-            "<p>The page is made from the certificate's file and proves nothing by itself; the file does. The first "
-            "command checks it, and that it speaks of your graph; the second needs Python alone. The format is "
+            "<p>The page is made from the certificate's file and proves nothing by itself; the file does. Either "
+            "command checks it, in its folder; the second needs Python alone. Add the file of your graph to the first, "
+            "and it is compared with that of the certificate, read in the same way "
+            f"(<code>{escaped(reading_flags(saved.document['graph']['read']))}</code>). The format is "
             "specified in <code>ptcc_certify/checker/FORMAT.md</code>, for a checker of your own.</p>"
             f"<pre>{html.escape(chr(10).join(printable(c, 300) for c in commands))}</pre>"
             + table("What to compare", ("What", "Value"), rows, stack=True)
