@@ -242,7 +242,7 @@ class SlidingEnvelope(Envelope):
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = sliding_bound(self.protocol, self.sigma0, knots, self.reaching) / unit
+        size = self._sizes(knots) / unit
         forcing = _column_norms(B @ size)
         s = self._clock_at(knots)
         step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
@@ -256,6 +256,14 @@ class SlidingEnvelope(Envelope):
         later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
         sliding = np.append(_column_norms(C @ size), 0.0)
         return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
+
+    def _sizes(self, z: np.ndarray) -> np.ndarray:
+        """Return the bounds of ``|sigma_k|``, which all members share."""
+        last: tuple[np.ndarray, np.ndarray] | None = self.__dict__.get("_last_sizes")
+        if last is None or not np.array_equal(last[0], z):
+            last = z, sliding_bound(self.protocol, self.sigma0, z, self.reaching)
+            self.__dict__["_last_sizes"] = last
+        return last[1]
 
     @cached_property
     def _pieces(self) -> np.ndarray:
