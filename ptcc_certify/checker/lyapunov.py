@@ -31,6 +31,7 @@ from ptcc_certify.sparse_definite import residual_definite
 from ptcc_certify.work import fits, spend
 
 Matrix = list[list[int]]
+ZERO = Fraction(0)
 Sparse = list[dict[int, int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
 
@@ -220,9 +221,11 @@ class LyapunovCheck(OutcomeCheck):
         A, bits = self._block(nodes), 2 * _length(weights) + self.digraph.bits
         sized(len(nodes) ** 2, bits + self.digraph.unit.bit_length(), "W A + A'W")
         spend(4 * len(nodes) ** 2, bits, bits, "W A + A'W")
+        (own,), scale = integers([weights])
+        scale *= self.digraph.unit
         return [
-            [(weights[i] * A[i][j] + weights[j] * A[j][i]) / self.digraph.unit for j in range(len(A))]
-            for i in range(len(A))
+            [Fraction(own[i] * x + own[j] * A[j][i], scale) if x or A[j][i] else ZERO for j, x in enumerate(row)]
+            for i, row in enumerate(A)
         ]
 
     def _coupled(self, gamma: dict[int, Fraction] | None, rho: Fraction) -> list[list[Fraction]]:
