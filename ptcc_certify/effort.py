@@ -495,7 +495,7 @@ def _proved_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
     matrix = form.matrix or ()
     scale = math.lcm(*(x.denominator for row in matrix for x in row))
-    P = [[int(x * scale) for x in row] for row in matrix]
+    P = [[x.numerator * (scale // x.denominator) for x in row] for row in matrix]
     above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
     if above is None:
         return None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import lru_cache
 from math import isqrt
 from operator import mul
 
@@ -44,6 +45,7 @@ def sqrt(x: Fraction, bits: int = BITS) -> Enclosure:
     return Fraction(root, 1 << shift), Fraction(root + 1, 1 << shift)
 
 
+@lru_cache(maxsize=256)  # bounds of many agents ask for the same few
 def exp(x: Fraction, bits: int = BITS) -> Enclosure:
     """Enclose ``e^x``.
 

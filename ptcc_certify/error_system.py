@@ -160,5 +160,5 @@ def rounded_matrix(P: np.ndarray, bits: int) -> Matrix:
     """Return a symmetric matrix in integers, its largest entry of that many bits; the scale is immaterial."""
     top = float(np.abs(P).max())
     unit = 2.0 ** (bits - np.ceil(np.log2(top)))
-    rows = [[Fraction(round(float(x) * unit)) for x in row] for row in P]
-    return [[rows[max(i, j)][min(i, j)] for j in range(len(P))] for i in range(len(P))]
+    whole = np.rint(np.tril(P) * unit)
+    return [[Fraction(int(x)) for x in row] for row in (whole + np.tril(whole, -1).T).tolist()]

@@ -594,7 +594,9 @@ class InputBounds:
         return self._kept[z]
 
     def _reached(self, k: int, z: Fraction) -> tuple[list[tuple[Fraction, Fraction]], Fraction]:
-        """Bound ``sqrt(V)`` while sliding variables move: at the begin of each piece, what it adds, and at ``z``.
+        """Bound ``sqrt(V)`` while sliding variables move: at the begin of each piece, and what it adds.
+
+        From ``z`` on ``sqrt(V)`` is at most the last number times ``e^(-rate s / 2)``.
 
         In a piece from ``a`` to ``b`` of the time ``sqrt(V)`` gains at most ``w (psi(a) - psi(b)) + f (b - a)``, ``w``
         and ``f`` being the norms of what bounds ``L sigma``, ``|sigma_k| <= |sigma_k(0)|``, and ``L f``.
@@ -609,7 +611,8 @@ class InputBounds:
                 added = rounded(w * piece.drop + f * piece.time, BITS, up=True)
                 found.append((v, added))
                 v = rounded(v * decay_above(form.rate / 2 * piece.clock_below) + added, BITS, up=True)
-            self._kept[k, z] = found, v
+            begin = rounded(v * exp(form.rate / 2 * self.gain.clock_above(z), BITS)[1], BITS, up=True)
+            self._kept[k, z] = found, begin
         return self._kept[k, z]
 
     def share(self, k: int, limits: Limits, clock: Fraction, growth: Fraction) -> Fraction:
@@ -659,8 +662,7 @@ class InputBounds:
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
             return of(self.gain, held, c * self.start(k), rate, z)
-        pieces, end = self._reached(k, z)
-        begin = end * exp(rate / 2 * self.gain.clock_above(z), BITS)[1]
+        pieces, begin = self._reached(k, z)
         early, late = self._early(of, held, c, z, pieces), of(self.gain, Fraction(0), c * begin, rate, z)
         return rounded(max(early, late) if of is peak_above else early + late, BITS, up=True)
 

@@ -336,9 +336,9 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
     if rate is None:
         return None
     size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
-    identity = diagonal_matrix([Fraction(1)] * n)
-    lowest = prove_generalized_margin(P, identity, float(size[0]))
-    negated = prove_generalized_margin([[-x for x in row] for row in P], identity, -float(size[-1]))
+    whole, identity = [[x.numerator for x in row] for row in P], np.eye(n, dtype=int).tolist()
+    lowest = prove_generalized_margin(whole, identity, float(size[0]))
+    negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
     if lowest is None or lowest <= 0 or negated is None:
         return None
     return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, candidate.rate)

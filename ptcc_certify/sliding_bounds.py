@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 
 # The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
 _PIECES = 4000
+#: Arrays of instants whose bounds are kept.
+_MOST_KNOWN = 8
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,7 @@ class SlidingEnvelope(Envelope):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
         kept = bool((trajectory.reaching_z <= certain + late).all())
         z = self._z(trajectory)
-        bound, size = sliding_bound(self.protocol, self.sigma0, z, self.reaching), np.abs(sigma0).max(initial=0.0)
+        bound, size = self._sliding(z), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(excess > 0, excess / bound, 0.0)
@@ -242,7 +244,7 @@ class SlidingEnvelope(Envelope):
         half = member.rate / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = sliding_bound(self.protocol, self.sigma0, knots, self.reaching) / unit
+        size = self._sliding(knots) / unit
         forcing = _column_norms(B @ size)
         s = self._clock_at(knots)
         step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
@@ -256,6 +258,19 @@ class SlidingEnvelope(Envelope):
         later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
         sliding = np.append(_column_norms(C @ size), 0.0)
         return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
+
+    @cached_property
+    def _known(self) -> dict[bytes, np.ndarray]:
+        return {}
+
+    def _sliding(self, z: np.ndarray) -> np.ndarray:
+        """Return :func:`sliding_bound`, which every member asks for at the same instants."""
+        key = z.tobytes()
+        if key not in self._known:
+            if len(self._known) > _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
+        return self._known[key]
 
     @cached_property
     def _pieces(self) -> np.ndarray:
@@ -301,7 +316,7 @@ class SlidingEnvelope(Envelope):
             with np.errstate(invalid="ignore", over="ignore"):
                 bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
                 norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
-        size = sliding_bound(self.protocol, self.sigma0, z, self.reaching) / unit
+        size = self._sliding(z) / unit
         bounds, norm = bounds + size, norm + _column_norms(size)
         if any(m.distance is not None for m in self.members):
             most = self._largest_deviation(x0) / unit * (1 + 1e-15)

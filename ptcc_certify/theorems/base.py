@@ -298,9 +298,14 @@ def to_floats(S: Matrix) -> np.ndarray:
 def prove_direct(structure: Structure, V: LyapunovFunction, letter: str) -> RateProof:
     """Prove ``Omega A + A' Omega > m I`` on the rows of ``V``, hence the rate ``m / lmax(Omega)``."""
     weights = V.weights
-    A = exact_block(structure.graph.exact_laplacian(), V.nodes, V.nodes)
-    S = symmetric_product(weights, A)
-    m = prove_margin(S, smallest_eigenvalue(to_floats(S)))
+    A, unit = integer_matrix(exact_block(structure.graph.exact_laplacian(), V.nodes, V.nodes))
+    w, scale = integer_matrix([weights])
+    product = integer_rows(A)
+    own = integer_rows(w)[0]
+    S = [[own[i] * x + own[j] * product[j][i] for j, x in enumerate(row)] for i, row in enumerate(product)]
+    Z = [[unit * scale * (i == j) for j in range(len(own))] for i in range(len(own))]
+    guess = smallest_eigenvalue(np.array([[x / (unit * scale) for x in row] for row in S]))
+    m = prove_generalized_margin(S, Z, guess) if guess > 0 else None
     if m is None:
         return RateProof(None, (), failed=f"{letter} is not proved positive definite")
     return RateProof(m / max(weights), (Obligation("margin", "paper", {"m": m} | _rho(V)),))
