@@ -36,6 +36,8 @@ from ptcc_certify.checker import check
 REAL = ("wiki-elec.txt.gz", "soc-sign-bitcoinotc.csv.gz", "soc-sign-epinions.txt.gz")
 CORES = REAL[:2]
 SIZES = (1000, 3000, 10_000, 30_000, 100_000, 300_000, 1_000_000)
+#: GB that a check may take: a million nodes need 2.
+MEMORY = 4
 READING = ("--edges", "listens", "--drop-self-loops")
 
 
@@ -117,7 +119,7 @@ def one(name: str) -> dict[str, Any]:
         first = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         del cert, graph
         checking = time.perf_counter()
-        report = check(path)
+        report = check(path, memory=MEMORY)
         done = time.perf_counter()
     assert report.accepted, (report.rejected, report.reason)
     return {
@@ -151,7 +153,7 @@ def core(path: Path) -> dict[str, Any]:
     times.append(time.perf_counter())
     cert = certify(graph, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), simulation=False)
     times.append(time.perf_counter())
-    report = check(cert.to_dict())
+    report = check(cert.to_dict(), memory=MEMORY)
     times.append(time.perf_counter())
     assert report.accepted, (report.rejected, report.reason)
     names = ("left vector", "spectrum", "proof", "certify", "check")
@@ -197,7 +199,7 @@ def real_table(folder: Path, names: list[str], runs: int) -> list[dict[str, Any]
         with tempfile.TemporaryDirectory() as place:
             out = str(Path(place) / "c.json")
             made = [command("certify", file, *READING, "--no-simulation", "-o", out) for _ in range(runs)]
-            checked = [command("check", out, file, *READING) for _ in range(runs)]
+            checked = [command("check", out, file, "--memory", str(MEMORY)) for _ in range(runs)]
             assert all(code == 0 for _, _, code in checked), checked
             data = json.loads(Path(out).read_text())
         graph = ptcc.read_graph(file, orientation="listens", drop_self_loops=True)

@@ -39,6 +39,7 @@ from ptcc_certify.actuator import Actuator
 from ptcc_certify.certificate import certify
 from ptcc_certify.checker import check, digraph
 from ptcc_certify.effort import box, ellipsoid
+from ptcc_certify.graph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 CLASSES = dict(all_classes())
@@ -103,6 +104,9 @@ def cases() -> list[Case]:
         found += [(f"{name}, large", large, {}), (f"{name}, side files", *with_side_files(large))]
         if "disconnected" not in name:
             found.append((f"{name}, factors", *with_side_files(with_factors(large))))
+    ring = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 1, 1)])
+    line = certify(ring, NominalProtocol(T=1, rho1=1, rho2="1/3", kappa=2), [1, 5, -2], simulation=False)
+    found.append(("spectrum on the line", {**json.loads(line.to_json()), "unverified": {}}, {}))
     found.append(("undecided", made("1.1", 5, large=True, method="full"), {}))
     kinds = {data["verdict"] for _, data, _ in found}
     assert kinds == {"certified", "undecided"}
