@@ -253,7 +253,7 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
 
 def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
-    what, rate, bound = f"rate >= {near(least)}", certificate.rate, certificate.upper_bound
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
     if certificate.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
     if bound is not None and least > bound:
@@ -264,7 +264,7 @@ def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> 
 
 def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
-    effort, what = certificate.effort, f"|u_k| <= {near(most)}"
+    effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
     if certificate.constant:
         return Answer(MET, what)
     least, proved = input_range(certificate)
@@ -314,7 +314,7 @@ def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
     residual = () if effort is None else effort.residual
     if len(residual) < len(certificate.limits) and not certificate.constant:
         period = None if effort is None else effort.longest_period
-        why = "nothing is certified under them" if period is None else f"certified up to a period of {down(period, 4)}"
+        why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
         found.append(Answer(OPEN, "limits", why))
     if certificate.noise is not None and not any(entry.noise for entry in residual):
         found.append(Answer(OPEN, "noise", "not certified"))

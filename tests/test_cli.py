@@ -767,7 +767,7 @@ def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     assert run.code == 0 and "held for 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
     coarse = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "0.5")
     assert "not certified with this period; up to 0.00" in coarse.out and coarse.code == 4
-    assert "verdict    left open: limits (certified up to a period of 0.00" in coarse.out
+    assert "verdict    left open: limits (certified with a period of 0.00" in coarse.out
     rows = ptcc("simulate", "fig1a", "--gain-cap", "20", "--samples", "11").out.splitlines()
     assert (
         rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines() and rows[0] == "t,remaining,1,2,3,4,5,6"

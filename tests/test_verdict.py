@@ -16,7 +16,6 @@ from bad_inputs import ptcc
 from generators import all_classes, random_graph
 
 from ptcc_certify import (
-    Actuator,
     Expectations,
     NominalProtocol,
     SignedDigraph,
@@ -150,8 +149,8 @@ def test_codes_are_worst_first():
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     [
-        (("--sample-period", "0.5"), 4, "left open: limits (nothing is certified under them)"),
-        (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified up to a period of 0.00"),
+        (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
+        (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified with a period of 0.00"),
         (("--noise", "1"), 4, "left open: noise (not certified)"),
         (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (not certified)"),
         (("--gain-cap", "20"), 0, "certified; "),
@@ -197,9 +196,8 @@ def test_where_nothing_is_decided_it_says_what_to_try(graph: Any, method: str, s
 def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
     """With what was asked; the page of a bound that says little is not green."""
     asked = Expectations("stability", Fraction(10), Fraction(10**6))
-    limits = [Actuator(sample_period="0.5")]
     protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.01", kappa=1)
-    weak = certify(load_graph("fig1a"), protocol, [1] * 6, limits=limits, expectations=asked, simulation=False)
+    weak = certify(load_graph("fig1a"), protocol, [1] * 6, noise=1, expectations=asked, simulation=False)
     weak.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert saved.expectations == asked and saved.assessment == weak.assessment
