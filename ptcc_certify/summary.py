@@ -134,7 +134,8 @@ def _class_lines(certificate: Certificate) -> list[str]:
     if found.tried:
         tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
         limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
-        lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit})"))
+        time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
+        lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit}{time})"))
         taken = [f"{m.kind} {down(m.rate, 4)} (prefactor {up(m.prefactor, 2)})" for m in found.members]
         lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
     return lines
