@@ -219,4 +219,5 @@ def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
     with np.errstate(all="ignore"):
         moved = np.ldexp(rows, [-half for half in halves]) @ Z
         apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
-    return (moved, power, apart) if np.isfinite((moved**2).sum()) else (np.zeros_like(rows), 0, math.inf)
+        finite = bool(np.isfinite((moved**2).sum()))
+    return (moved, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)

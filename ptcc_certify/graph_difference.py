@@ -34,7 +34,7 @@ def difference(one: SignedDigraph, other: SignedDigraph) -> str | None:
     >>> difference(told, SignedDigraph.from_edges([("b", "a", 1), ("c", "b", -2)]))
     'every edge points the other way: read it with --edges listens?'
     >>> difference(told, SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]))
-    '1 of 2 edges has another sign, such as b -> c: -2 in the certificate, 2 in the graph'
+    '1 of 2 edges has another sign (the signs are dropped), such as b -> c: -2 in the certificate, 2 in the graph'
     """
     if one.sha256 == other.sha256:
         return None

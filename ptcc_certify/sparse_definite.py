@@ -10,13 +10,12 @@ products of matrices of small integers, whose sums are below ``2^53`` and theref
 
 from __future__ import annotations
 
+import operator
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
-
-from ptcc_certify.work import fits
 
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
@@ -204,6 +203,7 @@ def residual_definite(
     weights: Any = None,
     scale: int = 1,
     numpy: bool | None = None,
+    fits: Callable[[float, float], bool] = operator.le,
 ) -> bool:
     """Check that a rounded sparse factor proves a symmetric matrix positive definite, in integers.
 
@@ -231,6 +231,8 @@ def residual_definite(
         Positive.
     numpy : bool, optional
         Default: NumPy if the data of the factor are an array, otherwise the standard library.
+    fits : callable
+        Tells whether a size is within a limit.
 
     Returns
     -------
@@ -288,14 +290,15 @@ def residual_definite(
         a, b = place[i], place[j]
         T[(a, b) if a >= b else (b, a)] += value << (shift + up)
     judge = _residual_numpy if wanted else _residual_plain
-    return judge(n, T, (indptr, indices, data), scale << up, weights)
+    return judge(n, T, (indptr, indices, data), scale << up, weights, fits)
 
 
 Triangle = dict[tuple[int, int], int]
 Factor = tuple[list[int], list[int], list[int]]
+Fits = Callable[[float, float], bool]
 
 
-def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
+def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int], fits: Fits) -> bool:
     indptr, indices, data = factor
     pairs = sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(indptr))
     if pairs > LARGEST_PAIRS:
@@ -329,12 +332,12 @@ def _residual_plain(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     return min(spare) > 0
 
 
-def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int]) -> bool:
+def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence[int], fits: Fits) -> bool:
     """Check as :func:`_residual_plain`: leading columns pair by pair, trailing ones as a dense block of slices."""
     import numpy as np
 
     if max(map(abs, factor[2]), default=0) > INT64_SAFE:
-        return _residual_plain(n, T, factor, times, d)
+        return _residual_plain(n, T, factor, times, d, fits)
     indptr, indices, data = (np.array(x, dtype=np.int64) for x in factor)
     counts = np.diff(indptr)
     left = n - np.arange(n + 1.0)
@@ -352,7 +355,7 @@ def _residual_numpy(n: int, T: Triangle, factor: Factor, times: int, d: Sequence
     squares = _slice_products(_slices_of(corner, width, slices))
     sums = _pair_products(n, first, indptr, indices, _slices_of(data, width, slices))
     if squares is None or sums is None:
-        return _residual_plain(n, T, factor, times, d)
+        return _residual_plain(n, T, factor, times, d, fits)
     if not fits((len(sums[0]) + corner.size) * times.bit_length(), LARGEST_BITS):
         return False
     block = sum(square.astype(object) << (width * m) for m, square in enumerate(squares))

@@ -298,7 +298,7 @@ def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int
     Path("g.csv").write_text("\n".join(rows) + "\n")
     start = ",".join(f"{k}.{10**digits + k}" for k in range(6))
     run = ptcc("certify", "g.csv", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
-    assert run.code == 0 and run.out.splitlines()[-1].split() == ["verdict", "certified"]
+    assert run.code == 0 and run.out.splitlines()[-1].startswith("verdict    certified")
 
 
 def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):

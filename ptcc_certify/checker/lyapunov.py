@@ -445,6 +445,7 @@ class LyapunovCheck(OutcomeCheck):
             scale *= self.digraph.unit**2
         scale *= times.denominator
         told: dict[str, Any] = {"power": said["power"], "weights": vector, "scale": scale, "numpy": self.exact.numpy}
+        told["fits"] = fits
         proved = residual_definite(n, lower, order, columns, exponents, said["bits"], **told)
         need(proved, "a leader group is not proved by its factor")
 

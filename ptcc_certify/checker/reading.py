@@ -99,7 +99,7 @@ def loaded_bytes(content: bytes | bytearray, text: str) -> int:
     Examples
     --------
     >>> loaded_bytes(b"[[], []]", "[[], []]")
-    237
+    359
     """
     objects, arrays, keys, commas, quotes = (content.count(x) for x in (b"{", b"[", b":", b",", b'"'))
     width = 1 if text.isascii() else -(-(sys.getsizeof(text) - 80) // len(text))  # bytes of a character
