@@ -211,12 +211,12 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
 def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
     """Return ``D Z`` over a power of two, that power, and how far ``Z'F Z`` is from the identity, in floats."""
     rows, power = floats(D)
-    try:
-        T, halves = unit_diagonal(F)
-        Z = np.linalg.inv(np.linalg.cholesky(T)).T
-    except np.linalg.LinAlgError:
-        return np.zeros_like(rows), 0, math.inf
     with np.errstate(all="ignore"):
+        try:
+            T, halves = unit_diagonal(F)
+            Z = np.linalg.inv(np.linalg.cholesky(T)).T
+        except np.linalg.LinAlgError:
+            return np.zeros_like(rows), 0, math.inf
         moved = np.ldexp(rows, [-half for half in halves]) @ Z
         apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
         finite = bool(np.isfinite((moved**2).sum()))
