@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import pickle
 import select
@@ -17,6 +19,8 @@ from lmi.errors import LMIError
 
 _HEAD = 8
 _ITEM, _ERROR, _END = range(3)
+#: PR_SET_PDEATHSIG of Linux.
+_DEATH_SIGNAL = 1
 
 
 def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
@@ -55,11 +59,18 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         yield from work()
         return
     here, there = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a solver keeps: the child uses none
-        child = os.fork()
+    parent = os.getpid()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a solver keeps: the child uses none
+            child = os.fork()
+    except OSError:  # no more processes
+        os.close(here)
+        os.close(there)
+        yield from work()
+        return
     if child == 0:
-        _work(work, here, there)
+        _work(work, here, there, parent)
     os.close(there)
     try:
         while True:
@@ -71,13 +82,17 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
             yield value
     finally:
         os.close(here)
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):  # where children are not waited for
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
 
 
-def _work(work: Callable[[], Iterable[Any]], here: int, there: int) -> None:
+def _work(work: Callable[[], Iterable[Any]], here: int, there: int, parent: int) -> None:
     """Do the work in the child, send what it yields, and leave without cleaning up what belongs to the parent."""
     try:
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)  # ends with the parent, however that ends
+        if os.getppid() != parent:
+            os._exit(0)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told, and ends the child
         os.close(here)
         try:
@@ -85,9 +100,17 @@ def _work(work: Callable[[], Iterable[Any]], here: int, there: int) -> None:
                 _send(there, _ITEM, value)
             _send(there, _END, None)
         except BaseException as error:
-            _send(there, _ERROR, error)
+            _send(there, _ERROR, _portable(error))
     finally:
         os._exit(0)
+
+
+def _portable(error: BaseException) -> BaseException:
+    """Return an error that survives pickling."""
+    try:
+        return pickle.loads(pickle.dumps(error))  # noqa: S301  what was made here
+    except Exception:
+        return LMIError(f"{type(error).__name__}: {error}")
 
 
 def _send(there: int, kind: int, value: Any) -> None:

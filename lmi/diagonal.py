@@ -46,6 +46,13 @@ SOLVERS = ("clarabel", "interior-point", "sdpa")
 COUPLING_LOSS = 5e-7
 
 
+def load_solver() -> None:
+    """Import cvxpy with Clarabel, a second's work that otherwise falls into the first search."""
+    import cvxpy
+
+    cvxpy.installed_solvers()
+
+
 def diagonal_lyapunov(
     A: Any,
     *,

@@ -21,6 +21,7 @@ import numpy as np
 from lmi import deadline
 from lmi.apart import apart
 from lmi.deadline import share_of_time
+from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.actuator import Actuator
 from ptcc_certify.bounds import FRACTIONS, Comparison, Envelope, Member, remaining_part
@@ -64,9 +65,11 @@ STEPS = (
     "outcome",
     "independent check",
 )
+#: Below this time limit, in seconds, the solver is loaded before the time begins to run.
+SHORT_LIMIT = 10
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
-SEARCHING, SHARES = 0.7, (0.3, 0.4, 0.8, 1.0)
+SEARCHING, SHARES = 0.7, (0.3, 0.3, 0.8, 1.0)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
@@ -619,6 +622,8 @@ ReachingTime(0, 1 before T_r)))
         source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical, limit, sharpening = None, RateProof(None, ()), None, None, Sharpening()
+    if seconds < SHORT_LIMIT and graph.n_nodes <= CLARABEL_MARGIN_ROWS:
+        load_solver()
     with deadline.time_limit(SEARCHING * seconds):
         if begin is not None:
             progress(STEPS[0])

@@ -23,7 +23,7 @@ import numpy as np
 import lmi
 import lmi.full
 from lmi.apart import apart
-from lmi.deadline import checkpoint, share_of_time
+from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
 from lmi.errors import LMIError, OutOfTime
 from lmi.exact import prove_generalized_margin
 from lmi.matrices import block_columns
@@ -38,6 +38,8 @@ METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
 #: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
 SEARCHED_GROUP = (300, 2000)
+#: The share of the time left that the searches may take together.
+SEARCHING = 0.6
 #: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
 APART_NODES = 40
 #: The member with the largest rate is chosen among those with at most this prefactor.
@@ -173,7 +175,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
         "full": (0.4, lambda: _full_candidates(system, losses)),
         "lmi": (0.6, lambda: _lmi_candidates(system, method == "lmi" or at is not None)),
     }
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), time_limit(SEARCHING * seconds_left()):  # the rest is for the proofs
         for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue
@@ -189,6 +191,7 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                     continue
             if not found and f"class {kind}" not in cut_off:
                 notes.append(f"class {kind}: nothing was found in floating point")
+    with np.errstate(all="ignore"):
         every = [c for kind in METHODS for c in results.get(kind, ())]
         tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
         candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]

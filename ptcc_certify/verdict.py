@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptcc_certify.bounds import Envelope
-from ptcc_certify.input_bounds import PrescribedGain
+from ptcc_certify.input_bounds import PrescribedGain, Starts
 from ptcc_certify.lemmas import EXACT_NODES
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.rounding import down, near, up
@@ -235,7 +235,8 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
     elif certificate.constant:
         useful, said = True, "nothing to decay"
     else:
-        useful, said, advice = _usefulness(certificate)
+        limited = certificate.effort is not None and certificate.effort.residual
+        useful, said, advice = (_limited_usefulness if limited else _usefulness)(certificate)
     violated = seen is not None and seen.violated
     return Assessment(certificate.verdict, violated, useful, said, advice, tuple(answers))
 
@@ -285,7 +286,7 @@ def input_range(certificate: Certificate | SavedCertificate) -> tuple[Fraction |
     Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
     attained or approached: at the start, or where noise meets the largest gain, without a limit an infinite one.
     The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
-    under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` grows no further where the gain rests.
+    under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` stays below what is proved without these.
     """
     effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
     if effort is None:
@@ -316,7 +317,8 @@ def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
         period = None if effort is None else effort.longest_period
         why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
         found.append(Answer(OPEN, "limits", why))
-    if certificate.noise is not None and not any(entry.noise for entry in residual):
+    silent = len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
+    if certificate.noise is not None and (silent or not residual):
         found.append(Answer(OPEN, "noise", "not certified"))
     if certificate.delta is not None and (effort is None or effort.disturbed is None):
         found.append(Answer(OPEN, "delta", "not certified"))
@@ -347,6 +349,26 @@ def _usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str,
     if rho2 is None:
         return False, said, ""
     return False, said, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
+
+
+def _limited_usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str, str]:
+    """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
+    effort, start, way = certificate.effort, certificate.start, certificate.longest_way
+    residual = () if effort is None else effort.residual
+    noisy = any(entry.noise is not None for entry in residual)
+    if way is not None and not noisy and all(entry.agents is not None for entry in residual):
+        worst = max(x for entry in residual for x in entry.agents or ())
+        said = f"under the limits every agent within {up(worst, 2)} of its final state at T"
+        if worst <= USEFUL * way:
+            return True, said, ""
+    norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
+    region = (None if effort is None else effort.starts) or (None if start is None else Starts(start))
+    if region is None:
+        return False, f"under the limits ||E|| <= {up(norm, 2)} at T", ""
+    rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
+    first = math.sqrt(sum(float(region.largest(row)) ** 2 for row in rows))
+    left = float(norm) / first if first else 0.0
+    return left <= USEFUL, f"under the limits ||E|| <= {up(left, 2)} ||E(0)|| at T", ""
 
 
 def _share(envelope: Envelope, clock: float) -> float:

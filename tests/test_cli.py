@@ -290,6 +290,21 @@ def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: P
     assert run.err.rstrip().endswith("round them, to 17 digits say")
 
 
+@pytest.mark.parametrize("ending", ["npy", "mtx"])
+@pytest.mark.parametrize("options", [(), ("--edges", "information"), ("--edges", "listens")])
+def test_check_reads_a_matrix_as_its_certificate_says(folder: Path, ending: str, options: tuple[str, ...]):
+    W = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    if ending == "npy":
+        np.save("m.npy", W)
+    else:
+        from scipy.io import mmwrite
+
+        mmwrite("m.mtx", W)
+    assert ptcc("certify", f"m.{ending}", *options, "--x0", "1,2,3", "--no-simulation", "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", f"m.{ending}")
+    assert run.code == 0 and "accepted" in run.out, run.out
+
+
 @pytest.mark.parametrize("digits", [50, 200, 400])
 def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int):
     rows = [

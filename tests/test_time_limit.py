@@ -65,7 +65,9 @@ def test_every_search_ends_at_a_limit():
         lambda: lmi.rate_frontier(A),
         lambda: lmi.full_frontier(A),
         lambda: lmi.h_matrix_certificate(A),
-        lambda: lmi.prove_generalized_margin([[int(x) for x in row] for row in A + A.T], np.eye(40, dtype=int), 0.5),
+        lambda: lmi.prove_generalized_margin(
+            [[int(x) for x in row] for row in A + A.T], np.eye(40, dtype=int).tolist(), 0.5
+        ),
     ):
         with time_limit(0), pytest.raises(lmi.OutOfTime):
             search()
@@ -156,6 +158,39 @@ def test_the_death_of_a_process_is_told():
 
     with pytest.raises(lmi.LMIError, match="without an answer"):
         list(apart(dies))
+
+
+@linux
+def test_work_apart_is_done_where_children_are_not_waited_for():
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        assert list(apart(lambda: range(3))) == [0, 1, 2]
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+@linux
+def test_work_apart_is_done_here_where_no_process_can_be_made(monkeypatch: pytest.MonkeyPatch):
+    def refused() -> int:
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(os, "fork", refused)
+    before = set(os.listdir("/proc/self/fd"))
+    assert list(apart(lambda: range(3))) == [0, 1, 2]
+    assert set(os.listdir("/proc/self/fd")) == before
+
+
+def test_an_error_that_cannot_be_handed_over_is_told_in_words():
+    class OddError(Exception):
+        def __init__(self, one: int, other: int):
+            super().__init__(f"{one} and {other}")
+
+    def fails() -> Iterator[int]:
+        yield from ()
+        raise OddError(1, 2)
+
+    with pytest.raises((lmi.LMIError, OddError), match="1 and 2"):
+        list(apart(fails))
 
 
 @linux

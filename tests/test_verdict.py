@@ -154,7 +154,13 @@ def test_codes_are_worst_first():
         (("--noise", "1"), 4, "left open: noise (not certified)"),
         (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (not certified)"),
         (("--gain-cap", "20"), 0, "certified; "),
-        (("--gain-cap", "20", "--noise", "1", "--delta", "1"), 0, "certified; "),
+        (
+            ("--gain-cap", "20", "--noise", "1", "--delta", "1"),
+            0,
+            "certified, but with these gains the bound says little",
+        ),
+        (("--gain-cap", "0.001"), 0, "certified, but with these gains the bound says little by T: under the limits"),
+        (("--stop-before", "0.9", "--initial-bound", "2"), 0, "certified, but with these gains the bound says little"),
         (("--expect", "consensus", "--min-rate", "9.0438"), 3, "refuted: consensus (it is stability); left open: rate"),
     ],
 )

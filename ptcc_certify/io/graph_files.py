@@ -131,8 +131,9 @@ def read_graph_as(
     >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
     True
     """
-    if orientation is None and read["orientation"] == "listens" and name_and_ending(path)[1] not in _MATRICES:
-        orientation = "listens"
+    turned = "information" if name_and_ending(path)[1] in _MATRICES else "listens"  # each kind has its own default
+    if orientation is None and read["orientation"] == turned:
+        orientation = turned
     told: Any = {"refused": "refuse"}.get(read["duplicates"], read["duplicates"])
     return read_graph(
         path,
