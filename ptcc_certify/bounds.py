@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -196,10 +196,10 @@ class Member:
         mean = np.tensordot(share * g, X, axes=1)
         return X - np.multiply.outer(g, mean)
 
-    def exact_coordinates_of(self, x: Sequence[Fraction], rows: Sequence[Mapping[int, Fraction]]) -> list[Fraction]:
-        """Return ``z`` of one state in rationals; ``rows`` are those of ``L``."""
+    def exact_coordinates_of(self, x: Sequence[Fraction], error: Sequence[Fraction]) -> list[Fraction]:
+        """Return ``z`` of one state in rationals; ``error`` is its ``-L x``."""
         if self.coordinates == "E":
-            return [-sum((w * x[j] for j, w in rows[v].items()), Fraction(0)) for v in self.nodes.tolist()]
+            return [error[v] for v in self.nodes.tolist()]
         assert self.gauge is not None
         signs = [int(self.gauge[v]) for v in self.nodes.tolist()]
         own = [x[v] for v in self.nodes.tolist()]
@@ -507,9 +507,21 @@ class Envelope:
     def _rows(self) -> list[dict[int, Fraction]]:
         return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
 
+    @cached_property
+    def _errors(self) -> dict[tuple[Fraction, ...], list[Fraction]]:
+        return {}
+
+    def _exact_error(self, x0: Sequence[Fraction]) -> list[Fraction]:
+        """Return ``-L x0``, for which every member asks."""
+        key = tuple(x0)
+        if key not in self._errors:
+            self._errors.clear()
+            self._errors[key] = [-sum((w * key[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
+        return self._errors[key]
+
     def _start(self, member: Member, x0: Sequence[Fraction]) -> float:
         """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
-        z = member.exact_coordinates_of(x0, self._rows)
+        z = member.exact_coordinates_of(x0, self._exact_error(x0))
         top = max(map(abs, z), default=Fraction(0))
         if top == 0:
             return 0.0

@@ -564,8 +564,15 @@ class InputBounds:
             form = self.form(k)
             rows = self._coordinates(form)
             _count(form, rows, self.starts)
-            self._kept["start", k] = rounded(_largest_root(form, rows, self.starts), BITS, up=True)
+            known = [self._center[v] for v in form.nodes] if form.coordinates == "E" else None
+            self._kept["start", k] = rounded(_largest_root(form, rows, self.starts, known), BITS, up=True)
         return self._kept["start", k]
+
+    @cached_property
+    def _center(self) -> list[Fraction]:
+        """``L`` times the center of the starts."""
+        center = self.starts.center
+        return [sum((a * center[j] for j, a in row.items()), Fraction(0)) for row in self.rows]
 
     def _coordinates(self, form: Form) -> list[Linear]:
         """Return the rows of the coordinates of a form."""
@@ -684,7 +691,8 @@ class InputBounds:
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
         form = Form(one, "E", nodes, None, W, one)
         _count(form, [self.rows[v] for v in nodes], self.starts)
-        return _largest_root(form, [self.rows[v] for v in nodes], self.starts) ** 2
+        known = [self._center[v] for v in nodes]
+        return _largest_root(form, [self.rows[v] for v in nodes], self.starts, known) ** 2
 
     def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
         """Bound what disturbances ``|d_k| <= delta`` add to the inputs of the nominal protocol.
@@ -744,17 +752,20 @@ def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
         spend((entries + n * len(matrix)) * len(starts.center), bits, bits, "starts")
 
 
-def _largest_root(form: Form, rows: Sequence[Linear], starts: Starts) -> Fraction:
+def _largest_root(
+    form: Form, rows: Sequence[Linear], starts: Starts, center: Sequence[Fraction] | None = None
+) -> Fraction:
     """Bound ``sqrt(z'P z)`` over the starts, ``z = A X(0)`` with the rows of ``A``; ``sqrt(V)`` is a norm.
 
     The lesser of two bounds: from the largest ``|z_i|``, and from the center and ``M = A'P A``, with
-    ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid.
+    ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid. ``center`` is ``z`` of
+    the center, where it is known.
     """
 
     def moved(x: Sequence[Fraction]) -> list[Fraction]:
         return [sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
 
-    middle = root_above(form.value(moved(starts.center)))
+    middle = root_above(form.value(moved(starts.center) if center is None else center))
     if starts.point:
         return middle
     if starts.axes:
