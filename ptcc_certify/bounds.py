@@ -95,7 +95,10 @@ def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
 
 def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
     try:
-        array = np.asarray(values, dtype=float)
+        given = np.asarray(values)
+        if given.dtype.kind in "bUS":
+            raise TypeError("truth values and texts are no numbers")
+        array = given.astype(float)
     except (TypeError, ValueError):
         raise ParameterError(f"{name} = {shorten(repr(values))} is not a number, nor an array of numbers") from None
     outside = array[~((array >= 0) & (array <= most))]  # NaN is neither

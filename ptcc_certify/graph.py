@@ -334,6 +334,9 @@ class SignedDigraph:
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
         if values.dtype.kind == "f":
+            if (odd := np.flatnonzero(~np.isfinite(values))).size:
+                place = f"row {shorten(names[row[odd[0]]])}, column {shorten(names[column[odd[0]]])}"
+                raise GraphError(f"{place} of the matrix is {values[odd[0]]}; write 0 where there is no edge")
             weights = Weights(values.astype(np.float64))
         else:
             exact = []

@@ -376,7 +376,7 @@ NETWORKX = SignedDigraph.from_networkx
         (MATRIX, np.zeros((2, 2, 2)), "two dimensions"),
         (MATRIX, np.zeros((0, 0)), "no nodes"),
         (MATRIX, [[1, 0], [0, 0]], "self-loop at node 1"),
-        (MATRIX, [[0, np.nan], [0, 0]], "edge 2 -> 1 is not a finite number"),
+        (MATRIX, [[0, np.nan], [0, 0]], "row 1, column 2 of the matrix is nan; write 0"),
         (MATRIX, [[0, 1j], [0, 0]], "real numbers"),
         (MATRIX, [["a", "b"], ["c", "d"]], "real numbers"),
         (MATRIX, np.array([[0, "x"], [0, 0]], dtype=object), "not a number"),
