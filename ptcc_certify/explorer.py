@@ -336,7 +336,7 @@ def explore(graph: SignedDigraph | None = None, settings: Settings | None = None
     >>> view = explore()
     controls need a notebook with ipywidgets: pip install 'ptcc-certify[notebook]'
     >>> print(view.text.splitlines()[-1])
-    verdict    certified
+    verdict    certified; ||E|| <= 2.3e-06 ||E(0)|| at 0.99 T
     """
     explorer = Explorer(graph)
     if settings is None:

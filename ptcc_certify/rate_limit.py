@@ -78,9 +78,10 @@ def prove_rate_limit(structure: Structure) -> RateLimit | None:
     >>> pair = [(1, 2, -1), (2, 1, -3)]
     >>> float(prove_rate_limit(analyse(SignedDigraph.from_edges(pair))).value)  # one nonzero eigenvalue, 4
     8.0
-    >>> limit = prove_rate_limit(analyse(SignedDigraph.from_edges([*pair, (1, 3, 1), (3, 1, 1)])))
+    >>> three = analyse(SignedDigraph.from_edges([*pair, (1, 3, 1), (3, 1, 1)]))  # the eigenvalues 0, 1 and 5
+    >>> limit = prove_rate_limit(three)
     >>> limit.kind, float(limit.value).__round__(6)
-    ('rate-limit', 1.527864)
+    ('rate-limit', 2.0)
     """
     mean = mean_limit(structure)
     slowest = None if mean is None else _slowest(structure)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ptcc_certify.disturbance import Adversary, Disturbance
 from ptcc_certify.errors import SimulationError
-from ptcc_certify.rounding import down, near, up
+from ptcc_certify.rounding import down, float_down, near, up
 
 if TYPE_CHECKING:
     from ptcc_certify.protocols import SlidingModeProtocol
@@ -75,8 +75,8 @@ class ReachingTime:
     @property
     def remaining(self) -> float:
         """``T_r - t``, rounded down; 0 where only ``T_r`` is certain, and where it is below the range of floats."""
-        if self.z is None:
-            return 0.0
+        if not self.z:
+            return 0.0 if self.z is None else float_down(self.deadline)
         z = float(min(self.z, Fraction(1000)))
         left = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
         return left if left > 1e-300 else 0.0
@@ -122,7 +122,7 @@ def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fra
     >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
-    (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.566 before T_r))
+    (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
     worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
     known: dict[Fraction, Fraction | None] = {Fraction(0): Fraction(0)}

@@ -435,7 +435,7 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
     >>> saved, saved.report.accepted
-    (SavedCertificate(bipartite consensus, rate 4, certified, 2 nodes), True)
+    (SavedCertificate(bipartite consensus, rate 3.99999, certified, 2 nodes), True)
     >>> [str(x) for x, radius in saved.final_state]
     ['-1', '1']
     """

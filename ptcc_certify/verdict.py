@@ -218,7 +218,7 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
     >>> print(assess(certify(pair, weak, [3, 1], simulation=False)).text)
-    certified, but with these gains the bound says little by T: ||eps|| <= 0.06 ||eps(0)|| at 0.99 T; \
+    certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
 --rho2 0.286 (rho2 kappa 0.286) leaves 1 %
     >>> found = assess(certify(pair, strong, [3, 1], simulation=False))
     >>> found.useful, found.exit_code
