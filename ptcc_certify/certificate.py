@@ -69,7 +69,7 @@ STEPS = (
 SHORT_LIMIT = 10
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
-SEARCHING, SHARES = 0.7, (0.3, 0.3, 0.8, 1.0)
+SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
 #: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
@@ -547,7 +547,7 @@ def certify(
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     time_limit : float, optional
-        Seconds of wall time. Simulation and searches may take 70 % together, each its share of what is left; what is
+        Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
         more for every 1,000 nodes.
     expectations : Expectations, optional

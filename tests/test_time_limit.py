@@ -94,7 +94,7 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
             checkpoint()
 
     monkeypatch.setattr(sharpen, "_lmi_candidates", without_end)
-    cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=6)
+    cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
     assert cert.cut_off == ("class lmi",)
     assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.sharpening.tried)
     assert check(cert.to_dict()).accepted
