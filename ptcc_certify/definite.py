@@ -136,6 +136,17 @@ class Standard:
                     continue
         return None
 
+    def product(self, A: Rows, B: Rows) -> list[list[int]]:
+        """Return ``A B``.
+
+        Examples
+        --------
+        >>> Standard().product([[1, 2], [0, 1]], [[3, 0], [1, 1]])
+        [[5, 2], [1, 1]]
+        """
+        columns = list(zip(*B, strict=True))
+        return [[sum(map(mul, row, column)) for column in columns] for row in A]
+
     def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
         """Return ``det(x I - A)`` of a sparse integer matrix, the leading coefficient first.
 
@@ -219,6 +230,13 @@ class Flint(Standard):
             return super().definite(S)
         coefficients = self.flint.fmpz_mat([list(row) for row in S]).charpoly().coeffs()  # constant term first
         return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
+
+    def product(self, A: Rows, B: Rows) -> list[list[int]]:
+        """Return ``A B`` by python-flint."""
+        if not A or not B:
+            return super().product(A, B)
+        left, right = (self.flint.fmpz_mat([list(row) for row in M]) for M in (A, B))
+        return [[int(x) for x in row] for row in (left * right).tolist()]
 
     def characteristic(self, rows: Sequence[Mapping[int, int]]) -> list[int]:
         """Return the characteristic polynomial; see :meth:`Standard.characteristic`."""

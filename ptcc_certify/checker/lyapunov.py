@@ -32,6 +32,8 @@ from ptcc_certify.work import fits, spend
 
 Matrix = list[list[int]]
 ZERO = Fraction(0)
+#: Above so many entries, a quarter of them not 0, products with ``L`` are formed as those of dense matrices.
+DENSE_SIZE = 400
 Sparse = list[dict[int, int]]
 Row = tuple[str, str, list[tuple[str, list[int], bool]]]
 
@@ -59,6 +61,11 @@ class LyapunovCheck(OutcomeCheck):
         sized(self.n**2, bits + 2 * own, "L'P L")
         spend(sum(len(self.digraph.row(b)) for row in P.values() for b in row), bits, own, "L'P L")
         spend(sum(len(self.digraph.row(a)) for a in P) * self.n, bits + own, own, "L'P L")
+        if self._dense:
+            kept = sorted({b for row in P.values() for b in row})
+            L = {v: [self.digraph.row(v).get(j, 0) for j in range(self.n)] for v in {*P, *kept}}
+            PL = self.exact.product([[row.get(b, 0) for b in kept] for row in P.values()], [L[b] for b in kept])
+            return self.exact.product([list(x) for x in zip(*(L[a] for a in P), strict=True)], PL) if P else []
         F = [[0] * self.n for _ in range(self.n)]
         for a, row in P.items():
             moved = [0] * self.n
@@ -69,6 +76,11 @@ class LyapunovCheck(OutcomeCheck):
                 F[i] = [f + x * y for f, y in zip(F[i], moved, strict=True)]
         return F
 
+    @cached_property
+    def _dense(self) -> bool:
+        """Whether products with ``L`` are formed as those of dense matrices."""
+        return 4 * sum(len(self.digraph.row(v)) for v in range(self.n)) > self.n**2 > DENSE_SIZE
+
     def _decrease(self, F: Matrix, b: Fraction, nodes: Sequence[int]) -> Matrix:
         """Return ``F L + L'F - b F`` on some nodes, times a positive integer; ``F`` is symmetric."""
         moved, L = [], [self.digraph.row(v) for v in range(self.n)]
@@ -77,7 +89,9 @@ class LyapunovCheck(OutcomeCheck):
         sized(self.n**2, bits + own + ratio, "F L + L'F - b F")
         spend(self.n * sum(map(len, L)), bits, own, "F L + L'F - b F")
         spend(2 * len(nodes) ** 2, bits + own, ratio, "F L + L'F - b F")
-        for row in F:
+        if self._dense:
+            moved = self.exact.product(F, [[row.get(j, 0) for j in range(self.n)] for row in L])
+        for row in () if self._dense else F:
             product = [0] * self.n
             for x, laplacian in zip(row, L, strict=True):
                 if x:
