@@ -4,8 +4,9 @@
 
 Dense matrices of 1,000 rows, matrices that dominate with 10^5 and 10^6 rows, and the largest strong component of
 Bitcoin OTC (``soc-sign-bitcoinotc.csv.gz`` in FOLDER; skipped without it) as a graph of its own. ``prove`` finds a
-witness from floats and proves it exactly (:mod:`lmi.exact`); ``check`` judges it again by other code, from integers
-(:mod:`ptcc_certify.sparse_definite`). The matrices ``P L + L' P - b P`` are exact: ``p`` in integers, ``b`` dyadic.
+witness from floats and proves it exactly (:mod:`lmi.exact.proofs`);
+``check`` judges it again by other code, from integers
+(:mod:`lmi.exact.sparse`). The matrices ``P L + L' P - b P`` are exact: ``p`` in integers, ``b`` dyadic.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 import lmi
+from lmi.exact.sparse import dense_definite, dominates, residual_definite
 from ptcc_certify import SignedDigraph, analyse, read_graph
-from ptcc_certify.lemmas import left_vector
-from ptcc_certify.sparse_definite import dense_definite, dominates, residual_definite
+from ptcc_certify.theorems.lemmas import left_vector
 
 DENSE_ROWS = 1000
 IN_DEGREE = 7

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
-from ptcc_certify.effort import Effort, starts_within, worst_start
+from ptcc_certify.bounds.input import Effort, starts_within, worst_start
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 

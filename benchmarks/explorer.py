@@ -19,8 +19,8 @@ from importlib.metadata import version
 from typing import Any
 
 from ptcc_certify.examples import GRAPHS
-from ptcc_certify.explorer import DISTURBANCES, KINDS, Explorer, Settings, controls
-from ptcc_certify.sharpen import METHODS
+from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.report.explorer import DISTURBANCES, KINDS, Explorer, Settings, controls
 
 GAINS = {"T": (0.5, 0.8), "rho1": (0.5, 1.0), "rho2": (0.3, 0.7), "kappa": (1.5, 2.0)}
 SLIDING = {

@@ -30,7 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate import certify
+from ptcc_certify.certificate.certificate import certify
 from ptcc_certify.checker import check
 
 REAL = ("wiki-elec.txt.gz", "soc-sign-bitcoinotc.csv.gz", "soc-sign-epinions.txt.gz")
@@ -139,8 +139,8 @@ def one(name: str) -> dict[str, Any]:
 
 def core(path: Path) -> dict[str, Any]:
     """Every step for one strong component, and the whole."""
-    from ptcc_certify.dominance import prove_group
-    from ptcc_certify.lemmas import laplacian_spectrum, left_vector
+    from ptcc_certify.lyapunov.dominance import prove_group
+    from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector
 
     graph = largest_core(path)
     structure = ptcc.analyse(graph)

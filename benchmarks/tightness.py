@@ -24,10 +24,10 @@ import flint
 import numpy as np
 
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
-from ptcc_certify.bounds import Member
-from ptcc_certify.error_system import ErrorSystem
+from ptcc_certify.bounds.envelope import Member
 from ptcc_certify.errors import PTCCError
-from ptcc_certify.sharpen import LARGEST_PREFACTOR, sharpen
+from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, sharpen
 
 CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
 DECADES = (1, 6)

@@ -26,15 +26,15 @@ from click.core import ParameterSource
 from ptcc_certify.errors import ParameterError, PTCCError, explain, one_line
 
 if TYPE_CHECKING:
-    from ptcc_certify.actuator import Actuator
-    from ptcc_certify.certificate import Certificate
+    from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker import CheckReport
     from ptcc_certify.gain_design import Design
-    from ptcc_certify.graph import SignedDigraph
-    from ptcc_certify.protocols import Protocol
-    from ptcc_certify.structure import Structure
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.structure import Structure
+    from ptcc_certify.protocols.nominal import Protocol
+    from ptcc_certify.simulation.limited import Actuator
 
-OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.verdict has them too
+OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.certificate.verdict has them too
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 FIGURES, TABLES = (".png", ".pdf", ".svg"), ("", ".csv", ".txt")
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
@@ -157,13 +157,13 @@ def cli() -> None:
 @_json_option
 def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     """Tell the structure of GRAPH and the theorem that applies; no computation in floating point."""
-    from ptcc_certify.structure import analyse
-    from ptcc_certify.summary import structure_lines
+    from ptcc_certify.graphs.structure import analyse
+    from ptcc_certify.report.screen import structure_lines
 
     expected = _behaviour(expect)
     structure = analyse(_read(graph, **read))
     if as_json:
-        from ptcc_certify.document import structure_document
+        from ptcc_certify.certificate.document import structure_document
 
         _print_json(structure_document(structure))
     else:
@@ -206,10 +206,10 @@ def certify(
     **options: Any,
 ) -> int:
     """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
-    from ptcc_certify.certificate import STEPS
-    from ptcc_certify.certificate import certify as run
-    from ptcc_certify.summary import certificate_lines
-    from ptcc_certify.verdict import Expectations
+    from ptcc_certify.certificate.certificate import STEPS
+    from ptcc_certify.certificate.certificate import certify as run
+    from ptcc_certify.certificate.verdict import Expectations
+    from ptcc_certify.report.screen import certificate_lines
 
     instant, bound = _number(at, "--at"), _number(initial_bound, "--initial-bound")
     most = _number(max_input, "--max-input")
@@ -290,9 +290,9 @@ def _same_graph(
     certificate: str, document: dict[str, Any], report: CheckReport, graph: str, read: dict[str, Any]
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
-    from ptcc_certify.graph_difference import difference
-    from ptcc_certify.io.graph_files import read_graph_as, reading_flags
-    from ptcc_certify.saved import certificate_graph
+    from ptcc_certify.certificate.saved import certificate_graph
+    from ptcc_certify.graphs.difference import difference
+    from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
     source = click.get_current_context().get_parameter_source
     names = {"orientation": "edges", **{name: name for name in ("duplicates", "drop_self_loops", "undirected")}}
@@ -322,8 +322,8 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
     certificate the page tells the reason and no claim.
     """
+    from ptcc_certify.certificate.saved import RejectedCertificate
     from ptcc_certify.report import write_report
-    from ptcc_certify.saved import RejectedCertificate
 
     try:
         with _progress(("independent check", "simulation", "report")) as begin:
@@ -363,8 +363,8 @@ def simulate(
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent. Under the sliding-mode protocol columns sigma(<label>) follow the states.
     """
-    from ptcc_certify.io import write_atomically
-    from ptcc_certify.simulation import simulate as run
+    from ptcc_certify.graphs.io import write_atomically
+    from ptcc_certify.simulation.run import simulate as run
 
     suffix = Path(output or "").suffix.lower()
     if suffix not in (*FIGURES, *TABLES):
@@ -388,8 +388,8 @@ def simulate(
         **more,
     )
     if output and suffix in FIGURES:
-        from ptcc_certify.plots import plot_run, save_figure
-        from ptcc_certify.structure import analyse
+        from ptcc_certify.graphs.structure import analyse
+        from ptcc_certify.report.plots import plot_run, save_figure
 
         save_figure(plot_run(trajectory, analyse(signed), wide=wide), output)
     elif output:
@@ -483,11 +483,11 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
     """
-    from ptcc_certify.certificate import certify as run
+    from lmi.exact.rounding import down
+    from ptcc_certify.certificate.certificate import certify as run
+    from ptcc_certify.certificate.verdict import Expectations, worst_code
     from ptcc_certify.examples import load_graph, select
-    from ptcc_certify.paper_figures import Run, paper_figures, results_csv
-    from ptcc_certify.rounding import down
-    from ptcc_certify.verdict import Expectations, worst_code
+    from ptcc_certify.report.paper_figures import Run, paper_figures, results_csv
 
     chosen, codes, runs = select(name), [], []
     if output:
@@ -519,8 +519,8 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             certificate.save(f"{stem}.json")
             runs.append(Run(example, graph_name, certificate))
     if output:
-        from ptcc_certify.io import write_atomically
-        from ptcc_certify.plots import save_figure
+        from ptcc_certify.graphs.io import write_atomically
+        from ptcc_certify.report.plots import save_figure
 
         for title, figure in paper_figures(runs).items():
             save_figure(figure, Path(output) / f"{title}.{suffix}")
@@ -668,7 +668,7 @@ def _read(
     undirected: bool = False,
     **_: Any,
 ) -> SignedDigraph:
-    from ptcc_certify.io import read_graph
+    from ptcc_certify.graphs.io import read_graph
 
     return read_graph(
         _graph_file(graph),
@@ -691,7 +691,7 @@ def _graph_file(graph: str) -> Any:
 
 def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
     """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
-    from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+    from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     if kind == "nominal":
@@ -714,8 +714,8 @@ def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = (
 
 def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, graph: SignedDigraph) -> dict[str, Any]:
     """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
-    from ptcc_certify.disturbance import as_disturbance
-    from ptcc_certify.protocols import SlidingModeProtocol
+    from ptcc_certify.protocols.disturbance import as_disturbance
+    from ptcc_certify.protocols.nominal import SlidingModeProtocol
 
     if not isinstance(protocol, SlidingModeProtocol):
         return {}
@@ -729,7 +729,7 @@ def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, gra
 
 def _actuator(options: dict[str, Any]) -> Actuator | None:
     """Return the limits of the gain; None if there are none."""
-    from ptcc_certify.actuator import Actuator
+    from ptcc_certify.simulation.limited import Actuator
 
     given = {name: _number(options[name], f"--{name.replace('_', '-')}") for name in _LIMITS}
     actuator = Actuator(**given)
@@ -738,7 +738,7 @@ def _actuator(options: dict[str, Any]) -> Actuator | None:
 
 def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
     from ptcc_certify.errors import NumberError
-    from ptcc_certify.rationals import parse_exact
+    from ptcc_certify.graphs.rationals import parse_exact
 
     try:
         if text is None or parse_exact(text) == 0:
@@ -750,8 +750,8 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 
 def _reached(certificate: Certificate) -> str:
     """Return the columns of ``ptcc examples`` about the sliding variables: last instant, proved instant, ``T_r``."""
-    from ptcc_certify.paper_figures import reaching_times
-    from ptcc_certify.rounding import up
+    from lmi.exact.rounding import up
+    from ptcc_certify.report.paper_figures import reaching_times
 
     last, proved, deadline = reaching_times(certificate)
     if isinstance(last, str):
@@ -761,7 +761,7 @@ def _reached(certificate: Certificate) -> str:
 
 def _ends(certificate: Certificate) -> str:
     """Return the outcome in a few letters: 0, a common size, or the largest, rounded up."""
-    from ptcc_certify.rounding import near, up
+    from lmi.exact.rounding import near, up
 
     if certificate.outcome is None:
         return "-"
@@ -773,7 +773,7 @@ def _ends(certificate: Certificate) -> str:
 
 
 def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    from ptcc_certify.io import random_states, read_state
+    from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 != "random":
         try:
@@ -786,7 +786,7 @@ def _start(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[F
 def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> Any:
     import numpy as np
 
-    from ptcc_certify.io import random_states
+    from ptcc_certify.graphs.io import random_states
 
     if dimension == 1:
         return _start(x0, seed, graph)
@@ -804,7 +804,7 @@ def _start_columns(x0: str, seed: int, graph: SignedDigraph, dimension: int) -> 
 def _behaviour(text: str | None) -> str | None:
     if text is None:
         return None
-    from ptcc_certify.structure import behaviour_name
+    from ptcc_certify.graphs.structure import behaviour_name
 
     try:
         return behaviour_name(text)
@@ -815,7 +815,7 @@ def _behaviour(text: str | None) -> str | None:
 def _number(text: str | None, option: str) -> Fraction | None:
     if text is None:
         return None
-    from ptcc_certify.rationals import parse_exact
+    from ptcc_certify.graphs.rationals import parse_exact
 
     try:
         return parse_exact(text)
@@ -824,7 +824,7 @@ def _number(text: str | None, option: str) -> Fraction | None:
 
 
 def _judged_behaviour(structure: Structure, expected: str) -> int:
-    from ptcc_certify.verdict import MET, judge_behaviour
+    from ptcc_certify.certificate.verdict import MET, judge_behaviour
 
     answer = judge_behaviour(structure, expected)
     if answer.status != MET:
@@ -901,7 +901,7 @@ def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: b
 
 def _batch_code(rows: Sequence[dict[str, Any]]) -> int:
     """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
-    from ptcc_certify.verdict import OPEN, REFUTED, exit_code
+    from ptcc_certify.certificate.verdict import OPEN, REFUTED, exit_code
 
     failed = [row for row in rows if row["error"] is not None]
     violated = sum(row["bound_kept"] is False for row in rows)
@@ -936,7 +936,7 @@ def _refuse_output(output: str | None, graph: str) -> None:
 
 def _save_curve(found: Design, path: str) -> None:
     """Write peak input against deadline: CSV, or a figure."""
-    from ptcc_certify.io import write_atomically
+    from ptcc_certify.graphs.io import write_atomically
 
     if Path(path).suffix.lower() == ".csv":
         curve = found.trade_off(found.deadlines())
@@ -944,7 +944,7 @@ def _save_curve(found: Design, path: str) -> None:
         lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
         write_atomically(path, "\n".join(lines) + "\n")
     else:
-        from ptcc_certify.plots import plot_trade_off, save_figure
+        from ptcc_certify.report.plots import plot_trade_off, save_figure
 
         save_figure(plot_trade_off(found).figure, path)
 

@@ -23,11 +23,11 @@ class PTCCError(Exception):
 
 
 class NumberError(PTCCError, ValueError):
-    """A text is not a number of the exact grammar (see :mod:`ptcc_certify.rationals`).
+    """A text is not a number of the exact grammar (see :mod:`ptcc_certify.graphs.rationals`).
 
     Examples
     --------
-    >>> from ptcc_certify.rationals import parse_exact
+    >>> from ptcc_certify.graphs.rationals import parse_exact
     >>> parse_exact("1/0")
     Traceback (most recent call last):
     ptcc_certify.errors.NumberError: "1/0" divides by zero

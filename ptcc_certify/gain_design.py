@@ -29,8 +29,9 @@ Two bounds hold for all gains of the protocol, whatever the certificate:
   ``u(0) = (a + k)/T e(0)``: ``U T > (2/limit) sup |e_v(0)|``. This needs a set of starts with inner points.
 * an agent moves at most ``U T``: ``U T >= sup |x_v(0) - (Q X(0))_v| - r``.
 
-The search is in floating point; what is answered is then proved: a :class:`~ptcc_certify.certificate.Certificate` with
-the gains found, whose bound of the input is compared with ``U`` exactly.
+The search is in floating point; what is answered is then proved: a
+:class:`~ptcc_certify.certificate.certificate.Certificate` with the gains found, whose
+bound of the input is compared with ``U`` exactly.
 """
 
 from __future__ import annotations
@@ -44,21 +45,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.certificate import Certificate, certify
+from lmi.exact.enclosure import rounded, sqrt
+from lmi.exact.rounding import down, float_up, up
+from ptcc_certify.bounds.input import Limits, Starts, WorstStart, starts_within, worst_start
+from ptcc_certify.certificate.certificate import Certificate, certify
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.effort import Limits, Starts, WorstStart, starts_within, worst_start
-from ptcc_certify.enclosure import rounded, sqrt
+from ptcc_certify.checker.input_bounds import BITS, InputBounds, Linear, PrescribedGain
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.gain import parameter
-from ptcc_certify.input_bounds import BITS, InputBounds, Linear, PrescribedGain
-from ptcc_certify.lemmas import laplacian_spectrum
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.rationals import format_exact, nearest_float, short_exact, shorten
-from ptcc_certify.rounding import down, float_up, up
-from ptcc_certify.structure import Structure, analyse
+from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.protocols.gain import parameter
+from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 if TYPE_CHECKING:
-    from ptcc_certify.graph import Exact, SignedDigraph
+    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
 #: Significant decimal digits of the gains and deadlines that are found.
@@ -129,7 +130,7 @@ class Design:
 
     Examples
     --------
-    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> found = design(pair, max_input=10, initial_bound=1, deadline=1)
     >>> found.verdict, bool(found.shortest_possible <= found.shortest_certified <= 1)
@@ -224,7 +225,7 @@ class Design:
 
         Examples
         --------
-        >>> from ptcc_certify.graph import SignedDigraph
+        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
         >>> design(pair, max_input=10, initial_bound=1).trade_off([1, 2]).lower.round(6)
         array([1.5 , 0.75])
@@ -310,7 +311,7 @@ class Design:
         }
 
     def _repr_html_(self) -> str:
-        from ptcc_certify.display import design_html
+        from ptcc_certify.report.notebook import design_html
 
         return design_html(self)
 
@@ -386,7 +387,7 @@ def design(
 
     Examples
     --------
-    >>> from ptcc_certify.graph import SignedDigraph
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> trio = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     >>> design(trio, max_input=20, initial_bound=3, deadline=1)
     Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18857, 1.18857 times the \

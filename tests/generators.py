@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from ptcc_certify.graph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 
 Rng = np.random.Generator
 Pair = tuple[int, int]  # (source, target)

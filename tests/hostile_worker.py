@@ -17,8 +17,8 @@ import resource
 import sys
 import traceback
 
+from lmi.exact.definite import arithmetic
 from ptcc_certify.checker import main
-from ptcc_certify.definite import arithmetic
 
 
 def child(path: str, memory: int, seconds: int, out: int) -> None:

@@ -24,11 +24,11 @@ from ptcc_certify.batch.rows import COLUMNS, Row
 from ptcc_certify.batch.settings import Settings, Start, whole_number
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.batch.table import refuse_table, table_bytes
-from ptcc_certify.ensembles import Ensemble
 from ptcc_certify.errors import ParameterError, PTCCError
-from ptcc_certify.io import write_atomically, write_graph
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.rationals import shorten
+from ptcc_certify.graphs.ensembles import Ensemble
+from ptcc_certify.graphs.io import write_atomically, write_graph
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.protocols.nominal import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
 
@@ -130,7 +130,7 @@ def certify_many(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> from ptcc_certify.protocols.nominal import NominalProtocol
     >>> rows = certify_many(["fig1a", "fig1b"], NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), method="perron")
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]

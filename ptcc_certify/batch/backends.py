@@ -21,7 +21,7 @@ from ptcc_certify.batch.rows import Row, certified_row, failed_row, package_vers
 from ptcc_certify.batch.settings import INSTALL, Settings
 from ptcc_certify.batch.sources import Task
 from ptcc_certify.errors import ParameterError, one_line
-from ptcc_certify.rationals import shorten
+from ptcc_certify.graphs.rationals import shorten
 
 #: One thread of linear algebra for each process; NumPy reads these when it is loaded.
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

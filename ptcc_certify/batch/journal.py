@@ -17,7 +17,7 @@ from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
 from ptcc_certify.batch.settings import Settings
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.rationals import shorten
+from ptcc_certify.graphs.rationals import shorten
 
 #: What the first line of a journal begins with.
 SCHEMA = "ptcc-batch/2"

@@ -54,14 +54,14 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, Start
-from ptcc_certify.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.verdict import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
-from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.io import random_states, read_graph, read_state
-from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.rounding import float_down, float_up
-from ptcc_certify.verdict import Expectations
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import random_states, read_graph, read_state
+from ptcc_certify.protocols.nominal import SlidingModeProtocol
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]

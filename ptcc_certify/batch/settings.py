@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
-from ptcc_certify.disturbance import as_disturbance
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.io import by_label
-from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import as_fraction, format_exact, nearest_float, shorten
-from ptcc_certify.sharpen import METHODS
-from ptcc_certify.structure import behaviour_name
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import by_label
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
+from ptcc_certify.graphs.structure import behaviour_name
+from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
 
 #: What a start may be given as.
 Start = str | Sequence[Any] | Mapping[Any, Any] | None

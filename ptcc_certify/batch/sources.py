@@ -12,12 +12,12 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ptcc_certify.ensembles import Ensemble
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, graph_path
-from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.io.files import read_bytes
-from ptcc_certify.rationals import shorten
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.ensembles import Ensemble
+from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.rationals import shorten
 
 #: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
 Origin = str | tuple[Ensemble, int] | SignedDigraph

@@ -13,7 +13,7 @@ from ptcc_certify.batch.rows import COLUMNS, Row
 from ptcc_certify.batch.settings import INSTALL
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.rationals import shorten
+from ptcc_certify.graphs.rationals import shorten
 
 #: Endings of a table's name.
 TABLES = (".csv", ".parquet")

@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lmi.exact.work import WorkError, limited
 from ptcc_certify.checker.effort import INPUT_NODES, EffortCheck
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
 from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
@@ -26,7 +27,6 @@ from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries,
 from ptcc_certify.checker.structure import MANY_COMPONENTS
 from ptcc_certify.checker.vectors import SideFiles
 from ptcc_certify.errors import FormatError
-from ptcc_certify.work import WorkError, limited
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib] [--memory GB]"
 

@@ -16,8 +16,8 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
+from lmi.exact.work import spend
 from ptcc_certify.checker.reading import common_denominator, longest, need, sized
-from ptcc_certify.work import spend
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000

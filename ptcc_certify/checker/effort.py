@@ -7,6 +7,22 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from lmi.exact.rounding import down, up
+from lmi.exact.spectral_line import nonzero_spectrum_beyond, tractable
+from lmi.exact.work import spend
+from ptcc_certify.checker.input_bounds import (
+    Form,
+    InputBounds,
+    Limits,
+    PrescribedGain,
+    Reaching,
+    Starts,
+    energy_above,
+    integral_above,
+    length_above,
+    peak_above,
+    root_above,
+)
 from ptcc_certify.checker.lyapunov import LyapunovCheck
 from ptcc_certify.checker.reading import (
     RejectedError,
@@ -21,22 +37,6 @@ from ptcc_certify.checker.reading import (
     triangle,
 )
 from ptcc_certify.checker.vectors import Numbers, beside
-from ptcc_certify.input_bounds import (
-    Form,
-    InputBounds,
-    Limits,
-    PrescribedGain,
-    Reaching,
-    Starts,
-    energy_above,
-    integral_above,
-    length_above,
-    peak_above,
-    root_above,
-)
-from ptcc_certify.rounding import down, up
-from ptcc_certify.spectral_line import nonzero_spectrum_beyond, tractable
-from ptcc_certify.work import spend
 
 KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
 #: Graphs up to this size have bounds of the input.

@@ -11,6 +11,10 @@ from itertools import pairwise
 from operator import mul
 from typing import Any
 
+from lmi.exact.rounding import down, up
+from lmi.exact.sparse import residual_definite
+from lmi.exact.work import fits, spend
+from ptcc_certify.checker.input_bounds import Form
 from ptcc_certify.checker.outcome import OutcomeCheck
 from ptcc_certify.checker.reading import (
     entries,
@@ -25,10 +29,6 @@ from ptcc_certify.checker.reading import (
     triangle,
 )
 from ptcc_certify.checker.vectors import Numbers, beside
-from ptcc_certify.input_bounds import Form
-from ptcc_certify.rounding import down, up
-from ptcc_certify.sparse_definite import residual_definite
-from ptcc_certify.work import fits, spend
 
 Matrix = list[list[int]]
 ZERO = Fraction(0)

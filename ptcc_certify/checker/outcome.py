@@ -8,6 +8,9 @@ from fractions import Fraction
 from operator import mul
 from typing import Any
 
+from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.rounding import up
+from lmi.exact.work import spend
 from ptcc_certify.checker.reading import (
     Interval,
     RejectedError,
@@ -24,9 +27,6 @@ from ptcc_certify.checker.reading import (
 )
 from ptcc_certify.checker.structure import MANY_COMPONENTS, StructureCheck
 from ptcc_certify.checker.vectors import Numbers, beside
-from ptcc_certify.enclosure import decay_integrals_below
-from ptcc_certify.rounding import up
-from ptcc_certify.work import spend
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"

@@ -13,8 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from lmi.exact.work import fits, keeps, spend
 from ptcc_certify.errors import FormatError
-from ptcc_certify.work import fits, keeps, spend
 
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.

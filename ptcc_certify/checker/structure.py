@@ -9,12 +9,12 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+from lmi.exact.definite import arithmetic
+from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import digraph
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same
 from ptcc_certify.checker.vectors import SideFiles, beside
-from ptcc_certify.definite import arithmetic
-from ptcc_certify.work import keeps
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100

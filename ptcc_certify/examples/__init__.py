@@ -11,8 +11,8 @@ from importlib import resources
 from pathlib import Path
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
 
 GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
 
@@ -171,7 +171,7 @@ def load_graph(name: str) -> SignedDigraph:
     >>> load_graph("fig1a")
     SignedDigraph(6 nodes, 12 edges, 4 negative)
     """
-    from ptcc_certify.io import read_graph
+    from ptcc_certify.graphs.io import read_graph
 
     return read_graph(graph_path(name))
 

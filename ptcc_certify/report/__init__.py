@@ -1,8 +1,9 @@
 """A certificate as something to send to a person: one page of HTML, or a statement in LaTeX.
 
-Both are made from a file that the independent check accepts (:mod:`ptcc_certify.saved`). What was proved is told apart
-from what is numerical: a simulated run, repeated for the figures. The page is one file that loads nothing and runs no
-script; every text that stands in the certificate is shown as text, whatever it holds.
+Both are made from a file that the independent check accepts (:mod:`ptcc_certify.certificate.saved`). What was
+proved is told apart from what is numerical: a simulated run, repeated for the figures. The page is
+one file that loads nothing and runs no script; every text that stands in the certificate is shown as text, whatever
+it holds.
 
 :mod:`~ptcc_certify.report.page` is the page, section by section, of pieces from :mod:`~ptcc_certify.report.markup` and
 equations from :mod:`~ptcc_certify.report.mathml`; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both take numbers
@@ -16,13 +17,13 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
-from ptcc_certify.io import write_atomically
-from ptcc_certify.plots import figure_bytes
+from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.report.figures import INPUT_NODES, draw
 from ptcc_certify.report.page import rejected_html, report_html
+from ptcc_certify.report.plots import figure_bytes
 from ptcc_certify.report.statement import report_latex
-from ptcc_certify.saved import RejectedCertificate, SavedCertificate, read_certificate
 
 #: What a report is written as.
 SUFFIXES = (".html", ".htm", ".tex")

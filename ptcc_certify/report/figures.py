@@ -6,9 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
-from ptcc_certify.saved import SavedCertificate
-from ptcc_certify.trajectory import SlidingTrajectory
+from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
+from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,16 +9,19 @@ from collections import Counter
 from fractions import Fraction
 from itertools import islice
 
-from ptcc_certify.bounds import FRACTIONS
-from ptcc_certify.document import producer
-from ptcc_certify.effort import Effort
-from ptcc_certify.io.graph_files import reading_flags
-from ptcc_certify.plots import DRAWN_NODES
-from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.rationals import nearest_float
+from lmi.exact.rounding import up
+from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.bounds.input import Effort
+from ptcc_certify.certificate.document import producer
+from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate
+from ptcc_certify.graphs.io.graph_files import reading_flags
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.markup import bullets, document, folded, table, verdict_box
 from ptcc_certify.report.mathml import equations, symbol
+from ptcc_certify.report.plots import DRAWN_NODES
+from ptcc_certify.report.screen import remarks_on, structure_text
 from ptcc_certify.report.texts import (
     AUTHORS,
     LISTED,
@@ -45,11 +48,8 @@ from ptcc_certify.report.texts import (
     rational,
     subscripts,
 )
-from ptcc_certify.rounding import up
-from ptcc_certify.saved import RejectedCertificate, SavedCertificate
-from ptcc_certify.summary import remarks_on, structure_text
+from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems import THEOREMS
-from ptcc_certify.trajectory import SlidingTrajectory
 
 #: Rows of agents, and of leader groups, that are written out.
 ROWS, GROUPS = 200, 40
@@ -61,7 +61,7 @@ def report_html(saved: SavedCertificate, *, no_run: str = "no run was asked for"
     Parameters
     ----------
     saved : SavedCertificate
-        As :func:`ptcc_certify.saved.read_certificate` reads it; with a trajectory
+        As :func:`ptcc_certify.certificate.saved.read_certificate` reads it; with a trajectory
         (:meth:`SavedCertificate.with_simulation`) there are figures of bound and input.
     no_run : str
         Why there is no trajectory, for the page.
@@ -91,7 +91,7 @@ def rejected_html(error: RejectedCertificate) -> str:
     Parameters
     ----------
     error : RejectedCertificate
-        What :func:`ptcc_certify.saved.read_certificate` raised.
+        What :func:`ptcc_certify.certificate.saved.read_certificate` raised.
 
     Returns
     -------

@@ -6,10 +6,12 @@ import re
 from collections import Counter
 from fractions import Fraction
 
-from ptcc_certify.bounds import FRACTIONS
-from ptcc_certify.document import producer
-from ptcc_certify.latex import symbol_latex
-from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.certificate.document import producer
+from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.protocols.latex import symbol_latex
+from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.report.screen import structure_text
 from ptcc_certify.report.texts import (
     AUTHORS,
     CHARACTERS,
@@ -24,8 +26,6 @@ from ptcc_certify.report.texts import (
     printable,
     rational,
 )
-from ptcc_certify.saved import SavedCertificate
-from ptcc_certify.summary import structure_text
 
 
 def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None) -> str:
@@ -34,7 +34,7 @@ def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None)
     Parameters
     ----------
     saved : SavedCertificate
-        As :func:`ptcc_certify.saved.read_certificate` reads it.
+        As :func:`ptcc_certify.certificate.saved.read_certificate` reads it.
     figures : mapping of {"graph", "decay"} to str, optional
         Names of the files that are included.
 

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
 
-from ptcc_certify.effort import Limited, Starts
-from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.rationals import format_exact, nearest_float, writable
-from ptcc_certify.rounding import down, up
-from ptcc_certify.saved import SavedCertificate
-from ptcc_certify.structure import Claim, ClosedComponent
+from lmi.exact.rounding import down, up
+from ptcc_certify.bounds.input import Limited, Starts
+from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
+from ptcc_certify.graphs.structure import Claim, ClosedComponent
+from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48

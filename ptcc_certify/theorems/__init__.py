@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ptcc_certify.structure import Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.base import LyapunovBlock, LyapunovFunction, Obligation, RateProof, Theorem
 from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
 from ptcc_certify.theorems.sliding_mode import SlidingMode, sliding_claim
@@ -48,8 +48,8 @@ def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
 
     Examples
     --------
-    >>> from ptcc_certify.graph import SignedDigraph
-    >>> from ptcc_certify.structure import analyse
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)]))
     >>> theorem_for(st).number, theorem_for(st, "sliding-mode").number
     ('1.1', '4.1')

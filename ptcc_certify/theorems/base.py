@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import lmi
-from lmi.exact import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
+from lmi.exact.proofs import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
 from ptcc_certify.checker import Statement
-from ptcc_certify.graph import SignedDigraph
-from ptcc_certify.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
-from ptcc_certify.structure import ClosedComponent, Structure
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.theorems.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
 
 if TYPE_CHECKING:
     import flint

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import lmi
-from ptcc_certify.lemmas import unbalanced_diagonal
-from ptcc_certify.structure import ClosedComponent, Structure
+from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     LyapunovBlock,
     LyapunovFunction,
@@ -24,6 +23,7 @@ from ptcc_certify.theorems.base import (
     split_rho,
     symmetric_product,
 )
+from ptcc_certify.theorems.lemmas import unbalanced_diagonal
 
 
 class DiagonalComposite(Theorem):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import lmi
-from ptcc_certify.structure import Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.base import (
     LyapunovBlock,
     LyapunovFunction,

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ptcc_certify.structure import Claim, Structure
+from ptcc_certify.graphs.structure import Claim, Structure
 from ptcc_certify.theorems.base import LyapunovFunction, RateProof, Theorem
 
 _COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from ptcc_certify.lemmas import unbalanced_diagonal
-from ptcc_certify.structure import Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.base import (
     KEPT,
     LyapunovBlock,
@@ -22,6 +21,7 @@ from ptcc_certify.theorems.base import (
     prove_weighted_deviation,
     rounded,
 )
+from ptcc_certify.theorems.lemmas import unbalanced_diagonal
 
 
 class BalancedStrong(Theorem):

@@ -10,8 +10,8 @@ from fractions import Fraction
 import numpy as np
 
 import lmi
-from lmi.exact import prove_margin
-from ptcc_certify.structure import ClosedComponent, Structure
+from lmi.exact.proofs import prove_margin
+from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     KEPT,
     LyapunovBlock,

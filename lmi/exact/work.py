@@ -1,0 +1,170 @@
+"""Limits of work and memory, so that numbers of any length are answered in bounded time and space.
+
+Whoever is about to multiply long integers, or to keep many, tells how many and how long; beyond the limits it is
+refused before anything is formed. The count depends on the sizes alone: the same file is refused on every machine, or
+on none. Limits grow in proportion to a memory that is allowed, in GB.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+#: What may be spent for each GB, in products of two digits of 30 bits: some seconds.
+LIMIT = 10_000_000_000
+#: What a product of short integers costs beside its digits.
+EACH = 60
+#: Digits from which on products cost less than the square, by Karatsuba's method.
+LONG = 70
+
+
+class WorkError(ArithmeticError):
+    """Work or memory would exceed the limit; the message says what was about to be done."""
+
+
+class Account:
+    """What is allowed, and what is counted so far.
+
+    Attributes
+    ----------
+    memory : float
+        GB that are allowed.
+    left : float
+        Work that is left, in the unit of :func:`cost`.
+    needed : float
+        GB for which all that was counted so far would have been allowed.
+    kept : float
+        Bytes of what stays to the end.
+    """
+
+    def __init__(self, memory: float):
+        self.memory, self.left, self.needed, self.kept = memory, LIMIT * memory, 0.0, 0.0
+
+
+_account: ContextVar[Account | None] = ContextVar("account", default=None)
+
+
+def cost(products: int, a: int = 0, b: int = 0) -> float:
+    """Return what products of integers of ``a`` and ``b`` bits cost.
+
+    Parameters
+    ----------
+    products : int
+        How many.
+    a, b : int
+        Their bits.
+
+    Returns
+    -------
+    float
+        In products of two digits of 30 bits, about a nanosecond each.
+
+    Examples
+    --------
+    >>> cost(1), cost(10, 300, 300)
+    (61.0, 1810.0)
+    """
+    short, long = sorted((a // 30 + 1, b // 30 + 1))
+    digits = short * long if short <= LONG else long * LONG * (short / LONG) ** 0.585
+    return products * (EACH + float(digits))
+
+
+def spend(products: int, a: int = 0, b: int = 0, what: str = "exact arithmetic") -> None:
+    """Count products of integers of ``a`` and ``b`` bits; nothing is counted outside of :func:`limited`.
+
+    Parameters
+    ----------
+    products, a, b : int
+        See :func:`cost`.
+    what : str
+        What they are for.
+
+    Raises
+    ------
+    WorkError
+        Together with all that was counted they exceed the limit.
+
+    Examples
+    --------
+    >>> with limited(1e-7):
+    ...     spend(10, 300, 300, "a product of long matrices")
+    Traceback (most recent call last):
+    ...
+    lmi.exact.work.WorkError: a product of long matrices would take too long
+    """
+    if (account := _account.get()) is not None:
+        account.left -= cost(products, a, b)
+        account.needed = max(account.needed, account.memory - account.left / LIMIT)
+        if account.left < 0:
+            raise WorkError(f"{what} would take too long")
+
+
+def affordable(products: int, a: int = 0, b: int = 0) -> bool:
+    """Tell whether so many products are within what is left.
+
+    Examples
+    --------
+    >>> with limited(1e-7):
+    ...     affordable(10, 300, 300)
+    False
+    """
+    account = _account.get()
+    return account is None or cost(products, a, b) <= account.left
+
+
+def fits(size: float, limit: float) -> bool:
+    """Tell whether something is within a limit for each GB that is allowed; 1 GB outside of :func:`limited`.
+
+    Examples
+    --------
+    >>> fits(2, 1)
+    False
+    >>> with limited(2):
+    ...     fits(2, 1)
+    True
+    """
+    account = _account.get()
+    if account is None:
+        return size <= limit
+    account.needed = max(account.needed, size / limit)
+    return size <= limit * account.memory
+
+
+def keeps(size: float) -> bool:
+    """Tell whether so many bytes more may stay to the end, and count them.
+
+    Examples
+    --------
+    >>> with limited(1):
+    ...     keeps(6e8), keeps(6e8)
+    (True, False)
+    """
+    if (account := _account.get()) is None:
+        return True
+    account.kept += size
+    return fits(account.kept, 1e9)
+
+
+@contextmanager
+def limited(memory: float = 1.0) -> Iterator[Account]:
+    """Limit what is spent inside.
+
+    Parameters
+    ----------
+    memory : float
+        GB, for each of which some seconds of work are allowed too.
+
+    Raises
+    ------
+    ValueError
+        Not positive.
+    """
+    if not 0 < memory < math.inf:
+        raise ValueError("the memory is not a positive number of GB")
+    token = _account.set(account := Account(memory))
+    try:
+        yield account
+    finally:
+        _account.reset(token)

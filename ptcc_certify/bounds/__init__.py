@@ -1,0 +1,1 @@
+"""Proved bounds: envelope, deviation from the final state, final state, input."""

@@ -1,0 +1,223 @@
+"""How far each agent is from its outcome, given a bound on ``V``.
+
+In the state, a Lyapunov function is ``V = x'F x``, and ``x - Q x = D x``; both vanish on the kernel of ``L``, so that
+only rows and columns ``kept`` count: all nodes but the first one of each balanced closed component. There
+
+    |x_k - (Q x)_k|^2 <= c_k V,    c_k = d_k' F^-1 d_k,
+
+``d_k`` a row of ``D``: the best constants there are. The largest eigenvalue of ``D F^-1 D'`` bounds ``||x - Q x||^2``.
+All constants come from one factor of ``F`` in floats and are raised by more than its rounding errors, which are seen in
+what it leaves of the identity; where they are too large, from one in integers. The check proves them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lmi.exact.definite import arithmetic, floats, unit_diagonal
+from lmi.exact.enclosure import rounded
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.graphs.structure import Structure
+
+#: Bits of the constants that are kept.
+KEPT_BITS = 40
+#: How near a factor in floats must take a form to the identity for constants of agents, and for that of the norm.
+NEAR, FAR = 2.0**-30, 2.0**-12
+#: Below this squares of floats may have lost digits.
+LEAST = 2.0**-900
+#: By how much constants are raised, relatively, so that they are quick to prove; that of the norm instead.
+RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
+
+Integers = list[list[int]]
+
+
+@dataclass(frozen=True)
+class DistanceBound:
+    """``|x_k - (Q x)_k|^2 <= agents[k] V`` and ``||x - Q x||^2 <= norm V``; the check proves it.
+
+    Attributes
+    ----------
+    agents : tuple of N Fraction
+    norm : Fraction
+    """
+
+    agents: tuple[Fraction, ...]
+    norm: Fraction
+
+    @cached_property
+    def roots(self) -> np.ndarray:
+        """``sqrt(agents)`` (N,), rounded up."""
+        return np.array([root_above(c) for c in self.agents])
+
+    @cached_property
+    def norm_root(self) -> float:
+        """``sqrt(norm)``, rounded up."""
+        return root_above(self.norm)
+
+
+def root_above(value: Fraction) -> float:
+    """Return a float that is not below the square root of a nonnegative rational of any size.
+
+    Examples
+    --------
+    >>> root_above(Fraction(10) ** 500) >= 1e250, root_above(Fraction(0))
+    (True, 0.0)
+    """
+    if value == 0:
+        return 0.0
+    shift = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    root = math.sqrt(float(value * Fraction(4) ** -shift)) * (1 + 1e-15)
+    try:
+        return math.nextafter(math.ldexp(root, shift), math.inf)
+    except OverflowError:
+        return math.inf
+
+
+class OutcomeGeometry:
+    """What turns a bound on Lyapunov functions into bounds of ``x - Q x``, for one graph.
+
+    Parameters
+    ----------
+    structure : Structure
+    influence : Influence
+        ``Q`` in rationals.
+    """
+
+    def __init__(self, structure: Structure, influence: Influence):
+        self._structure, self._influence = structure, influence
+
+    def bound(
+        self,
+        coordinates: str,
+        nodes: Sequence[int],
+        diagonal: Sequence[Fraction] | None,
+        matrix: Sequence[Sequence[Fraction]] | None,
+    ) -> DistanceBound | None:
+        """Return the constants of ``V = z' P z``, or None where ``V`` is not seen to be definite.
+
+        Parameters
+        ----------
+        coordinates : {"E", "eps"}
+        nodes : sequence of int
+            The rows of ``z``.
+        diagonal, matrix
+            ``P``, one of both.
+        """
+        F, scale = self._error_form(nodes, diagonal, matrix) if coordinates == "E" else self._mean_form(diagonal or ())
+        D, common = self._deviation
+        unit, found = scale / common**2, _constants(F, D)
+        if found is None:
+            return None
+        *agents, norm = (rounded(x * unit, KEPT_BITS, up=True) for x in found)
+        return DistanceBound(tuple(agents), norm)
+
+    @cached_property
+    def _kept(self) -> list[int]:
+        """All nodes but the first one of each balanced closed component."""
+        first = {c.nodes[0] for c in self._influence.balanced}
+        return [v for v in range(self._structure.graph.n_nodes) if v not in first]
+
+    @cached_property
+    def _laplacian(self) -> tuple[Integers, int]:
+        """``L`` times a scale on the columns ``kept``, and the scale."""
+        return self._on_kept(self._structure.graph.exact_rows(range(self._structure.graph.n_nodes)))
+
+    @cached_property
+    def _deviation(self) -> tuple[Integers, int]:
+        """``D = I - Q`` times a scale on the columns ``kept``, and the scale."""
+        rows = [
+            {j: -Fraction(x) for j, x in self._influence.row(v).items()} for v in range(self._structure.graph.n_nodes)
+        ]
+        for v, row in enumerate(rows):
+            row[v] = row.get(v, Fraction(0)) + 1
+        return self._on_kept(rows)
+
+    def _on_kept(self, rows: Sequence[Mapping[int, Fraction]]) -> tuple[Integers, int]:
+        """Return sparse rows times a scale on the columns ``kept``, and the scale."""
+        kept = set(self._kept)
+        parts = [{j: x for j, x in row.items() if j in kept} for row in rows]
+        scale = math.lcm(*{x.denominator for row in parts for x in row.values()})
+        whole = ({j: int(x * scale) for j, x in row.items()} for row in parts)
+        return [[row.get(j, 0) for j in self._kept] for row in whole], scale
+
+    def _error_form(
+        self,
+        nodes: Sequence[int],
+        diagonal: Sequence[Fraction] | None,
+        matrix: Sequence[Sequence[Fraction]] | None,
+    ) -> tuple[Integers, Fraction]:
+        """Return ``L'P L`` times a scale on ``kept``, and the scale."""
+        import flint
+
+        L, unit = self._laplacian
+        rows = flint.fmpz_mat([L[v] for v in nodes])
+        if diagonal is not None:
+            (weights,), scale = _over_one_scale([diagonal])
+            moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(nodes, weights, strict=True)])
+        else:
+            P, scale = _over_one_scale(matrix or ())
+            moved = flint.fmpz_mat(P) * rows
+        return _rows(rows.transpose() * moved), Fraction(scale * unit**2)
+
+    def _mean_form(self, p: Sequence[Fraction]) -> tuple[Integers, Fraction]:
+        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``, and the scale."""
+        (weights,), scale = _over_one_scale([p])
+        (gauge,), total = (c.gauge or () for c in self._influence.balanced), sum(weights)
+        Z = [
+            [gauge[i] * gauge[j] * weights[i] * (total * (i == j) - weights[j]) for j in self._kept] for i in self._kept
+        ]
+        return Z, Fraction(total * scale)
+
+
+def _over_one_scale(rows: Sequence[Sequence[Fraction]]) -> tuple[Integers, int]:
+    """Return rational rows times their common denominator, and that."""
+    scale = math.lcm(*{x.denominator for row in rows for x in row})
+    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
+
+
+def _rows(M: Any) -> Integers:
+    return [[int(x) for x in row] for row in M.tolist()]
+
+
+def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
+    """Return ``d'F^-1 d`` for the rows ``d`` of ``D`` and the largest eigenvalue of ``D F^-1 D'``, a little raised.
+
+    By floats where they are sharp enough, else in integers; there the last one may be the sum of the others. None where
+    ``F > 0`` is not proved.
+    """
+    moved, power, apart = _factored(F, D)
+    unit, sizes = Fraction(4) ** power, (moved**2).sum(axis=1).tolist()
+    if apart <= NEAR and all(x > LEAST or not any(d) for x, d in zip(sizes, D, strict=True)):
+        values = [Fraction(x) * unit * (1 + Fraction(64 * apart)) for x in sizes]
+    else:
+        proved = arithmetic().above(F, D)
+        if proved is None:
+            return None
+        values = proved
+    norm = sum(values, Fraction(0))
+    if apart <= FAR:
+        raised = 1 + max(NORM_RAISE, Fraction(64 * apart))
+        norm = min(norm, Fraction(float(np.linalg.norm(moved, 2))) ** 2 * unit * raised)
+    return [x * (1 + RAISE) for x in (*values, norm)]
+
+
+def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
+    """Return ``D Z`` over a power of two, that power, and how far ``Z'F Z`` is from the identity, in floats."""
+    rows, power = floats(D)
+    with np.errstate(all="ignore"):
+        try:
+            T, halves = unit_diagonal(F)
+            Z = np.linalg.inv(np.linalg.cholesky(T)).T
+        except np.linalg.LinAlgError:
+            return np.zeros_like(rows), 0, math.inf
+        moved = np.ldexp(rows, [-half for half in halves]) @ Z
+        apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
+        finite = bool(np.isfinite((moved**2).sum()))
+    return (moved, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)

@@ -1,0 +1,231 @@
+"""The final state of a large graph in intervals: leaders from their voices, followers by one solve and its residual.
+
+With ``u > 0`` and ``M(L_F) u > 0``, any approximation ``y`` of the followers' end has
+
+    |x_F - y|  <=  max_i((|r_i| + s_i) / (M(L_F) u)_i) u,      r = L_F y + L_FL x_L,
+
+``s`` what the radii of the leaders add. The voices of a large leader group are enclosed in the same way. Residuals are
+taken in floats with room for their rounding, or in rationals where that room is too wide; the check of the certificate
+forms them exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.errors import LMIError
+from lmi.iterative import SparseHMatrix, solve
+from ptcc_certify.bounds.final_state import Influence, Outcome, follower_state
+from ptcc_certify.graphs.structure import ClosedComponent, Structure
+
+#: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
+_ROUNDING, _NARROW = 1e-12, 4e-7
+#: Residual of a witness in every row, relatively.
+_LOOSE = 0.05
+#: Room for the rounding of a radius, and of texts and floats of a middle.
+_MORE, _ULP = 1 + 1e-6, 2.0**-52
+#: Starts below this size leave no room for radii in float64, and are taken in another unit.
+_SMALLEST = Fraction(1, 10**290)
+
+Interval = tuple[Fraction, Fraction]
+
+
+class NotEnclosedError(ArithmeticError):
+    """No interval was found; the message tells why."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnclosedOutcome:
+    """The final state in intervals, and what proves them.
+
+    Attributes
+    ----------
+    middle, radius : (N,) arrays, or None without a start
+        In units of ``unit``. What is exact has radius 0 or the rounding of its float.
+    unit : Fraction
+        1, or a power of 2 for tiny starts.
+    exact : mapping of node to Fraction
+        The ends that are known exactly.
+    degenerate : tuple of int, or None without a start
+        1-based numbers of the balanced closed components that meet at 0.
+    voices : mapping of k to (middle, radius)
+        Of those of ``Influence.balanced`` whose voices are not rational.
+    witness : (N,) array
+        ``u``; 1 for leaders, but for those of ``voices``.
+    """
+
+    middle: np.ndarray | None
+    radius: np.ndarray | None
+    unit: Fraction
+    exact: dict[int, Fraction]
+    degenerate: tuple[int, ...] | None
+    voices: dict[int, tuple[np.ndarray, np.ndarray]]
+    witness: np.ndarray
+
+    def outcome(self, found: Outcome) -> Outcome:
+        """Return an outcome in floats with what is proved in its place: exact ends, middles, degenerate groups."""
+        if self.middle is None or self.degenerate is None:
+            return found
+        final: list[Fraction | float] = self.middle.tolist()
+        if self.unit != 1:  # floats may not hold the product
+            final = [Fraction(x) * self.unit for x in final]
+        for v, x in self.exact.items():
+            final[v] = x
+        values = [final[c.nodes[0]] * sign for c in found.influence.balanced for sign in [(c.gauge or (1,))[0]]]
+        return replace(found, final_state=tuple(final), consensus_values=tuple(values), degenerate=self.degenerate)
+
+
+def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction] | None) -> EnclosedOutcome:
+    """Enclose ``Q start``.
+
+    Raises
+    ------
+    NotEnclosedError
+        The equations of followers or voices are too ill-conditioned for floats, or a consensus value may be 0.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.bounds.final_state import influence
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
+    >>> found = enclose(st, influence(st, exact=False), [Fraction(1), Fraction(0), Fraction(1)])
+    >>> bool(abs(found.middle[1] + 1 / 3) <= found.radius[1] < 1e-9)  # the follower c ends at -1/3
+    True
+    """
+    n, F = structure.graph.n_nodes, structure.followers
+    u = np.ones(n)
+    if F.size:
+        u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
+    voices = {}
+    for k, (component, voice) in enumerate(zip(influence.balanced, influence.voices, strict=True)):
+        if not all(isinstance(w, Fraction | int) for w in voice):
+            voices[k] = _enclosed_voices(structure, component, np.array(voice, dtype=float), u)
+    if start is None:
+        return EnclosedOutcome(None, None, Fraction(1), {}, None, voices, u)
+    size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
+    unit = Fraction(1)
+    if 0 < size < _SMALLEST:
+        unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
+        start = [x / unit for x in start]
+    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, Fraction]()
+    numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
+    degenerate = []
+    for k, (number, component) in enumerate(zip(numbers, influence.balanced, strict=True)):
+        signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
+        if k in voices and any(start[v] for v in component.nodes):
+            own = np.array([float(start[v]) for v in component.nodes])
+            value, spread = float(voices[k][0] @ own), float(voices[k][1] @ np.abs(own))
+            spread = (spread + _ROUNDING * float(np.abs(voices[k][0]) @ np.abs(own))) * _MORE
+            if abs(value) <= 2 * spread:
+                raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
+            middle[nodes], radius[nodes] = signs * value, spread
+            continue
+        shares = zip(component.nodes, influence.voices[k], strict=True)
+        known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
+        degenerate += [number] if known == 0 else []
+        exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
+        middle[nodes] = signs * float(known)
+        radius[nodes] = 0.0 if Fraction(float(known)) == known else _spacing(float(known))
+    exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
+    if F.size and middle.any():
+        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, u)
+    exact = {v: x * unit for v, x in exact.items()} if unit != 1 else exact
+    return EnclosedOutcome(middle, radius, unit, exact, tuple(degenerate), voices, u)
+
+
+def _spacing(x: float | np.ndarray) -> Any:
+    """Bound the rounding of a float or of its decimal text."""
+    return 2 * _ULP * np.abs(x) + 5e-324
+
+
+def _witness(block: Any) -> np.ndarray:
+    """Return ``u > 0`` with ``M(block) u > 0``, its largest entry 1."""
+    with np.errstate(all="ignore"):
+        try:
+            matrix = SparseHMatrix(block)
+        except LMIError as error:
+            raise NotEnclosedError(str(error)) from None
+        ones = np.ones(matrix.diagonal.size)
+        rows = matrix.M.multiply(1 / matrix.diagonal[:, None]).tocsr()  # rows of every size weigh alike
+        u = solve(rows, ones, ones, _LOOSE / np.sqrt(ones.size))
+        u /= u.max()
+        pushed = matrix.M @ u
+    if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(pushed).all() and (pushed > 0).all()):
+        raise NotEnclosedError("the equations are too ill-conditioned for floats")
+    return u
+
+
+def _enclosed_voices(
+    structure: Structure, component: ClosedComponent, voice: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
+    nodes = np.array(component.nodes)
+    block = structure.graph.laplacian().tocsr()[nodes][:, nodes].tocsr()
+    signs = np.array(component.gauge or (), dtype=float)
+    eta = signs * voice
+    top = int(np.argmax(eta))
+    rest = np.delete(np.arange(nodes.size), top)
+    own = _witness(block[rest][:, rest].T.tocsr())
+    u[nodes[rest]] = own
+    columns = block.T.tocsr()[rest]  # of the comparison matrix, but for signs
+    z = eta / eta[top]
+    pushed = 2 * block.diagonal()[rest] * own - abs(columns[:, rest]) @ own
+    total = abs(columns) @ z
+    residual = np.abs(2 * block.diagonal()[rest] * z[rest] - total)
+    with np.errstate(all="ignore"):
+        error = float(((residual + _ULP * (np.diff(columns.indptr) + 4) * total) / pushed).max()) * _MORE
+    weights = np.zeros(nodes.size)
+    weights[rest] = own
+    low, high = z.sum() - error * weights.sum(), z.sum() + error * weights.sum()
+    if not low > 0.5 * high:
+        raise NotEnclosedError(f"the voices of a leader group of {nodes.size} nodes are too ill-conditioned for floats")
+    ends = np.abs((z - error * weights) / high - eta), np.abs((z + error * weights) / low - eta)
+    return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
+
+
+def _enclosed_followers(
+    structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return middles and radii of the followers, in a unit near to the largest leader."""
+    F = structure.followers
+    unit = float(np.exp2(np.floor(np.log2(np.abs(middle).max()))))
+    rows = structure.graph.laplacian().tocsr()[F]
+    state, blur = middle / unit, abs(rows) @ (radius / unit)
+    block = rows[:, F].tocsr()
+    with np.errstate(all="ignore"):
+        solved = follower_state(structure, state)
+        if not np.isfinite(solved).all():
+            raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
+        state[F] = solved
+        comparison = 2 * block.diagonal() * u[F] - abs(block) @ u[F]
+        residual = np.abs(rows @ state) + blur + _ROUNDING * (abs(rows) @ np.abs(state))
+        error = float((residual / comparison).max()) * 1.01
+    if not error * u[F].max() <= _NARROW:
+        error = _exact_error(structure, exact, state, blur + _ULP * (abs(rows) @ np.abs(state)), u, unit)
+    found = solved * unit
+    return found, (error * u[F] * unit + _spacing(found)) * _MORE
+
+
+def _exact_error(
+    structure: Structure, exact: dict[int, Fraction], state: np.ndarray, blur: np.ndarray, u: np.ndarray, unit: float
+) -> float:
+    """Return ``max_i (|r_i| + s_i) / (M(L_F) u)_i``, the residual in rationals."""
+    F = structure.followers.tolist()
+    following = set(F)
+    known = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
+    weights = [Fraction(x) for x in u.tolist()]
+    error = Fraction(0)
+    for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
+        left = sum((x * known[j] for j, x in row.items()), Fraction(0))
+        signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
+        pushed = sum(signs, Fraction(0))
+        if pushed <= 0:
+            raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
+        error = max(error, (abs(left) + Fraction(more)) / pushed)
+    return float(error) * _MORE

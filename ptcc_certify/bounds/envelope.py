@@ -1,0 +1,694 @@
+"""What a proved rate says over time, and how a simulated trajectory compares with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from numbers import Rational
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ptcc_certify.bounds.deviation import DistanceBound
+from ptcc_certify.bounds.final_state import Influence, exact_start, influence
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.search import SharpMember
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.theorems import LyapunovFunction
+
+if TYPE_CHECKING:
+    from ptcc_certify.simulation.trajectory import Trajectory
+
+#: Instants, as fractions of the deadline, at which ratios and residuals are reported.
+FRACTIONS = (0.5, 0.9, 0.99)
+#: 1 - t/T at which residuals are reported besides.
+LAST_INSTANTS = (1e-6, 1e-9)
+#: The integrator's error is taken to be below this multiple of its tolerance times the size of the state.
+FLOOR_FACTOR = 1000.0
+
+
+def float_above(value: Fraction) -> float:
+    """Return a float that is not below ``value``; infinity where it is beyond float64.
+
+    Examples
+    --------
+    >>> float_above(Fraction(1, 3)) >= Fraction(1, 3), float_above(Fraction(10) ** 400)
+    (True, inf)
+    """
+    try:
+        return math.nextafter(float(value), math.inf)
+    except OverflowError:
+        return math.inf
+
+
+def float_below(value: Fraction | float) -> float:
+    """Return a float that is not above ``value``.
+
+    Examples
+    --------
+    >>> float_below(Fraction(1, 3)) <= Fraction(1, 3), float_below(Fraction(-1, 3)) <= Fraction(-1, 3)
+    (True, True)
+    """
+    return math.nextafter(float(value), -math.inf)
+
+
+def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
+    """Return values of ``1 - t/T`` as floats, or refuse what is no instant up to the deadline.
+
+    Raises
+    ------
+    ParameterError
+        A value is not a number from 0 to 1.
+
+    Examples
+    --------
+    >>> remaining_part([1, 0.5])
+    array([1. , 0.5])
+    >>> remaining_part(1.9)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: remaining = 1.9 is outside its domain; it is 1 - t/T, from 1 at 0 to 0 at T
+    """
+    return _within(remaining, name, 1.0, "it is 1 - t/T, from 1 at 0 to 0 at T")
+
+
+def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
+    """Return values of a clock as floats, or refuse those before its start.
+
+    Raises
+    ------
+    ParameterError
+        A value is negative or not a number.
+
+    Examples
+    --------
+    >>> clock_values(np.inf)
+    array(inf)
+    """
+    return _within(clock, name, math.inf, "a clock is 0 at the start and infinite at its deadline")
+
+
+def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind in "bUS":
+            raise TypeError("truth values and texts are no numbers")
+        array = given.astype(float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {shorten(repr(values))} is not a number, nor an array of numbers") from None
+    outside = array[~((array >= 0) & (array <= most))]  # NaN is neither
+    if outside.size:
+        raise ParameterError(f"{name} = {outside.flat[0]:.12g} is outside its domain; {domain}")
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One bound of an envelope: ``V <= e^(-rate s) V(0)`` for ``V = z' P z``.
+
+    Attributes
+    ----------
+    kind : str
+        Class of the certificate: ``paper``, ``perron``, ``lmi``, ``full``.
+    coordinates : {"E", "eps"}
+        See :class:`ptcc_certify.theorems.LyapunovFunction`.
+    nodes : (n,) int array
+    weights : (n,) array or (n, n) array
+        ``P``, its diagonal if it is diagonal.
+    gauge : (N,) array or None
+        Camps, for the coordinates ``eps``.
+    rate : float
+        Not above the proved rate.
+    prefactor : float
+        Not below the proved prefactor; it multiplies the squared norm.
+    lowest : float
+        Not above the smallest eigenvalue of ``P``.
+    distance : DistanceBound or None
+        Constants from ``V`` to the distance of each agent to its outcome.
+    exact_weights : tuple of Fraction
+        The diagonal as it was proved, for the coordinates ``eps``, whose mean it defines.
+    """
+
+    kind: str
+    coordinates: str
+    nodes: np.ndarray
+    weights: np.ndarray
+    gauge: np.ndarray | None
+    rate: float
+    prefactor: float
+    lowest: float
+    distance: DistanceBound | None = None
+    exact_weights: tuple[Fraction, ...] = ()
+
+    @classmethod
+    def of(cls, structure: Structure, V: LyapunovFunction, rate: Fraction | float, **more: Any) -> Member:
+        """Build the member of a paper row with a given rate, rounded to the safe side."""
+        weights = np.array([float(w) for w in V.weights])
+        return cls(
+            "paper",
+            V.coordinates,
+            np.array(V.nodes, dtype=np.int64),
+            weights,
+            structure.gauge,
+            float_below(rate),
+            float_above(V.prefactor),
+            math.nextafter(float(weights.min(initial=np.inf)), 0.0),
+            exact_weights=V.weights,
+            **more,
+        )
+
+    @classmethod
+    def of_sharp(cls, member: SharpMember, **more: Any) -> Member:
+        """Build the member of a sharper Lyapunov function, rounded to the safe side."""
+        if member.dominance is not None:
+            weights = member.dominance.weights
+        elif member.diagonal is not None:
+            weights = np.array([float(w) for w in member.diagonal])
+        else:
+            weights = np.array([[float(x) for x in row] for row in member.matrix or ()])
+        return cls(
+            member.kind,
+            "E",
+            np.array(member.nodes, dtype=np.int64),
+            weights,
+            None,
+            float_below(member.rate),
+            float_above(member.prefactor),
+            float_below(member.lowest),
+            **more,
+        )
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """``R`` with ``P = R'R``: the square root of the weights, or the Cholesky factor of a full ``P``."""
+        return np.sqrt(self.weights) if self.weights.ndim == 1 else np.linalg.cholesky(self.weights).T
+
+    def coordinates_of(self, states: np.ndarray, L: object) -> np.ndarray:
+        """Return ``z`` for states of shape (N, ...): rows of ``-L X``, or the weighted deviation of ``X``."""
+        if self.coordinates == "E":
+            flat = states.reshape(len(states), -1)
+            return -np.asarray(L @ flat).reshape(states.shape)[self.nodes]  # type: ignore[operator]
+        assert self.gauge is not None
+        X, g = states[self.nodes], self.gauge[self.nodes].astype(float)
+        share = self.weights / self.weights.sum()
+        mean = np.tensordot(share * g, X, axes=1)
+        return X - np.multiply.outer(g, mean)
+
+    def exact_coordinates_of(self, x: Sequence[Fraction], error: Sequence[Fraction]) -> list[Fraction]:
+        """Return ``z`` of one state in rationals; ``error`` is its ``-L x``."""
+        if self.coordinates == "E":
+            return [error[v] for v in self.nodes.tolist()]
+        assert self.gauge is not None
+        signs = [int(self.gauge[v]) for v in self.nodes.tolist()]
+        own = [x[v] for v in self.nodes.tolist()]
+        weighted = sum((w * g * y for w, g, y in zip(self.exact_weights, signs, own, strict=True)), Fraction(0))
+        mean = weighted / sum(self.exact_weights)
+        return [y - g * mean for y, g in zip(own, signs, strict=True)]
+
+    def scaled(self, z: np.ndarray) -> np.ndarray:
+        """Return ``R z``, whose Euclidean norm is ``sqrt(V)``, for coordinates of shape (n, ...)."""
+        if self.root.ndim == 1:
+            return self.root.reshape(-1, *([1] * (z.ndim - 1))) * z
+        return np.tensordot(self.root, z, axes=1)
+
+    def value(self, z: np.ndarray) -> np.ndarray:
+        """Return ``V`` for coordinates of shape (n, ...)."""
+        return (self.scaled(z) ** 2).sum(axis=0)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A simulated trajectory against an envelope.
+
+    Attributes
+    ----------
+    worst_ratio : float
+        ``max over t > 0 of max(sqrt(V) - f, 0) / sqrt(bound)`` with ``f = floor * tolerance * sqrt(V(0))``, the floor
+        below which the integrator resolves nothing. At most 1 (up to rounding) when no bound is violated.
+    floor : float
+        The constant in ``f``.
+    tolerance : float
+        Relative tolerance of the integrator.
+    resolved_until : float
+        ``1 - t/T`` from which the bound lies below ``f^2``; 0 if it never does.
+    judged : int
+        How many samples after the first rose above the floor. If none did, the run says nothing about the bound.
+    ratios : dict of float to float
+        ``sqrt(V / bound)`` at those of the fractions 0.5, 0.9, 0.99 of the deadline that were sampled.
+    stop : float
+        Smallest ``1 - t/T`` that was sampled before the deadline.
+    deadline_resolved : bool
+        Whether the run settled, so that samples from the deadline on were judged too.
+    sliding_ratio : float or None
+        Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound``, with the bound of each agent and with that of
+        Proposition 1 for the norm; ``f`` is the integrator's floor of the largest ``|sigma_k(0)|``.
+    distance_ratio : float or None
+        ``max over k, t > 0 of max(|x_k - outcome_k| - f, 0) / bound`` with the bound of each agent and of the norm, and
+        the integrator's floor of the largest state; None without constants.
+    reaching_kept : bool or None
+        Sliding mode: whether every sliding variable was 0 at its certified reaching time.
+
+    References
+    ----------
+    Theorems 1 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+
+    >>> comparison = certify(pair, protocol, [3, 1]).comparison
+    >>> comparison.violated, comparison.worst_ratio <= 1, comparison.deadline_resolved
+    (False, True, True)
+    """
+
+    worst_ratio: float
+    floor: float
+    tolerance: float
+    resolved_until: float
+    judged: int
+    ratios: dict[float, float]
+    stop: float
+    deadline_resolved: bool
+    sliding_ratio: float | None = None
+    distance_ratio: float | None = None
+    reaching_kept: bool | None = None
+
+    @property
+    def violated(self) -> bool:
+        """Whether a bound was exceeded by more than rounding."""
+        worst = max(self.worst_ratio, self.sliding_ratio or 0.0, self.distance_ratio or 0.0)
+        return worst > 1 + 1e-6 or self.reaching_kept is False
+
+
+class History(NamedTuple):
+    """``sqrt(V)`` of one run and its bound over time, (M,) each, and the floor ``f`` of the integrator."""
+
+    root: np.ndarray
+    bound: np.ndarray
+    floor: float
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The pointwise best of several bounds ``V_i(t) <= e^(-rate_i s(t)) V_i(0)``.
+
+    Attributes
+    ----------
+    structure : Structure
+    gain : Gain
+    members : tuple of Member
+
+    References
+    ----------
+    Theorems 1 to 3 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+
+    >>> envelope = certify(pair, protocol, [3, 1], simulation=False).envelope
+    >>> 0 < envelope.residual(0.01) < 0.01  # what may be left at 0.99 T
+    True
+    >>> bool(envelope.distance(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)
+    True
+    """
+
+    structure: Structure
+    gain: Gain
+    members: tuple[Member, ...]
+
+    @cached_property
+    def _laplacian(self) -> object:
+        return self.structure.graph.laplacian()
+
+    @property
+    def coordinates(self) -> str:
+        """The coordinates ``z`` of the bounds in norm: ``E`` if some member is in ``E``, otherwise ``eps``."""
+        return "eps" if all(m.coordinates == "eps" for m in self.members) and self.members else "E"
+
+    @property
+    def _in_norm(self) -> list[Member]:
+        return [m for m in self.members if m.coordinates == self.coordinates]
+
+    def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
+        """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(prefactor_i) e^(-rate_i s / 2)``.
+
+        Parameters
+        ----------
+        clock : float or (M,) array
+            Values of the stretched clock, infinite from the deadline on.
+
+        Returns
+        -------
+        array
+            Of the shape of ``clock``; infinite where nothing was proved: an envelope without members bounds nothing.
+
+        Raises
+        ------
+        ParameterError
+            A value is negative or not a number.
+        """
+        clock = clock_values(clock)
+        factors = [_grown(math.sqrt(m.prefactor), m.rate, clock) for m in self._in_norm]
+        return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
+
+    def residual(self, remaining: float) -> float:
+        """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant.
+
+        Parameters
+        ----------
+        remaining : float
+            From 1 at 0 to 0 at the deadline.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ParameterError
+            ``remaining`` is not one number from 0 to 1.
+        """
+        if np.ndim(remaining):
+            raise ParameterError("remaining is one number from 0 to 1; for several instants ask norm_bound")
+        return float(self.norm_factor(self._clock(remaining)))
+
+    def _clock(self, remaining: Any) -> np.ndarray:
+        """Return the clock where ``1 - t/T`` is ``remaining``, or refuse it."""
+        return np.asarray(self.gain.clock_at_remaining(remaining_part(remaining)))
+
+    def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``.
+
+        Parameters
+        ----------
+        clock : (M,) array or float
+            Values of the stretched clock, infinite from the deadline on.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
+            Rationals are taken exactly, floats as the dyadic numbers they are.
+
+        Returns
+        -------
+        (M,) array or float
+            Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
+        """
+        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
+        bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest), m.rate, clock) for m in self._in_norm]
+        return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
+
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,).
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        return self.bound(self._clock(remaining), x0)
+
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - outcome_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+            From 1 at 0 to 0 at the deadline.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
+
+        Returns
+        -------
+        (N, M) or (N,) array
+            Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        return self.distance(self._clock(remaining), x0)
+
+    def distance(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
+
+        The least of ``sqrt(c_k e^(-rate s) V(0))`` over the members, and never more than ``max_j |x_j(0) - (Q x0)_j|``:
+        ``x - Q x`` obeys the same equation as ``x``, and ``e^(-L s)`` does not expand the largest entry.
+
+        Parameters
+        ----------
+        clock : (M,) array or float
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
+            Rationals are taken exactly, floats as the dyadic numbers they are.
+
+        Returns
+        -------
+        (N, M) array or (N,) array
+            Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
+        """
+        return self._distances(clock, x0, lambda d: d.roots)
+
+    def distance_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`distance`."""
+        return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
+
+    def _distances(
+        self,
+        clock: np.ndarray | float,
+        x0: Any,
+        constants: Callable[[DistanceBound], np.ndarray],
+    ) -> np.ndarray:
+        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
+        bounds = []
+        for m in self.members:
+            if m.distance is not None:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    size = np.nan_to_num(constants(m.distance) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
+                bounds.append(_grown(size, m.rate, clock))
+        if bounds:
+            most = self._largest_deviation(x0)
+            if len(bounds[0]) < len(x0):  # of the norm, which has N such entries
+                most *= math.sqrt(len(x0)) * (1 + 1e-15)
+            return np.minimum(np.minimum.reduce(bounds), most)
+        return np.full((len(x0), *clock.shape), 0.0 if self._still else np.inf)
+
+    @cached_property
+    def _still(self) -> bool:
+        """Whether no agent moves: every one is where it ends."""
+        return not ErrorSystem(self.structure).nodes
+
+    @cached_property
+    def _influence(self) -> Influence:
+        return influence(self.structure)
+
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - (Q x0)_k|``, rounded up."""
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply(start)
+        return float_above(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
+
+    @cached_property
+    def _rows(self) -> list[dict[int, Fraction]]:
+        return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
+
+    @cached_property
+    def _errors(self) -> dict[tuple[Fraction, ...], list[Fraction]]:
+        return {}
+
+    def _exact_error(self, x0: Sequence[Fraction]) -> list[Fraction]:
+        """Return ``-L x0``, for which every member asks."""
+        key = tuple(x0)
+        if key not in self._errors:
+            self._errors.clear()
+            self._errors[key] = [-sum((w * key[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
+        return self._errors[key]
+
+    def _start(self, member: Member, x0: Sequence[Fraction]) -> float:
+        """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
+        z = member.exact_coordinates_of(x0, self._exact_error(x0))
+        top = max(map(abs, z), default=Fraction(0))
+        if top == 0:
+            return 0.0
+        relative = np.array([float(x / top) for x in z])
+        return float(np.sqrt(member.value(relative))) * (1 + 1e-12) * float_above(top)
+
+    def _unit(self, x0: np.ndarray) -> float:
+        """Return the size of the start, in which squares neither overflow nor vanish."""
+        return float(np.abs(x0).max(initial=0.0)) or 1.0
+
+    def compare(self, trajectory: Trajectory) -> Comparison:
+        """Compare a simulated run with every member; see :class:`Comparison`.
+
+        Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
+        holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
+        in units of the start, so that no square overflows or vanishes. A run that begins later than 0 is judged from
+        its first sample on.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of the same graph and protocol.
+
+        Returns
+        -------
+        Comparison
+
+        Raises
+        ------
+        ParameterError
+            The run is of another graph or protocol, disturbed or held over periods under the nominal protocol, or has
+            no sample before the deadline.
+        """
+        if trajectory.forcing is not None or trajectory.held_input is not None:
+            raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
+        if trajectory.graph != self.structure.graph or trajectory.protocol.gain != self.gain:
+            raise ParameterError("the run is of another graph or protocol than the envelope")
+        if not np.isfinite(trajectory.clock[0]):
+            raise ParameterError("the run has no sample before the deadline, where a bound could be compared")
+        T = float(self.gain.T)
+        judged = trajectory.clock > trajectory.clock[0]
+        if not trajectory.deadline_resolved:
+            judged &= trajectory.t < T
+        worst, floor, resolved, count = 0.0, 0.0, 0.0, 0
+        ratios: dict[float, float] = {}
+        for history in (h for member in self.members for h in self.histories(member, trajectory)):
+            root, bound, f = history
+            excess = np.maximum(root - f, 0.0)[judged]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                ratio = np.nan_to_num(np.where(excess > 0, excess / bound[judged], 0.0), nan=np.inf, posinf=np.inf)
+                plain = np.where(root > 0, root / bound, 0.0)
+            worst = max(worst, float(ratio.max(initial=0.0)))
+            count += int((excess > 0).sum())
+            if root[0] > 0:
+                floor = max(floor, float(f / (trajectory.rtol * root[0])))
+            below = trajectory.remaining[(bound < f) & (trajectory.remaining > 0)]
+            resolved = max(resolved, float(below.max(initial=0.0)))
+            for fraction in FRACTIONS:
+                at = int(np.argmin(np.abs(trajectory.t - fraction * T)))
+                if abs(trajectory.t[at] - fraction * T) <= 1e-9 * T:
+                    ratios[fraction] = max(ratios.get(fraction, 0.0), float(plain[at]))
+        before = trajectory.remaining[trajectory.remaining > 0]
+        return Comparison(
+            worst,
+            floor,
+            trajectory.rtol,
+            resolved,
+            count,
+            ratios,
+            float(before.min()),
+            trajectory.deadline_resolved,
+            distance_ratio=self._distance_ratio(trajectory, judged),
+        )
+
+    def _distance_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
+        """Compare every agent's distance to its outcome with its bound, column by column.
+
+        Before the deadline only: the bound is 0 from there on, and whether the run has arrived is told elsewhere.
+        """
+        if not any(m.distance is not None for m in self.members) or trajectory.t[0] != 0:
+            return None
+        judged = judged & (trajectory.t < float(self.gain.T))
+        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        worst = 0.0
+        for column in range(states.shape[1]):
+            x = states[:, column]
+            size = self._unit(x[:, 0])
+            bounds, start = self._distance_bounds(trajectory, x, size)
+            final, _ = self._influence.apply(start)
+            gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
+            excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
+            norm = np.linalg.norm(excess, axis=0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                both = np.vstack([excess, norm]) / bounds
+            worst = max(worst, float(np.where(np.vstack([excess, norm]) > 0, both, 0.0)[:, judged].max(initial=0.0)))
+        return worst
+
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
+        """Return the bounds of every agent and of the norm (N + 1, M) in that unit, and what ``Q`` is applied to."""
+        start = [as_exact(v) for v in x[:, 0]]
+        own = [v / Fraction(unit) for v in start]
+        bounds = np.vstack([self.distance(trajectory.clock, own), self.distance_norm(trajectory.clock, own)])
+        return bounds, start
+
+    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start.
+
+        Parameters
+        ----------
+        member : Member
+            Of this envelope.
+        trajectory : Trajectory
+            Of the same graph and protocol.
+
+        Returns
+        -------
+        list of History
+            One for each column of the states.
+        """
+        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
+        states = states / _sizes(states)
+        z = member.coordinates_of(states, self._laplacian)
+        unit = _sizes(z)
+        root = np.sqrt(member.value(z / unit))
+        bounds = _grown(root[:, 0], member.rate, trajectory.clock - trajectory.clock[0])
+        return [
+            History(
+                root[column],
+                bounds[column],
+                FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column], float(unit[column, 0])),
+            )
+            for column in range(states.shape[1])
+        ]
+
+    def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:
+        """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
+        size = np.abs(states).max(axis=1)
+        if member.coordinates == "E":
+            size = np.asarray(abs(self._laplacian) @ size)[member.nodes]  # type: ignore[arg-type, operator]
+        else:
+            size = 2 * size[member.nodes]
+        if member.root.ndim == 1:
+            return float(np.linalg.norm(member.root * (size / unit)))
+        return float(np.linalg.norm(np.abs(member.root) @ (size / unit)))
+
+
+def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
+    """Return ``size e^(-rate s / 2)`` for every size and every clock value, rounded up; formed in logarithms.
+
+    At the deadline, where the clock is infinite, 0 if the rate is positive or the size is 0.
+    """
+    with np.errstate(all="ignore"):
+        exponent = np.add.outer(np.log(size), -rate * clock / 2 if rate else np.zeros_like(clock))
+        grown = np.exp(exponent) * (1 + 1e-12)
+    grown = np.where((grown == 0) & (exponent > -np.inf), 5e-324, grown)
+    return np.where(np.isnan(grown), 0.0, grown)
+
+
+def as_exact(x: Any) -> Fraction:
+    """Return a rational as it is, a float as the dyadic number that it is."""
+    return Fraction(x) if isinstance(x, Rational) else Fraction(float(x))
+
+
+def _sizes(values: np.ndarray) -> np.ndarray:
+    """Return the (S, 1) largest entries of (N, S, M) values at the first instant, 1 for a column of zeros."""
+    sizes = np.abs(values[:, :, :1]).max(axis=0, initial=0.0)
+    return np.where(sizes > 0, sizes, 1.0)

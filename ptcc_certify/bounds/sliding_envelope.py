@@ -1,0 +1,375 @@
+"""What the proved rate says under the sliding-mode protocol, through the reaching phase and on to ``T_r + T_s``.
+
+With ``y = x - sigma`` and ``A`` the matrix of the certificate's coordinates ``z`` (rows of ``E``, or ``eps``),
+
+    z_y' = -gain (A z_y + B sigma),      sqrt(V)' <= -(rate/2) gain sqrt(V) + gain || |B| |sigma| ||_Omega
+
+so that on the clock ``s``, ``v = sqrt(V(y))``:
+
+    v(s) <= e^(-rate s/2) v(0) + int_0^s e^(-rate (s - r)/2) || |B| b ||_Omega dr
+
+where ``b_k`` bounds ``|sigma_k|`` whatever the disturbance. The coordinates of ``x`` are those of ``y`` and of
+``sigma``: ``||z_x||_Omega <= v + || |C| b ||_Omega``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptcc_certify.bounds.envelope import (
+    FLOOR_FACTOR,
+    Comparison,
+    Envelope,
+    History,
+    Member,
+    as_exact,
+    clock_values,
+    float_above,
+    remaining_part,
+)
+from ptcc_certify.bounds.final_state import exact_start
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime, sliding_bound
+from ptcc_certify.simulation.trajectory import SlidingTrajectory
+
+if TYPE_CHECKING:
+    from ptcc_certify.simulation.trajectory import Trajectory
+
+# The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
+_PIECES = 4000
+#: Arrays of instants whose bounds are kept.
+_MOST_KNOWN = 8
+
+
+@dataclass(frozen=True)
+class SlidingEnvelope(Envelope):
+    """The proved bounds under the sliding-mode protocol, for one ``sigma(0)`` and every disturbance within ``delta``.
+
+    Attributes
+    ----------
+    protocol : SlidingModeProtocol
+    sigma0 : tuple of Fraction
+        ``sigma(0)``, N numbers.
+    reaching : tuple of ReachingTime
+        Proved reaching times, one for each agent.
+
+    References
+    ----------
+    Theorems 4 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> envelope = certify(pair, robust, [3, 1], sigma0=[1, 0], simulation=False).envelope
+    >>> bool(envelope.outcome_distance(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
+    True
+    >>> bool(envelope.sliding_norm(0.0) >= 1)  # ||sigma(0)|| = 1
+    True
+    """
+
+    protocol: SlidingModeProtocol
+    sigma0: tuple[Fraction, ...]
+    reaching: tuple[ReachingTime, ...]
+
+    @property
+    def direct(self) -> bool:
+        """Whether ``sigma(0) = 0``: there is no reaching phase, and the bounds are those of the nominal protocol."""
+        return not any(self.sigma0)
+
+    def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
+        """Bound of ``||z(t)|| / ||z(0)||``; see :meth:`Envelope.norm_factor`.
+
+        Raises
+        ------
+        ParameterError
+            ``sigma(0)`` is not 0: sliding variables drive the agents, and no multiple of their start bounds them.
+        """
+        self._need_direct()
+        return super().norm_factor(clock)
+
+    def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z||`` at clock values; see :meth:`Envelope.bound`, and :meth:`state_bound` for any sigma(0).
+
+        Raises
+        ------
+        ParameterError
+            ``sigma(0)`` is not 0.
+        """
+        self._need_direct()
+        return super().bound(clock, x0)
+
+    def _need_direct(self) -> None:
+        if not self.direct:
+            raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
+
+    def state_bound(self, remaining: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, from ``x0``.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+            Between 0 and 1.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
+
+        Returns
+        -------
+        array
+            Of the shape of ``remaining``; infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
+        z, clock = self._instants(q)
+        bound, unit = np.full(q.size, np.inf), self._unit(np.array([float(x) for x in x0]))
+        for member in self._in_norm:
+            if self._usable(member):
+                v, sliding = self._bounds(member, x0, unit, z, clock)
+                with np.errstate(over="ignore"):
+                    bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit * (1 + 1e-12))
+        return bound if np.ndim(remaining) else bound[0]
+
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||z||`` from ``x0``, (M,), whatever the disturbance; see :meth:`Envelope.norm_bound`."""
+        if self.direct:
+            return super().norm_bound(remaining, x0)
+        return self.state_bound(np.asarray(remaining), x0)
+
+    def sliding_norm(self, z: np.ndarray) -> np.ndarray:
+        """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``.
+
+        Parameters
+        ----------
+        z : (M,) array
+            ``ln(T_r/(T_r - t))`` of the instants, dimensionless.
+
+        Returns
+        -------
+        (M,) array
+
+        Raises
+        ------
+        ParameterError
+            An instant is negative or not a number.
+        """
+        z = clock_values(z, "z")
+        size = math.hypot(*(float(x) for x in self.sigma0))
+        return size * np.exp(-self.protocol.reaching_gain.clock_at_tau(z))
+
+    def compare(self, trajectory: Trajectory) -> Comparison:
+        """Compare a simulated run with every bound: Lyapunov functions, sliding variables, reaching times.
+
+        Raises
+        ------
+        ParameterError
+            The run is of another graph or protocol, begins later than 0, from another ``sigma(0)``, or is the
+            boundary-layer imitation, of which nothing was proved.
+        """
+        if not isinstance(trajectory, SlidingTrajectory) or trajectory.protocol != self.protocol:
+            raise ParameterError("the run is of another protocol than the envelope")
+        if trajectory.boundary_layer is not None:
+            raise ParameterError("nothing was proved about the boundary-layer imitation; compare the true solution")
+        sigma0 = np.array([float(x) for x in self.sigma0])
+        if trajectory.t[0] != 0 or (trajectory.sigma0 != sigma0).any():
+            raise ParameterError("the run starts later than 0, or from another sigma(0) than the envelope")
+        certain = np.array([np.inf if r.z is None else float(r.z) for r in self.reaching])
+        late = certain * 1e-9
+        if trajectory.reads_states:  # sigma_k is known to the integrator's floor, its root to that over the slope
+            gap = float(self.protocol.mu1 - self.protocol.delta) * float(self.protocol.T_r) * np.exp(-certain)
+            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+                late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
+        kept = bool((trajectory.reaching_z <= certain + late).all())
+        z = self._z(trajectory)
+        bound, size = self._sliding(z), np.abs(sigma0).max(initial=0.0)
+        excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(excess > 0, excess / bound, 0.0)
+            norm = np.linalg.norm(excess / (size or 1.0), axis=0)
+            ratio = np.append(ratio, np.where(norm > 0, norm / (self.sliding_norm(z) / size), 0.0))
+        return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
+
+    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of the start."""
+        assert isinstance(trajectory, SlidingTrajectory)
+        if self.direct:
+            return super().histories(member, trajectory)
+        if not self._usable(member):
+            return []
+        own = self._unit(trajectory.states[:, 0])
+        x, y = trajectory.states / own, (trajectory.states - trajectory.sigma) / own
+        size = max(float(np.abs(part).max()) for part in (x, y))
+        v, sliding = self._bounds(member, trajectory.states[:, 0], own, self._z(trajectory), trajectory.clock)
+        unit = float((v + sliding).max()) or 1.0
+        floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
+        return [
+            History(np.sqrt(member.value(member.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
+            for part, bound in ((x, v + sliding), (y, v))
+        ]
+
+    def _unit(self, x0: np.ndarray) -> float:
+        """Return the size of the start, in which squares neither overflow nor vanish."""
+        return max(float(np.abs(x0).max()), *(abs(float(x)) for x in self.sigma0)) or 1.0
+
+    @staticmethod
+    def _z(trajectory: SlidingTrajectory) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return -np.log(trajectory.reaching_remaining)
+
+    def _usable(self, member: Member) -> bool:
+        """Whether a member bounds the reaching phase: one that bounds only the growth would end in infinity."""
+        return self.direct or member.rate > 0
+
+    def _bounds(
+        self, member: Member, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
+
+        What is returned is in units of ``unit``; ``x0`` is not.
+        """
+        own = Fraction(unit)
+        y0 = [(as_exact(x) - sigma) / own for x, sigma in zip(x0, self.sigma0, strict=True)]
+        half = member.rate / 2
+        C, B = self._drive(member)
+        knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
+        size = self._sliding(knots) / unit
+        forcing = _column_norms(B @ size)
+        s = self._clock_at(knots)
+        step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
+        decay, share = np.exp(-step), -np.expm1(-step) / half
+        v = np.empty(knots.size + 1)
+        v[0] = self._start(member, y0)
+        for i in range(knots.size):
+            v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
+        at = np.searchsorted(knots, z)
+        last = self._clock_at(np.array([np.inf]))[0]
+        later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
+        sliding = np.append(_column_norms(C @ size), 0.0)
+        return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
+
+    @cached_property
+    def _known(self) -> dict[bytes, np.ndarray]:
+        return {}
+
+    def _sliding(self, z: np.ndarray) -> np.ndarray:
+        """Return :func:`sliding_bound`, which every member asks for at the same instants."""
+        key = z.tobytes()
+        if key not in self._known:
+            if len(self._known) > _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
+        return self._known[key]
+
+    @cached_property
+    def _pieces(self) -> np.ndarray:
+        """Instants ``z`` at which the pieces begin, until all sliding variables are certainly 0."""
+        certain = [LAST_Z if r.z is None else float(min(r.z, Fraction(LAST_Z))) for r in self.reaching]
+        fine = np.concatenate([[0.0], np.geomspace(1e-9, 1, 2000) * max(certain)])
+        levels = self.protocol.reaching_gain.clock_at_tau(fine)
+        return np.interp(np.linspace(0, levels[-1], _PIECES), levels, fine)
+
+    def _clock_at(self, z: np.ndarray) -> np.ndarray:
+        """Return ``s`` at instants ``z`` before ``T_r``, and at ``T_r`` where ``z`` is infinite."""
+        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
+
+    def _drive(self, member: Member) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
+        L = self.structure.graph.laplacian()
+        if member.coordinates == "E":
+            rows = L[member.nodes]
+            return np.abs(member.scaled(rows.toarray())), np.abs(member.scaled((rows @ L).toarray()))
+        deviation = member.coordinates_of(np.eye(L.shape[0]), L)
+        return np.abs(member.scaled(deviation)), np.abs(member.scaled(deviation @ L))
+
+    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
+        """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
+        if self.direct:
+            return super()._distance_bounds(trajectory, x, unit)
+        assert isinstance(trajectory, SlidingTrajectory)
+        bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(trajectory), trajectory.clock)
+        start = [as_exact(v) - sigma for v, sigma in zip(x[:, 0], self.sigma0, strict=True)]
+        return np.vstack([bounds, norm]), start
+
+    def _outcome_bounds(
+        self, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds of ``|x_k - outcome_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
+        bounds = np.full((len(x0), z.size), 0.0 if self._still else np.inf)
+        norm = bounds[0].copy()
+        for member in self.members:
+            if member.distance is None or not self._usable(member):
+                continue
+            v = self._bounds(member, x0, unit, z, clock)[0] * (1 + 1e-12)
+            with np.errstate(invalid="ignore", over="ignore"):
+                bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
+                norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
+        size = self._sliding(z) / unit
+        bounds, norm = bounds + size, norm + _column_norms(size)
+        if any(m.distance is not None for m in self.members):
+            most = self._largest_deviation(x0) / unit * (1 + 1e-15)
+            bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
+        return bounds, norm
+
+    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
+        """Return ``max_k |x_k(0) - outcome_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
+
+        ``x - outcome`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
+        expand the largest entry.
+        """
+        start = [as_exact(x) for x in x0]
+        final, _ = self._influence.apply([x - sigma for x, sigma in zip(start, self.sigma0, strict=True)])
+        gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
+        return float_above(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
+
+    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
+
+        Parameters
+        ----------
+        remaining : float or (M,) array
+            Between 0 and 1.
+        x0 : sequence of N numbers, mapping of label to number or pandas Series
+
+        Returns
+        -------
+        (N, M) or (N,) array
+
+        Raises
+        ------
+        ParameterError
+            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
+        """
+        if self.direct:
+            return super().outcome_distance(remaining, x0)
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
+        unit = self._unit(np.array([float(x) for x in x0]))
+        z, clock = self._instants(q)
+        bounds = self._outcome_bounds(x0, unit, z, clock)[0] * unit
+        return bounds if np.ndim(remaining) else bounds[:, 0]
+
+    def _instants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``z`` and ``s`` where ``1 - t/(T_r + T_s)`` equals ``q``."""
+        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        with np.errstate(divide="ignore"):
+            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
+            return z, np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
+
+
+def _column_norms(M: np.ndarray) -> np.ndarray:
+    """Return the Euclidean norms of the columns; nothing is squared that could leave float64."""
+    top = np.abs(M).max(axis=0, initial=0.0)
+    unit = np.where(top > 0, top, 1.0)
+    return np.linalg.norm(M / unit, axis=0) * top * (1 + 1e-12)

@@ -1,0 +1,417 @@
+"""The verdict of a certificate in one line, and the exit code that agrees with it.
+
+To ``certified`` and ``undecided`` it adds three things: whether the bound says something by the deadline with the gains
+at hand, if not which gains would; what to try next where nothing was decided; and which expectation was met, refuted or
+left open.
+
+*Useful* is a bound that leaves at most 1 % at 0.99 T, by one of two measures:
+
+* ``||z|| <= ||z(0)|| / 100`` for every initial state, ``z`` being the coordinates ``E`` or ``eps`` of the envelope;
+* from the given initial state, no agent is farther from its final state than a hundredth of the longest way of all.
+
+Under the sliding-mode protocol with a reaching phase the first alone counts, from ``T_r`` on: ``||z||`` at
+``T_r + 0.99 T_s`` against ``||z(T_r)||``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.rounding import down, near, up
+from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.checker.input_bounds import PrescribedGain, Starts
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.search import USEFUL
+from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.theorems.lemmas import EXACT_NODES
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.saved import SavedCertificate
+
+#: What became of an expectation.
+MET, REFUTED, OPEN = "met", "refuted", "left open"
+#: The share of the time that is left where the bound is judged.
+LAST = Fraction(1, 100)
+#: Digits of the gain that is proposed.
+_DIGITS = 3
+_LARGEST_CLOCK = 1e12
+#: From so many decades between weights on, they are named as the reason that nothing was proved.
+MANY_DECADES = 8
+
+OK, VIOLATED, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 3, 4
+
+
+@dataclass(frozen=True)
+class Expectations:
+    """What is asked of a certificate besides.
+
+    Attributes
+    ----------
+    behaviour : str or None
+        As :attr:`ptcc_certify.graphs.structure.Claim.behaviour` or one of its special cases.
+    min_rate : Fraction or None
+        A proved rate of at least so much, per unit of the stretched clock.
+    max_input : Fraction or None
+        A proved peak of every ``|u_k|`` of at most so much, in units of the input.
+
+    References
+    ----------
+    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances, say which behaviour follows.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
+    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
+    refuted: rate >= 5 (none exceeds 4, proved); certified; met: bipartite consensus
+    """
+
+    behaviour: str | None = None
+    min_rate: Fraction | None = None
+    max_input: Fraction | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of one expectation: ``met``, ``refuted`` or ``left open``, of what, and why."""
+
+    status: str
+    what: str
+    why: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.what} ({self.why})" if self.why else self.what
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """The graded verdict of a certificate: what it is worth, what became of what was asked, and the exit code.
+
+    A bound is useful if it leaves at most 1 % at ``0.99 T``: of ``||E(0)||`` (or ``||eps(0)||``), or from the initial
+    state of the longest way of an agent; under the sliding-mode protocol of ``||E(T_r)||`` at ``T_r + 0.99 T_s``.
+
+    Attributes
+    ----------
+    verdict : {"certified", "undecided"}
+        Of the certificate.
+    violated : bool
+        Whether the simulated run exceeds a proved bound.
+    useful : bool or None
+        Whether the bound says something by the deadline with these gains; None if nothing is certified.
+    said : str
+        What it says, or does not, or what to try next.
+    advice : str
+        Gains with which the bound would be useful; empty if it is, or if none are known.
+    answers : tuple of Answer
+        One for each expectation.
+
+    References
+    ----------
+    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances, are what is certified.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> found = certify(pair, protocol, simulation=False).assessment
+    >>> found.verdict, found.useful, found.exit_code
+    ('certified', True, 0)
+    """
+
+    verdict: str
+    violated: bool
+    useful: bool | None
+    said: str
+    advice: str
+    answers: tuple[Answer, ...]
+
+    @property
+    def exit_code(self) -> int:
+        """0 proved and everything asked holds, 1 violated, 3 an expectation refuted, 4 undecided or one left open."""
+        statuses = {answer.status for answer in self.answers}
+        return exit_code(self.violated, REFUTED in statuses, OPEN in statuses or self.verdict != "certified")
+
+    @property
+    def asked(self) -> str | None:
+        """The worst of what became of the expectations; None if there were none."""
+        statuses = {answer.status for answer in self.answers}
+        return next((status for status in (REFUTED, OPEN, MET) if status in statuses), None)
+
+    @property
+    def word(self) -> str:
+        """The verdict in a few words."""
+        if self.violated:
+            return "VIOLATED"
+        if self.asked in (REFUTED, OPEN) and (self.asked == REFUTED or self.verdict == "certified"):
+            return str(self.asked)
+        return f"{self.verdict}, says little by T" if self.useful is False else self.verdict
+
+    @property
+    def text(self) -> str:
+        """The verdict line: what is not as one would wish comes first, and agrees with the exit code."""
+        parts = ["VIOLATED: the simulated run exceeds the proved bound; please report this graph"] * self.violated
+        for status in (REFUTED, OPEN):
+            unmet = [str(answer) for answer in self.answers if answer.status == status]
+            parts += [f"{status}: {', '.join(unmet)}"] if unmet else []
+        crowded = bool(parts)
+        if self.useful is False:
+            little = f"{self.verdict}, but with these gains the bound says little by T"
+            advice = f"; {self.advice}" if self.advice else ""
+            parts.append(f"{little}{advice}" if crowded else f"{little}: {self.said}{advice}")
+        else:
+            colon = ": " if self.verdict != "certified" else "; "
+            parts.append(f"{self.verdict}{colon}{self.said}" if self.said and not crowded else self.verdict)
+        met = [str(answer) for answer in self.answers if answer.status == MET]
+        parts += [f"{MET}: {', '.join(met)}"] if met else []
+        return "; ".join(parts)
+
+
+def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
+    """Return the exit code: 1 violated, 3 refuted, 4 undecided or left open, 0 otherwise; the first that holds.
+
+    Examples
+    --------
+    >>> exit_code(False, True, True), exit_code(False, False, False)
+    (3, 0)
+    """
+    return VIOLATED if violated else REFUTED_EXPECTATION if refuted else UNDECIDED if left_open else OK
+
+
+def worst_code(codes: Iterable[int]) -> int:
+    """Return the worst of several exit codes.
+
+    Examples
+    --------
+    >>> worst_code([0, 4, 3]), worst_code([])
+    (3, 0)
+    """
+    found = set(codes)
+    return exit_code(VIOLATED in found, REFUTED_EXPECTATION in found, UNDECIDED in found)
+
+
+def assess(certificate: Certificate | SavedCertificate) -> Assessment:
+    """Return the graded verdict of a certificate, made or read back, and of what was expected of it.
+
+    Parameters
+    ----------
+    certificate : Certificate or SavedCertificate
+
+    Returns
+    -------
+    Assessment
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
+    >>> print(assess(certify(pair, weak, [3, 1], simulation=False)).text)
+    certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
+--rho2 0.286 (rho2 kappa 0.286) leaves 1 %
+    >>> found = assess(certify(pair, strong, [3, 1], simulation=False))
+    >>> found.useful, found.exit_code
+    (True, 0)
+    """
+    asked, seen = certificate.expectations, certificate.comparison
+    answers = [] if asked.behaviour is None else [judge_behaviour(certificate.structure, asked.behaviour)]
+    answers += [] if asked.min_rate is None else [judge_rate(certificate, asked.min_rate)]
+    answers += [] if asked.max_input is None else [judge_input(certificate, asked.max_input)]
+    answers += judge_limits(certificate)
+    useful, said, advice = None, "", ""
+    if certificate.verdict != "certified":
+        said = _next_step(certificate)
+    elif certificate.constant:
+        useful, said = True, "nothing to decay"
+    else:
+        limited = certificate.effort is not None and certificate.effort.residual
+        useful, said, advice = (_limited_usefulness if limited else _usefulness)(certificate)
+    violated = seen is not None and seen.violated
+    return Assessment(certificate.verdict, violated, useful, said, advice, tuple(answers))
+
+
+# ---------------------------------------------------------------------- expectations
+
+
+def judge_behaviour(structure: Structure, expected: str) -> Answer:
+    """Tell whether a behaviour follows from the theorem that applies, in every component."""
+    if structure.holds(expected):
+        return Answer(MET, expected)
+    claims = [component.claim for component in structure.components]
+    return Answer(REFUTED, expected, f"it is {claims[0].behaviour}" if len(claims) == 1 else "not in every component")
+
+
+def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> Answer:
+    """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if certificate.constant or (rate is not None and rate >= least):
+        return Answer(MET, what)
+    if bound is not None and least > bound:
+        return Answer(REFUTED, what, f"none exceeds {up(bound, 8)}, proved")
+    proved = "none is proved" if rate is None else f"proved: {down(rate)}"
+    return Answer(OPEN, what, proved if bound is None else f"{proved}, at most {up(bound, 8)} can be")
+
+
+def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> Answer:
+    """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
+    effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
+    if certificate.constant:
+        return Answer(MET, what)
+    least, proved = input_range(certificate)
+    if proved is not None and proved <= most:
+        return Answer(MET, what)
+    if least > most:
+        first = effort is not None and effort.first is not None and effort.first >= least
+        size = f"up to {down(least)}" if least < math.inf else "without limit"
+        return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by noise alone'}, proved")
+    if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
+        return Answer(REFUTED, what, "from some of these starts it grows without limit, proved")
+    return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
+
+
+def input_range(certificate: Certificate | SavedCertificate) -> tuple[Fraction | float, Fraction | None]:
+    """Return proved bounds of the largest ``|u_k|`` over all agents, starts, noise and disturbances asked about.
+
+    Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
+    attained or approached: at the start, or where noise meets the largest gain, without a limit an infinite one.
+    The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
+    under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` stays below what is proved without these.
+    """
+    effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
+    if effort is None:
+        return Fraction(0), None
+    gain = PrescribedGain(p.T, p.rho1, p.rho2 * p.kappa)
+    tops = [top for entry in certificate.limits if (top := entry.largest_gain(gain)) is not None]
+    share = min([Fraction(1), *(top / (gain.rho1 + gain.k / gain.T) for top in tops)])
+    least: Fraction | float = (effort.first or Fraction(0)) * share
+    if certificate.noise is not None:
+        rows = graph.exact_rows(range(graph.n_nodes))
+        heard = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
+        least = max(least, 2 * heard * certificate.noise * min(tops)) if tops else math.inf
+    if certificate.limits:
+        known = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
+        most = None if len(known) < len(certificate.limits) or None in known else max(x for x in known if x is not None)
+    else:
+        most = None if effort.peak is None or certificate.noise is not None else effort.peak.largest
+    if most is not None and certificate.delta is not None:
+        most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
+    return least, most
+
+
+def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
+    """Tell which of the limits, noise and disturbances that were asked for are not certified."""
+    effort, found = certificate.effort, []
+    residual = () if effort is None else effort.residual
+    if len(residual) < len(certificate.limits) and not certificate.constant:
+        period = None if effort is None else effort.longest_period
+        why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
+        found.append(Answer(OPEN, "limits", why))
+    silent = len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
+    if certificate.noise is not None and (silent or not residual):
+        found.append(Answer(OPEN, "noise", "not certified"))
+    if certificate.delta is not None and (effort is None or effort.disturbed is None):
+        found.append(Answer(OPEN, "delta", "not certified"))
+    return found
+
+
+# ---------------------------------------------------------------------- use
+
+
+def _usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str, str]:
+    """Return whether the bound is useful, what it says, and which gains would make it so."""
+    envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
+    span = p.T if direct or not isinstance(p, SlidingModeProtocol) else p.T_s
+    z, instant = envelope.coordinates, "0.99 T"
+    begin = f"{z}(0)"
+    if not direct:
+        begin, instant = f"{z}(T_r)", "T_r + 0.99 T_s"
+    fixed, pole = float(p.rho1 * span * (1 - LAST)), float(p.rho2 * p.kappa)
+    left = _share(envelope, fixed + pole * math.log(1 / LAST))
+    said = f"||{z}|| <= {up(left, 2)} ||{begin}|| at {instant}"
+    if left <= USEFUL:
+        return True, said, ""
+    if direct and (way := certificate.longest_way) is not None:
+        worst = float(certificate.outcome_distance([float(LAST)]).max(initial=0.0))
+        if worst <= USEFUL * way:
+            return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
+    rho2 = _useful_rho2(envelope, fixed, p.kappa)
+    if rho2 is None:
+        return False, said, ""
+    return False, said, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
+
+
+def _limited_usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str, str]:
+    """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
+    effort, start, way = certificate.effort, certificate.start, certificate.longest_way
+    residual = () if effort is None else effort.residual
+    noisy = any(entry.noise is not None for entry in residual)
+    if way is not None and not noisy and all(entry.agents is not None for entry in residual):
+        worst = max(x for entry in residual for x in entry.agents or ())
+        said = f"under the limits every agent within {up(worst, 2)} of its final state at T"
+        if worst <= USEFUL * way:
+            return True, said, ""
+    norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
+    region = (None if effort is None else effort.starts) or (None if start is None else Starts(start))
+    if region is None:
+        return False, f"under the limits ||E|| <= {up(norm, 2)} at T", ""
+    rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
+    first = math.sqrt(sum(float(region.largest(row)) ** 2 for row in rows))
+    left = float(norm) / first if first else 0.0
+    return left <= USEFUL, f"under the limits ||E|| <= {up(left, 2)} ||E(0)|| at T", ""
+
+
+def _share(envelope: Envelope, clock: float) -> float:
+    """Return what is left of ``||z||`` after so much of the clock, rounded up."""
+    return float(Envelope.norm_factor(envelope, np.array(clock)))
+
+
+def _useful_rho2(envelope: Envelope, fixed: float, kappa: Fraction) -> Fraction | None:
+    """Return a short ``rho2`` with which the bounds at hand leave a hundredth; None if there is none."""
+    low, high = fixed, max(fixed, 1e-300)
+    while _share(envelope, high) > USEFUL:
+        low, high = high, 2 * high
+        if high > _LARGEST_CLOCK:
+            return None
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _share(envelope, middle) > USEFUL else (low, middle)
+    wanted = Fraction(high - fixed) / Fraction(math.log(1 / LAST)) / kappa
+    return Fraction(up(wanted * (1 + Fraction(1, 10**9)), _DIGITS)) if wanted > 0 else None
+
+
+# ---------------------------------------------------------------------- what to try next
+
+
+def _next_step(certificate: Certificate | SavedCertificate) -> str:
+    """Tell why nothing was decided, and what to try."""
+    report = certificate.checked
+    if report is not None and not report.accepted:
+        return f"the independent check rejects {report.rejected}; please report this graph"
+    method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes
+    if certificate.cut_off:
+        return f"{certificate.time_limit:g} s ended {certificate.cut_off[0]}; raise --time-limit"
+    if certificate.rate is None:
+        if method != "best":
+            return f"--method {method} proves no rate; try --method best"
+        if (decades := certificate.graph.weight_decades) >= MANY_DECADES:
+            return f"no rate is proved, weights span {decades} decades: rescale them, or leave out the smallest"
+        groups = [note for note in notes if "leader group" in note and "lmi is for" not in note]
+        if groups:
+            most = max(len(component.nodes) for component in certificate.structure.closed_components)
+            return f"no rate is proved: a leader group of {most} nodes is too much; certify followers and leaders apart"
+        size = "--method lmi" if n > EXACT_NODES else "rounding the weights to fewer digits"
+        return f"no rate is proved; try {size}"
+    return (
+        "the final state is not proved, the equations are ill-conditioned: rescale weights that are far from the others"
+    )

@@ -1,0 +1,1 @@
+"""Signed digraphs: exact weights, structure, ensembles, reading and writing."""

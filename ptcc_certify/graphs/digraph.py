@@ -1,0 +1,624 @@
+"""Signed digraphs: immutable, labelled, sparse, with exact weights.
+
+``w_kl != 0`` iff there is an edge ``v_l -> v_k``: information flows from ``l`` to ``k``, *k listens to l*. A
+positive weight means ally, a negative one opponent. Rows of every matrix are listeners, columns are sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
+
+if TYPE_CHECKING:
+    import networkx as nx
+    from scipy import sparse
+
+_INT64_LIMIT = 2**62
+SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
+_SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
+_INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
+
+Exact = Fraction | int | float | str
+
+
+class Weights:
+    """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
+
+    def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
+        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None)."""
+        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+            table: np.ndarray = values.astype(np.float64)
+            self.kind, self.scale = "float64", 1
+        else:
+            fractions = [v if isinstance(v, Fraction) else Fraction(v) for v in values]
+            scale = 1
+            for value in fractions:
+                scale = math.lcm(scale, value.denominator)
+                if scale > _INT64_LIMIT:
+                    break
+            if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
+                table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
+                self.kind, self.scale = "int64", scale
+            elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in fractions):
+                table = np.array([float(v) for v in fractions])
+                self.kind, self.scale = "float64", 1
+            else:
+                table = np.empty(len(fractions), dtype=object)
+                table[:] = fractions
+                self.kind, self.scale = "fraction", 1
+        self.table = table if codes is None else table[codes]
+
+    def take(self, index: np.ndarray) -> Weights:
+        """Return the weights at ``index``, in that order."""
+        new = object.__new__(Weights)
+        new.kind, new.scale, new.table = self.kind, self.scale, self.table[index]
+        return new
+
+    def as_float(self) -> np.ndarray:
+        """Return the weights rounded to float64."""
+        if self.kind == "int64":
+            # One rounding only: int64 / scale in float64 would round the numerator first.
+            if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
+                return self.table / float(self.scale)
+            return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
+        if self.kind == "float64":
+            return self.table.copy()
+        return np.array([nearest_float(v) for v in self.table], dtype=np.float64)
+
+    def fraction(self, i: int) -> Fraction:
+        """Return weight ``i`` exactly."""
+        value = self.table[i]
+        return Fraction(int(value), self.scale) if self.kind == "int64" else Fraction(value)
+
+    def signs(self) -> np.ndarray:
+        """Return +1 or -1 for each weight."""
+        return np.where(self.table > 0, 1, -1).astype(np.int8)
+
+
+#: Edges whose lines are hashed at a time.
+_HASHED = 65_536
+
+
+class SignedDigraph:
+    """A signed digraph with exact weights.
+
+    Build one with :meth:`from_edges`, :meth:`from_matrix`, :meth:`from_networkx` or
+    :func:`ptcc_certify.read_graph`. Nodes carry text labels; edge arrays are sorted by (target, source) index.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Node labels in index order: by value when all are integers, otherwise by first appearance.
+    source, target : (n_edges,) int array
+        Information flows from ``source`` to ``target``: the target listens.
+    weights : (n_edges,) float64 array
+        The weights, each rounded once; the constructor takes them exactly.
+    sign : (n_edges,) int8 array
+        +1 ally, -1 opponent.
+    read : mapping, optional
+        How the data were read: ``orientation``, ``duplicates``, ``self_loops``, ``undirected``, ``notes``. The
+        constructor fills in what it is not told.
+
+    Raises
+    ------
+    GraphError
+        There is no node, two nodes bear one label, a weight is zero, an edge occurs twice or is a loop.
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+    Altafini, Consensus problems on networks with antagonistic interactions, IEEE Trans. Automat. Control 58 (2013).
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([("a", "b", 2), ("b", "a", "-0.5")])
+    >>> g
+    SignedDigraph(2 nodes, 2 edges, 1 negative)
+    >>> g.laplacian().toarray()
+    array([[ 0.5,  0.5],
+           [-2. ,  2. ]])
+    """
+
+    def __init__(
+        self,
+        labels: Iterable[str],
+        source: np.ndarray,
+        target: np.ndarray,
+        weights: Weights,
+        read: Mapping[str, Any] | None = None,
+    ):
+        self.labels = tuple(labels)
+        n = len(self.labels)
+        if n == 0:
+            raise GraphError("the graph has no nodes; give at least one edge, or a row with one label")
+        if len(set(self.labels)) != n:
+            raise GraphError("two nodes bear the same label; rename one of them")
+        for label in self.labels:
+            if _SURROGATE_PAIR.search(label):
+                name = shorten(label)
+                raise GraphError(f"label {name} holds a character as two surrogates; write the character itself")
+        source, target = np.asarray(source, dtype=np.int64), np.asarray(target, dtype=np.int64)
+        order = np.lexsort((source, target))
+        self.source, self.target = source[order], target[order]
+        self._weights = weights.take(order)
+        self.sign = self._weights.signs()
+        self.read = dict(_READ_DEFAULT, **(read or {}))
+        for array in (self.source, self.target, self._weights.table, self.sign):
+            array.flags.writeable = False
+        self._refuse_bad_edges()
+
+    def _refuse_bad_edges(self) -> None:
+        source, target = self.source, self.target
+        loops = np.flatnonzero(source == target)
+        if loops.size:
+            label = self.labels[source[loops[0]]]
+            raise GraphError(f"self-loop at node {shorten(label)}; remove it, or drop all with --drop-self-loops")
+        twice = np.flatnonzero((source[1:] == source[:-1]) & (target[1:] == target[:-1]))
+        if twice.size:
+            raise GraphError(f"two edges {self._edge_text(int(twice[0]))}; keep one, or merge with --duplicates")
+        table = self._weights.table
+        if self._weights.kind == "float64" and not np.isfinite(table).all():
+            where = int(np.flatnonzero(~np.isfinite(table))[0])
+            raise GraphError(f"weight {table[where]} of edge {self._edge_text(where)} is not a finite number")
+        if (zero := np.flatnonzero(table == 0)).size:
+            raise GraphError(
+                f"weight 0 of edge {self._edge_text(int(zero[0]))}: an unknown sign is not an edge; "
+                "remove it or give a weight"
+            )
+        size = np.abs(self.weights)
+        if self._weights.kind == "fraction":
+            for edge, weight in enumerate(table.tolist()):
+                if not writable(weight):
+                    raise GraphError(f"weight of edge {self._edge_text(edge)} has too many digits to keep; round it")
+        if (odd := np.flatnonzero((size < SMALLEST_WEIGHT) | (size > LARGEST_WEIGHT))).size:
+            raise GraphError(
+                f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
+            )
+
+    def _edge_text(self, edge: int) -> str:
+        return f"{shorten(self.labels[self.source[edge]])} -> {shorten(self.labels[self.target[edge]])}"
+
+    # ------------------------------------------------------------------ constructors
+
+    @classmethod
+    def from_edges(
+        cls,
+        edges: Iterable[tuple[Hashable, Hashable, Exact]],
+        nodes: Iterable[Hashable] = (),
+        *,
+        orientation: str = "information",
+    ) -> SignedDigraph:
+        """Build a graph from ``(source, target, weight)`` triples.
+
+        Parameters
+        ----------
+        edges : iterable of (label, label, weight)
+            A weight is an int, Fraction, float (the dyadic number it is) or a text of the exact grammar.
+        nodes : iterable of labels, optional
+            Further nodes, and the wish for an order: these come first unless all labels are integers.
+        orientation : {"information", "listens"}
+            ``information``: information flows first -> second. ``listens``: the first listens to the second.
+
+        Raises
+        ------
+        GraphError
+            A weight is zero or not finite, an edge occurs twice, or an edge is a loop.
+
+        Examples
+        --------
+        >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
+        ('b', 'a', Fraction(1, 1))
+        """
+        _refuse_unknown_orientation(orientation)
+        index: dict[str, int] = {}
+        original: dict[str, Hashable] = {}
+
+        def number(node: Hashable) -> int:
+            label = str(node)
+            if label in original and original[label] != node:
+                raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
+            original.setdefault(label, node)
+            return index.setdefault(label, len(index))
+
+        for node in nodes:
+            number(node)
+        heads, tails, values = [], [], []
+        for edge in edges:
+            try:
+                first, second, weight = edge
+            except (TypeError, ValueError):
+                raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight)") from None
+            heads.append(number(first))
+            tails.append(number(second))
+            try:
+                values.append(as_fraction(weight, "weight"))  # type: ignore[arg-type]
+            except NumberError as error:
+                raise GraphError(f"edge {shorten(str(first))} -> {shorten(str(second))}: {error}") from None
+        if orientation == "listens":
+            heads, tails = tails, heads
+        labels, rank = ordered_labels(list(index))
+        source = rank[np.array(heads, dtype=np.int64)]
+        target = rank[np.array(tails, dtype=np.int64)]
+        return cls(labels, source, target, Weights(values), {"orientation": orientation})
+
+    @classmethod
+    def from_matrix(
+        cls, matrix: Any, labels: Iterable[Hashable] | None = None, *, orientation: str | None = None
+    ) -> SignedDigraph:
+        """Build a graph from an adjacency matrix: its entry (k, l) is read as the row ``k, l, entry`` of an edge list.
+
+        Some write ``w_kl`` for what k makes of l, as the paper does, others for the edge k -> l, as networkx does. A
+        matrix does not tell which, so that ``orientation`` must:
+
+            from_matrix(W, orientation="listens").adjacency()              is the paper's W again
+            from_matrix(nx.to_numpy_array(G), orientation="information")   is from_networkx(G), but for the labels
+
+        Parameters
+        ----------
+        matrix : (N, N) array, SciPy sparse matrix or pandas DataFrame
+            Integers are exact, floats are the dyadic numbers they are; the diagonal must be zero. Entries of an
+            object array may be Fractions. A DataFrame has the same labels on rows and columns, in any order; those of
+            the rows become the nodes.
+        labels : iterable of N labels, optional
+            ``1 .. N`` by default; none beside those of a DataFrame.
+        orientation : {"information", "listens"} or None
+            ``information``: information flows from the row to the column. ``listens``: the row listens to the column.
+            None is refused: it must be said.
+
+        Raises
+        ------
+        GraphError
+            The orientation is not given, the matrix is not square, a diagonal entry is not zero, an entry is not a
+            finite number, there are not N different labels, or rows and columns of a DataFrame have different ones.
+
+        Examples
+        --------
+        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="listens").edges
+        (('2', '1', Fraction(-1, 1)),)
+        >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="information").edges
+        (('1', '2', Fraction(-1, 1)),)
+        """
+        if hasattr(matrix, "is_multigraph"):
+            raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
+        if orientation is None:
+            raise GraphError(
+                'a matrix does not tell its direction: say orientation="listens" if row k holds whom k listens to (the '
+                'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
+            )
+        _refuse_unknown_orientation(orientation)
+        if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
+            if labels is not None:
+                raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
+            labels, matrix = rows, _aligned_frame(matrix, rows)
+        if hasattr(matrix, "tocoo"):
+            coo = matrix.tocoo()
+            if len(coo.shape) != 2:
+                raise GraphError(f"an adjacency matrix has two dimensions, not {len(coo.shape)}")
+            shape, row, column, values = coo.shape, coo.row, coo.col, coo.data
+            keep = values != 0
+            row, column, values = row[keep], column[keep], values[keep]
+        else:
+            try:
+                dense = np.asarray(matrix)
+            except ValueError:
+                raise GraphError("the adjacency matrix has rows of different lengths") from None
+            if dense.ndim != 2:
+                raise GraphError(f"an adjacency matrix has two dimensions, not {dense.ndim}")
+            shape = dense.shape
+            if dense.dtype.kind not in "biufO":
+                raise GraphError(f"an adjacency matrix holds real numbers, not {dense.dtype}")
+            try:
+                row, column = np.nonzero(dense)
+            except (TypeError, ValueError):  # pandas' NA is neither zero nor not
+                raise GraphError(
+                    "an entry of the adjacency matrix is missing; write 0 where there is no edge"
+                ) from None
+            values = dense[row, column]
+        if shape[0] != shape[1]:
+            raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
+        if values.dtype.kind not in "biufO":
+            raise GraphError(f"an adjacency matrix holds real numbers, not {values.dtype}")
+        names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
+        if len(names) != shape[0]:
+            raise GraphError(f"{len(names)} labels for {shape[0]} rows")
+        if values.dtype.kind == "f":
+            if (odd := np.flatnonzero(~np.isfinite(values))).size:
+                place = f"row {shorten(names[row[odd[0]]])}, column {shorten(names[column[odd[0]]])}"
+                raise GraphError(f"{place} of the matrix is {values[odd[0]]}; write 0 where there is no edge")
+            weights = Weights(values.astype(np.float64))
+        else:
+            exact = []
+            for k, m, value in zip(row.tolist(), column.tolist(), values.tolist(), strict=True):
+                try:
+                    exact.append(as_fraction(value, "the entry"))
+                except NumberError as error:
+                    place = f"row {shorten(names[k])}, column {shorten(names[m])}"
+                    raise GraphError(f"{place} of the matrix: {error}") from None
+            weights = Weights(exact)
+        if orientation == "information":
+            return cls(names, row, column, weights, {"orientation": "information"})
+        return cls(names, column, row, weights, {"orientation": "matrix"})
+
+    @classmethod
+    def from_networkx(
+        cls, graph: nx.DiGraph, weight: str = "weight", *, orientation: str = "information"
+    ) -> SignedDigraph:
+        """Build a graph from a networkx ``DiGraph``.
+
+        Parameters
+        ----------
+        graph : networkx.DiGraph
+        weight : str
+            The attribute of edges that holds their weights.
+        orientation : {"information", "listens"}
+            ``information``: information flows along an edge ``u -> v``. ``listens``: u listens to v, as in trust and
+            rating data.
+
+        Raises
+        ------
+        GraphError
+            ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, or an edge has no weight.
+
+        Examples
+        --------
+        >>> import networkx as nx
+        >>> team = nx.DiGraph()
+        >>> team.add_edge("ann", "bob", weight=-2)
+        >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
+        ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
+        """
+        if graph.is_multigraph():
+            raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
+        if not graph.is_directed():
+            raise GraphError("the networkx graph is undirected; pass graph.to_directed() if both ends listen")
+        triples = []
+        for u, v, data in graph.edges(data=True):
+            if weight not in data:
+                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"')
+            triples.append((u, v, data[weight]))
+        return cls.from_edges(triples, graph.nodes, orientation=orientation)
+
+    # ------------------------------------------------------------------ reading
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes ``N``."""
+        return len(self.labels)
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges."""
+        return int(self.source.size)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Map of label to node index."""
+        return {label: i for i, label in enumerate(self.labels)}
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(n_edges,) float64 array: the weights, each rounded once."""
+        values = self._weights.as_float()
+        values.flags.writeable = False
+        return values
+
+    def exact_weight(self, edge: int) -> Fraction:
+        """Return the weight of edge number ``edge`` exactly."""
+        return self._weights.fraction(edge)
+
+    @cached_property
+    def weight_decades(self) -> int:
+        """How many powers of ten lie between the smallest and the largest size of a weight; 0 without edges."""
+        sizes = {abs(self._weights.fraction(int(i))) for i in np.unique(self._weights.table, return_index=True)[1]}
+        ratio = max(sizes) / min(sizes) if sizes else Fraction(1)
+        return len(str(ratio.numerator // ratio.denominator)) - 1
+
+    def weight_table(self) -> tuple[np.ndarray | None, int]:
+        """Return int64 numerators or float64 weights, in the order of the edges, and what divides them.
+
+        None where neither holds the weights exactly.
+        """
+        return (None if self._weights.kind == "fraction" else self._weights.table), self._weights.scale
+
+    @cached_property
+    def weight_texts(self) -> list[str]:
+        """The weights as exact texts, in the order of the edges."""
+        table = self._weights.table
+        if table.dtype == object:
+            return [format_exact(self._weights.fraction(i)) for i in range(self.n_edges)]
+        _, first, which = np.unique(table, return_index=True, return_inverse=True)
+        texts = [format_exact(self._weights.fraction(int(i))) for i in first]
+        return [texts[k] for k in which.tolist()]
+
+    def equal_weights(self, other: np.ndarray) -> np.ndarray:
+        """Tell for each edge ``i`` whether its weight equals that of edge ``other[i]``, exactly."""
+        return np.asarray(self._weights.table == self._weights.table[other], dtype=bool)
+
+    @property
+    def edges(self) -> tuple[tuple[str, str, Fraction], ...]:
+        """All edges as ``(source label, target label, exact weight)``, sorted by (target, source) index."""
+        return tuple(self._edges())
+
+    def _edges(self) -> Iterator[tuple[str, str, Fraction]]:
+        labels = self.labels
+        for i, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
+            yield labels[s], labels[t], self._weights.fraction(i)
+
+    def adjacency(self) -> sparse.csr_array:
+        """(N, N) sparse float64 matrix ``W``; rows are listeners."""
+        from scipy import sparse
+
+        n = self.n_nodes
+        return sparse.csr_array((self.weights, (self.target, self.source)), shape=(n, n))
+
+    def laplacian(self) -> sparse.csr_array:
+        """(N, N) sparse float64 signed Laplacian ``L = D - W``, ``D = diag(sum_l |w_kl|)``."""
+        from scipy import sparse
+
+        return sparse.csr_array(sparse.diags_array(self.in_weight()) - self.adjacency())
+
+    def dense_laplacian(self) -> np.ndarray:
+        """(N, N) dense float64 signed Laplacian, for small graphs."""
+        L = np.zeros((self.n_nodes, self.n_nodes))
+        L[self.target, self.source] = -self.weights
+        np.fill_diagonal(L, self.in_weight())
+        return L
+
+    def in_weight(self) -> np.ndarray:
+        """(N,) float64 array: ``D_k = sum_l |w_kl|``, how much node k listens in total."""
+        return np.bincount(self.target, np.abs(self.weights), minlength=self.n_nodes).astype(np.float64)
+
+    def exact_laplacian(self) -> list[list[Fraction]]:
+        """Return the signed Laplacian as N rows of N rationals (small graphs)."""
+        n = self.n_nodes
+        rows = [[Fraction(0)] * n for _ in range(n)]
+        for edge, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
+            weight = self._weights.fraction(edge)
+            rows[t][s] = -weight
+            rows[t][t] += abs(weight)
+        return rows
+
+    def exact_rows(self, nodes: Iterable[int]) -> list[dict[int, Fraction]]:
+        """Return rows of the signed Laplacian as ``{column: rational}``, without zeros.
+
+        Parameters
+        ----------
+        nodes : iterable of int
+            Indices of the rows.
+
+        Returns
+        -------
+        list of dict of int to Fraction
+        """
+        start = np.searchsorted(self.target, np.arange(self.n_nodes + 1))
+        rows = []
+        for node in nodes:
+            edges = range(int(start[node]), int(start[node + 1]))
+            row = {int(self.source[edge]): -self._weights.fraction(edge) for edge in edges}
+            total = sum(map(abs, row.values()), Fraction(0))
+            rows.append({**row, node: total} if total else {})
+        return rows
+
+    def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
+        """Return the graph induced by the node indices ``nodes``, in that order."""
+        nodes = np.asarray(nodes, dtype=np.int64)
+        position = np.full(self.n_nodes, -1, dtype=np.int64)
+        position[nodes] = np.arange(nodes.size)
+        keep = np.flatnonzero((position[self.source] >= 0) & (position[self.target] >= 0))
+        return SignedDigraph(
+            [self.labels[i] for i in nodes.tolist()],
+            position[self.source[keep]],
+            position[self.target[keep]],
+            self._weights.take(keep),
+            self.read,
+        )
+
+    @cached_property
+    def sha256(self) -> str:
+        r"""SHA-256 of the canonical edge list, independent of the order of nodes and edges.
+
+        One JSON array per line: first ``[label]`` of every node, then ``[source, target, weight]`` of every edge
+        with the weight as ``p`` or ``p/q`` in lowest terms, each group sorted; UTF-8, ``\n`` after each line.
+        """
+        digest = hashlib.sha256()
+        quoted = [json.dumps(label, ensure_ascii=False) for label in self.labels]
+        order = sorted(range(self.n_nodes), key=self.labels.__getitem__)
+        rank = np.empty(self.n_nodes, dtype=np.int64)
+        rank[order] = np.arange(self.n_nodes)
+        digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
+        names, texts = np.array(quoted, dtype=object), np.array(self.weight_texts, dtype=object)
+        edges = np.lexsort((rank[self.target], rank[self.source]))
+        for some in np.split(edges, range(_HASHED, edges.size, _HASHED)):
+            columns = names[self.source[some]], names[self.target[some]], texts[some]
+            lines = [f'[{s}, {t}, "{w}"]\n' for s, t, w in zip(*(c.tolist() for c in columns), strict=True)]
+            digest.update("".join(lines).encode("utf-8", "surrogatepass"))
+        return digest.hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        """Two graphs are equal when they have the same labelled nodes and the same exact edges."""
+        return isinstance(other, SignedDigraph) and self.sha256 == other.sha256
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    def _repr_html_(self) -> str:
+        from ptcc_certify.report.notebook import graph_html
+
+        return graph_html(self)
+
+    def __repr__(self) -> str:
+        negative = int((self.sign < 0).sum())
+        return f"SignedDigraph({self.n_nodes} nodes, {self.n_edges} edges, {negative} negative)"
+
+
+_READ_DEFAULT: dict[str, Any] = {
+    "orientation": "information",
+    "duplicates": "refused",
+    "self_loops": "refused",
+    "undirected": False,
+    "notes": (),
+}
+
+
+def _refuse_unknown_orientation(orientation: str) -> None:
+    if orientation not in ("information", "listens"):
+        raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
+
+
+def labels_beside(values: Any) -> list[str] | None:
+    """Return the labels of a pandas Series, or of the rows of a DataFrame, as nodes are written; None of other data.
+
+    Examples
+    --------
+    >>> labels_beside([3, 5]) is None
+    True
+    """
+    index = getattr(values, "index", None)  # a method of lists and texts
+    if index is None or callable(index) or not hasattr(values, "to_numpy"):
+        return None
+    return [str(label) for label in index]
+
+
+def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
+    """Return the entries of a DataFrame with its columns in the order of its rows."""
+    place = {str(label): i for i, label in enumerate(frame.columns)}
+    for what, labels in (("rows", rows), ("columns", [str(label) for label in frame.columns])):
+        if len(set(labels)) < len(labels):
+            twice = next(label for label in labels if labels.count(label) > 1)
+            raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
+    if odd := sorted(place.keys() ^ set(rows)):
+        named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
+        raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
+    # One type for all columns would round the integers of one beside the floats of another.
+    entries = frame.to_numpy(dtype=object) if len(set(frame.dtypes)) > 1 else frame.to_numpy()
+    return entries[:, [place[label] for label in rows]]
+
+
+def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
+    """Order labels by value if all are integers, else as they came; also return the rank of each old position.
+
+    Examples
+    --------
+    >>> ordered_labels(["10", "2"])
+    (['2', '10'], array([1, 0]))
+    """
+    n = len(labels)
+    if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
+        order = sorted(range(n), key=lambda i: (int(labels[i]), labels[i]))
+    else:
+        order = list(range(n))
+    rank = np.empty(n, dtype=np.int64)
+    rank[order] = np.arange(n)
+    return [labels[i] for i in order], rank

@@ -1,0 +1,483 @@
+"""Ensembles of random signed digraphs that are what they are by construction: nothing is drawn and thrown away.
+
+A graph is laid out in strongly connected blocks. Blocks that listen to nobody outside are the closed components; every
+other block listens to an earlier one. Edges are added only where they change neither. A balanced closed component
+takes its signs from two camps; in an unbalanced one the signs along one cycle are made to multiply to -1.
+
+Graph ``i`` depends on the ensemble and on ``i`` alone, so that any machine can make it.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptcc_certify.errors import FormatError, NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
+
+CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
+LARGEST_COUNT, LARGEST_SEED, LARGEST_ORDER = 10**6, 2**32 - 1, 10**6
+LARGEST_DECADES = 30
+#: Most closed components of a weakly connected part, and most parts of a disconnected graph.
+MOST_GROUPS, MOST_PARTS = 5, 4
+
+
+class _Block(NamedTuple):
+    """A strongly connected block: the positions ``first .. last - 1``, which may listen to ``floor .. last - 1``."""
+
+    first: int
+    last: int
+    floor: int
+    leads: bool
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """A family of random signed digraphs of stated classes, each a function of its number alone.
+
+    The classes take turns: graph ``i`` has connectivity ``connectivity[i % c]`` and leaders that are balanced as
+    ``balanced[(i // c) % b]`` says, where ``c`` and ``b`` are the numbers of entries. Everything else is drawn by a
+    generator that is seeded with ``(seed, i)``.
+
+    Parameters
+    ----------
+    count : int
+        Number of graphs.
+    nodes : int, sequence of int or range
+        Number of nodes, or the numbers of nodes to choose from.
+    seed : int
+        0 to 2^32 - 1.
+    connectivity : str or sequence of str
+        Of ``strong``, ``quasi-strong``, ``weak``, ``disconnected``.
+    balanced : bool or sequence of bool
+        Whether every closed component is balanced (True) or none (False).
+    mean_degree : number
+        Edges per node, as near as the class and the number of nodes allow.
+    negative : number
+        Probability that a node of a balanced closed component is in the second camp, or that another edge is negative.
+    weight_range : pair of numbers
+        Sizes of weights are uniform in it, to three digits, or to a thousandth of its width where fewer than ten such
+        numbers are in it.
+    weight_decades : number, optional
+        Instead: sizes are log-uniform over so many decades around 1, to three digits.
+    undirected : bool
+        Every edge goes both ways with one weight; connectivity is then ``strong`` or ``disconnected``.
+
+    Raises
+    ------
+    ParameterError
+        Names the parameter and its domain, or the class that no graph of so few nodes is of.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> ensemble = Ensemble(count=8, nodes=range(5, 9), seed=1)
+    >>> ensemble.kind(2), analyse(ensemble.graph(2)).connectivity
+    (('weak', True), 'weak')
+    >>> ensemble.graph(2) == Ensemble(count=3, nodes=range(5, 9), seed=1).graph(2)
+    True
+    """
+
+    count: int
+    nodes: Sequence[int]
+    seed: int = 0
+    connectivity: Sequence[str] = CONNECTIVITIES
+    balanced: Sequence[bool] = (True, False)
+    mean_degree: float = 3.0
+    negative: float = 0.3
+    weight_range: tuple[Fraction, Fraction] = (Fraction(1, 2), Fraction(2))
+    weight_decades: float | None = None
+    undirected: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "count", _integer(self.count, "count", 1, LARGEST_COUNT))
+        object.__setattr__(self, "seed", _integer(self.seed, "seed", 0, LARGEST_SEED))
+        if not isinstance(self.nodes, range):
+            orders = tuple(_integer(n, "nodes", 1, LARGEST_ORDER) for n in _several(self.nodes, "nodes"))
+            object.__setattr__(self, "nodes", orders)
+        for n in (self.nodes[0], self.nodes[-1]) if self.nodes else ():
+            _integer(n, "nodes", 1, LARGEST_ORDER)
+        for name, allowed in (("connectivity", CONNECTIVITIES), ("balanced", (True, False))):
+            chosen = _several(getattr(self, name), name)
+            for value in chosen:
+                if type(value) is not type(allowed[0]) or value not in allowed:
+                    listed = ", ".join(map(_text, allowed))
+                    raise ParameterError(f"{name} = {_text(value)} is unknown; choose of {listed}")
+            if len(set(chosen)) < len(chosen):
+                raise ParameterError(f"{name} names a class twice; name it once")
+            object.__setattr__(self, name, chosen)
+        _require(isinstance(self.undirected, bool), "undirected", self.undirected, "true or false")
+        object.__setattr__(self, "mean_degree", _real(self.mean_degree, "mean_degree", 0, 1000))
+        object.__setattr__(self, "negative", _real(self.negative, "negative", 0, 1))
+        ends = self.weight_range
+        _require(isinstance(ends, list | tuple) and len(ends) == 2, "weight_range", ends, "[least, largest]")
+        low, high = (_exact(x, "weight_range") for x in ends)
+        _require(0 < low <= high <= 10**300 and low >= Fraction(1, 10**300), "weight_range", ends, "0 < least, largest")
+        object.__setattr__(self, "weight_range", (low, high))
+        if self.weight_decades is not None:
+            object.__setattr__(self, "weight_decades", _real(self.weight_decades, "weight_decades", 0, LARGEST_DECADES))
+        self._refuse_impossible()
+
+    def _refuse_impossible(self) -> None:
+        if not self.nodes:
+            raise ParameterError("nodes is empty; give at least one number of nodes")
+        few = min(self.nodes[0], self.nodes[-1]) if isinstance(self.nodes, range) else min(self.nodes)
+        for connectivity in self.connectivity:
+            if self.undirected and connectivity in ("quasi-strong", "weak"):
+                raise ParameterError(
+                    f'an undirected graph is not {connectivity}; leave "{connectivity}" out of connectivity'
+                )
+            for balanced in self.balanced:
+                least = _least(connectivity, balanced, self.undirected)
+                if few < least:
+                    leaders = "balanced" if balanced else "unbalanced"
+                    raise ParameterError(
+                        f"nodes = {few} is too few: a {connectivity} {'undirected ' * self.undirected}graph with "
+                        f"{leaders} leaders has {least} nodes or more"
+                    )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Ensemble:
+        r"""Read an ensemble from a TOML file whose keys are the parameters of the class.
+
+        In the file at ``path``, ``nodes`` is a number, a list to choose from, or a range ``{ from = 5, to = 40 }``
+        with both ends.
+
+        Raises
+        ------
+        FormatError
+            The file cannot be read, or is no TOML.
+        ParameterError
+            A key is unknown or missing, or a value is outside its domain; the message names the file.
+
+        Examples
+        --------
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     spec = Path(folder, "spec.toml")
+        ...     _ = spec.write_text('count = 2\nnodes = { from = 5, to = 40 }\nconnectivity = "weak"')
+        ...     ensemble = Ensemble.read(spec)
+        >>> ensemble.nodes, ensemble.kind(1)
+        (range(5, 41), ('weak', False))
+        """
+        name = shorten(os.fspath(path), 200)
+        try:
+            data = Path(path).read_bytes()
+        except FileNotFoundError:
+            raise FormatError(f"{name}: no such file; check the path") from None
+        except OSError as error:
+            raise FormatError(f"{name}: cannot be read ({error.strerror}); name a file") from None
+        try:
+            # Decimals are read exactly, as in every other input.
+            spec = tomllib.loads(data.decode("utf-8"), parse_float=parse_exact)
+        except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
+            reason = shorten(" ".join(str(error).split()), 160)
+            raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
+        keys = [field.name for field in fields(cls)]
+        for key in spec:
+            if key not in keys:
+                raise ParameterError(f'{name}: unknown key "{shorten(key)}"; the keys are {", ".join(keys)}')
+        for key in ("count", "nodes"):
+            if key not in spec:
+                raise ParameterError(f'{name}: the key "{key}" is missing; add it')
+        try:
+            if isinstance(spec["nodes"], dict):
+                spec["nodes"] = _range(spec["nodes"])
+            return cls(**spec)
+        except ParameterError as error:
+            raise ParameterError(f"{name}: {error}") from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the parameters as JSON takes them; equal ensembles give equal ones."""
+        return {
+            "count": self.count,
+            "nodes": [self.nodes.start, self.nodes.stop, self.nodes.step, "range"]
+            if isinstance(self.nodes, range)
+            else list(self.nodes),
+            "seed": self.seed,
+            "connectivity": list(self.connectivity),
+            "balanced": list(self.balanced),
+            "mean_degree": self.mean_degree,
+            "negative": self.negative,
+            "weight_range": [format_exact(x) for x in self.weight_range],
+            "weight_decades": self.weight_decades,
+            "undirected": self.undirected,
+        }
+
+    def __len__(self) -> int:
+        return self.count
+
+    def kind(self, i: int) -> tuple[str, bool]:
+        """Return connectivity of graph ``i``, and whether its leaders are balanced."""
+        self._refuse_number(i)
+        c = len(self.connectivity)
+        return self.connectivity[i % c], self.balanced[(i // c) % len(self.balanced)]
+
+    def graph(self, i: int) -> SignedDigraph:
+        """Make graph ``i``, with nodes ``1 .. n``.
+
+        Parameters
+        ----------
+        i : int
+            0 to ``count - 1``.
+
+        Raises
+        ------
+        ParameterError
+            There is no such graph.
+        """
+        connectivity, balanced = self.kind(i)
+        rng = np.random.default_rng([self.seed, i])
+        n = self.nodes[int(rng.integers(len(self.nodes)))]
+        blocks = _blocks(rng, n, connectivity, balanced, self.undirected)
+        source, target, cycles = _edges(rng, n, blocks, balanced, self.mean_degree, self.undirected)
+        sign = _signs(rng, n, blocks, (source, target), balanced, cycles, self.negative)
+        sizes = self._sizes(rng, source.size)
+        weights = [size * s for size, s in zip(sizes, sign.tolist(), strict=True)]
+        if self.undirected:
+            source, target, weights = np.append(source, target), np.append(target, source), weights * 2
+        number = rng.permutation(n)  # no number tells who leads
+        return SignedDigraph(map(str, range(1, n + 1)), number[source], number[target], Weights(weights))
+
+    def _sizes(self, rng: np.random.Generator, m: int) -> list[Fraction]:
+        low, high = self.weight_range
+        if self.weight_decades is not None:
+            half = self.weight_decades / 2
+            return [Fraction(f"{x:.2e}") for x in (10.0 ** rng.uniform(-half, half, m)).tolist()]
+        if low == high:
+            return [low] * m
+        if high - low < 10 * Fraction(10) ** (int(f"{float(high):e}".partition("e")[2]) - 2):
+            return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in rng.uniform(size=m).tolist()]
+        drawn = rng.uniform(float(low), float(high), m).tolist()
+        return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
+
+    def _refuse_number(self, i: int) -> None:
+        if not 0 <= i < self.count:
+            raise ParameterError(f"there is no graph {i}; the ensemble has the numbers 0 to {self.count - 1}")
+
+
+# ---------------------------------------------------------------------- parameters
+
+
+def _text(value: Any) -> str:
+    try:
+        return str(value).lower() if isinstance(value, bool) else shorten(str(value))
+    except ValueError:  # Python writes no integer of more than 4,300 digits
+        return "a number of thousands of digits"
+
+
+def _require(holds: bool, name: str, value: Any, domain: str) -> None:
+    if not holds:
+        raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
+
+
+def _integer(value: Any, name: str, least: int, most: int) -> int:
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    _require(whole and least <= value <= most, name, value, f"an integer from {least} to {most}")
+    return int(value)
+
+
+def _exact(value: Any, name: str) -> Fraction:
+    try:
+        if isinstance(value, bool):
+            raise NumberError("a truth value is not a number")
+        return as_fraction(value)
+    except NumberError as error:
+        raise ParameterError(f"{name}: {error}") from None
+
+
+def _real(value: Any, name: str, least: int, most: int) -> float:
+    number = _exact(value, name)
+    _require(least <= number <= most, name, value, f"from {least} to {most}")
+    return float(number)
+
+
+def _several(value: Any, name: str) -> tuple[Any, ...]:
+    """Return one or several values as a tuple."""
+    chosen = tuple(value) if isinstance(value, list | tuple | np.ndarray) else (value,)
+    if not chosen:
+        raise ParameterError(f"{name} is empty; give at least one value")
+    return chosen
+
+
+def _range(table: dict[str, Any]) -> range:
+    if set(table) != {"from", "to"}:
+        raise ParameterError("nodes: a range is written { from = 5, to = 40 }")
+    least, most = (_integer(table[key], f"nodes.{key}", 1, LARGEST_ORDER) for key in ("from", "to"))
+    _require(least <= most, "nodes.to", most, f"{least} or more")
+    return range(least, most + 1)
+
+
+# ---------------------------------------------------------------------- layout
+
+
+def _least(connectivity: str, balanced: bool, undirected: bool) -> int:
+    """Return the least number of nodes: a cycle with negative product takes two nodes, three where edges go both ways.
+
+    Outside a strongly connected graph there is at least one follower.
+    """
+    group = 1 if balanced else 3 if undirected else 2
+    return {"strong": group, "quasi-strong": group + 1, "weak": 2 * group + 1, "disconnected": 2 * group}[connectivity]
+
+
+def _shares(rng: np.random.Generator, extra: int, boxes: int) -> list[int]:
+    """Share ``extra`` among ``boxes``, unevenly."""
+    return [int(x) for x in rng.multinomial(extra, rng.dirichlet(np.ones(boxes)))]
+
+
+def _blocks(
+    rng: np.random.Generator, n: int, connectivity: str, balanced: bool, undirected: bool
+) -> list[list[_Block]]:
+    """Lay out the weakly connected parts of a graph in blocks that cover ``0 .. n - 1``."""
+    if connectivity != "disconnected":
+        return [_part(rng, 0, n, connectivity, balanced, undirected)]
+    least = _least("strong", balanced, undirected)
+    count = int(rng.integers(2, min(MOST_PARTS, n // least) + 1))
+    parts, first = [], 0
+    for extra in _shares(rng, n - count * least, count):
+        size = least + extra
+        kinds = CONNECTIVITIES[:1] if undirected else CONNECTIVITIES[:3]
+        fit = [kind for kind in kinds if _least(kind, balanced, undirected) <= size]
+        parts.append(_part(rng, first, size, fit[int(rng.integers(len(fit)))], balanced, undirected))
+        first += size
+    return parts
+
+
+def _part(
+    rng: np.random.Generator, first: int, n: int, connectivity: str, balanced: bool, undirected: bool
+) -> list[_Block]:
+    if connectivity == "strong":
+        return [_Block(first, first + n, first, True)]
+    least = _least("strong", balanced, undirected)
+    groups = 1 if connectivity == "quasi-strong" else int(rng.integers(2, min(MOST_GROUPS, (n - 1) // least) + 1))
+    *leading, following = _shares(rng, n - 1 - groups * least, groups + 1)
+    blocks, at = [], first
+    for extra in leading:
+        blocks.append(_Block(at, at + least + extra, at, True))
+        at += least + extra
+    cuts = at + 1 + np.flatnonzero(rng.random(following) < rng.random())  # from one block to a chain of single nodes
+    ends = [*cuts.tolist(), first + n]
+    return blocks + [_Block(a, b, first, False) for a, b in zip([at, *cuts.tolist()], ends, strict=True)]
+
+
+# ---------------------------------------------------------------------- edges
+
+
+def _edges(
+    rng: np.random.Generator,
+    n: int,
+    parts: list[list[_Block]],
+    balanced: bool,
+    mean_degree: float,
+    undirected: bool,
+) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
+    """Return sources, targets, and for each leading block the numbers of the edges along one cycle.
+
+    Of an undirected graph, one of the two directions.
+    """
+    pairs: list[tuple[int, int]] = []
+    cycles: list[list[int]] = []
+    low, high = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for blocks in parts:
+        for block in blocks:
+            own = block.first + rng.permutation(block.last - block.first)
+            edges, length = _tree(rng, own.tolist(), not balanced) if undirected else _ears(rng, own.tolist())
+            if block.leads:
+                cycles.append(list(range(len(pairs), len(pairs) + length)))
+            pairs += edges
+            low[block.first : block.last], high[block.first : block.last] = block.floor, block.last
+        pairs += _links(rng, blocks)
+    if undirected:  # every edge from the smaller position to the larger one
+        pairs = [(min(pair), max(pair)) for pair in pairs]
+        wanted = round(mean_degree * n / 2)
+        high = np.arange(n)
+    else:
+        wanted = round(mean_degree * n)
+    skeleton = np.array([t * n + s for s, t in pairs], dtype=np.int64)
+    keys = np.append(skeleton, _further(rng, n, low, high, skeleton, wanted - skeleton.size))
+    return keys % n, keys // n, cycles
+
+
+def _further(
+    rng: np.random.Generator, n: int, low: np.ndarray, high: np.ndarray, taken: np.ndarray, wanted: int
+) -> np.ndarray:
+    """Choose ``wanted`` more edges: node ``t`` may listen to ``low[t] .. high[t] - 1`` but itself."""
+    itself = (low <= np.arange(n)) & (np.arange(n) < high)
+    ends = np.cumsum(high - low - itself)
+    wanted = min(wanted, int(ends[-1]) - taken.size)
+    if wanted <= 0:
+        return taken[:0]
+    # As many besides as are taken: whatever is drawn twice, enough remain.
+    drawn = rng.choice(int(ends[-1]), wanted + taken.size, replace=False)
+    target = np.searchsorted(ends, drawn, side="right")
+    source = low[target] + drawn - np.append(0, ends)[target]
+    source += itself[target] & (source >= target)
+    keys = target * n + source
+    return keys[~np.isin(keys, taken)][:wanted]
+
+
+def _ears(rng: np.random.Generator, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
+    """Connect nodes strongly: a cycle, which comes first and whose length is told, and ears from it back to it."""
+    if len(nodes) == 1:
+        return [], 0
+    length = int(rng.integers(2, len(nodes) + 1))
+    edges = [(nodes[i], nodes[(i + 1) % length]) for i in range(length)]
+    done = length
+    while done < len(nodes):
+        new = nodes[done : done + int(rng.integers(1, len(nodes) - done + 1))]
+        begin, end = (nodes[int(k)] for k in rng.integers(done, size=2))
+        path = [begin, *new, end]
+        edges += pairwise(path)
+        done += len(new)
+    return edges, length
+
+
+def _tree(rng: np.random.Generator, nodes: list[int], cyclic: bool) -> tuple[list[tuple[int, int]], int]:
+    """Connect nodes by a tree, grown from a cycle of three nodes or more if it is to be ``cyclic``."""
+    length = int(rng.integers(3, len(nodes) + 1)) if cyclic else 0
+    edges = [(nodes[i], nodes[(i + 1) % length]) for i in range(length)]
+    edges += [(nodes[int(rng.integers(i))], nodes[i]) for i in range(max(length, 1), len(nodes))]
+    return edges, length
+
+
+def _links(rng: np.random.Generator, blocks: list[_Block]) -> list[tuple[int, int]]:
+    """Let the first block of followers listen to every leading block, and each later one to somebody before it."""
+    leading = [block for block in blocks if block.leads]
+    links = []
+    for number, block in enumerate(blocks[len(leading) :]):
+        heard = [(a.first, a.last) for a in leading] if number == 0 else [(block.floor, block.first)]
+        links += [(int(rng.integers(*span)), int(rng.integers(block.first, block.last))) for span in heard]
+    return links
+
+
+def _signs(
+    rng: np.random.Generator,
+    n: int,
+    parts: list[list[_Block]],
+    edges: tuple[np.ndarray, np.ndarray],
+    balanced: bool,
+    cycles: list[list[int]],
+    negative: float,
+) -> np.ndarray:
+    source, target = edges
+    camp = np.where(rng.random(n) < negative, -1, 1)
+    sign = np.where(rng.random(source.size) < negative, -1, 1)
+    if not balanced:
+        for cycle in cycles:
+            if np.prod(sign[cycle]) > 0:
+                sign[cycle[int(rng.integers(len(cycle)))]] *= -1
+        return sign
+    block = np.full(n, -1)
+    for number, own in enumerate(b for blocks in parts for b in blocks if b.leads):
+        block[own.first : own.last] = number
+    inside = (block[source] >= 0) & (block[source] == block[target])
+    return np.where(inside, camp[source] * camp[target], sign)

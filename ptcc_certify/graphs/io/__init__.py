@@ -1,0 +1,23 @@
+"""Files in and out: signed digraphs in every common format, starts, and writing that is whole or not at all.
+
+Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.graphs.io.rows`) checks the rows and
+builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.
+"""
+
+from ptcc_certify.graphs.io.files import MAX_BYTES, MAX_LINE, write_atomically
+from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
+from ptcc_certify.graphs.io.matrices import MAX_NODES
+from ptcc_certify.graphs.io.state import by_label, in_node_order, random_states, read_state
+
+__all__ = [
+    "MAX_BYTES",
+    "MAX_LINE",
+    "MAX_NODES",
+    "by_label",
+    "in_node_order",
+    "random_states",
+    "read_graph",
+    "read_state",
+    "write_atomically",
+    "write_graph",
+]

@@ -1,0 +1,162 @@
+"""Edge lists: rows ``source,target,weight`` of a text file, read and written."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+
+import numpy as np
+
+from ptcc_certify.errors import FormatError, NumberError
+from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
+from ptcc_certify.graphs.io.files import MAX_LINE, lines_of
+from ptcc_certify.graphs.io.rows import Numbers, Rows
+from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
+
+_SEPARATORS = ("\t", ",", ";", None)  # None: blanks
+_SOURCE = ("source", "from", "fromnodeid", "src")
+_TARGET = ("target", "to", "tonodeid", "dst")
+_WEIGHT = ("weight", "sign", "rating", "value", "w")
+
+
+def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield number of the line and fields of each row that is not a comment; fields may have blanks around them.
+
+    Commas, tabs, semicolons or blanks separate the fields, whichever the first row of several fields uses.
+    """
+    numbered = enumerate(lines_of(data, name), 1)
+    separator: str | None = ","
+    detected = False
+    for number, line in numbered:
+        if line.lstrip()[:1] in "#%":  # the empty text is in every text
+            continue
+        try:
+            if not detected:
+                separator, detected = _separator(line)
+            if '"' not in line:
+                yield number, line.split(separator)
+            else:  # a quoted field may go on in the following lines
+                yield number, _csv_fields(chain([line], (text for _, text in numbered)), separator, strict=True)
+        except csv.Error as error:
+            mend = 'close each, set it apart, and write "" for a quote within quotes'
+            why = shorten(str(error), 80)
+            raise FormatError(f"{name}, line {number}: unclear quotes ({why}); {mend}") from None
+
+
+def _csv_fields(lines: Iterable[str], separator: str | None, strict: bool) -> list[str]:
+    """Split the first row of ``lines``, honouring quotes."""
+    whole = (f"{line}\n" if separator else line.replace("\t", " ") + "\n" for line in lines)
+    row = next(csv.reader(whole, delimiter=separator or " ", skipinitialspace=True, strict=strict))
+    return [field.strip() for field in row if separator or field]
+
+
+def _separator(line: str) -> tuple[str | None, bool]:
+    """Return the separator that gives most fields, three at most, and whether it gives several.
+
+    Filled fields count first, so that ``a;b;0,5`` is split at its semicolons; then empty ones, as in ``a;;``.
+    """
+
+    def rank(separator: str | None) -> tuple[int, int]:
+        row = _csv_fields([line], separator, strict=False)
+        return min(len([*filter(None, row)]), 3), min(len(row), 3)
+
+    best = max(_SEPARATORS, key=rank)
+    return (best, True) if rank(best) > (1, 1) else (",", False)
+
+
+def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
+    """Return the column that bears the first of ``names`` that occurs."""
+    lower = [field.lower() for field in row]
+    for name in names:
+        if lower.count(name) > 1:
+            raise FormatError(f'{place}: two columns are named "{name}"; rename one')
+        if name in lower:
+            return lower.index(name)
+    return None
+
+
+def _header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
+    """Return the columns of source, target and weight if a row is a header, else None."""
+    source, target = column(row, _SOURCE, place), column(row, _TARGET, place)
+    if source is None or target is None:
+        return None
+    if (weight := column(row, _WEIGHT, place)) is not None:
+        return source, target, weight
+    try:
+        parse_exact("".join(row[2:3]))
+    except NumberError:
+        raise FormatError(f"{place}: the header names no weight; name one column weight, sign or rating") from None
+    return None
+
+
+def read_edge_list(data: bytes, name: str) -> Rows:
+    """Read an edge list; a row with one field declares a node."""
+    if data.startswith(b"%%MatrixMarket"):
+        raise FormatError(f'{name}, line 1: a Matrix Market file; name it .mtx or pass the format "mtx"')
+    nodes, weights = Numbers(), Numbers()
+    first, second, codes, numbers = [], [], [], []
+    ignored: dict[str, None] = {}
+    started = header = False
+    width, (s, t, w) = 3, (0, 1, 2)
+    for number, row in records(data, name):
+        if not started and len(row) > 1:
+            started = True
+            if columns := _header([field.strip() for field in row], f"{name}, line {number}"):
+                header, width, (s, t, w) = True, len(row), columns
+                ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
+                continue
+        if len(row) > width and any(map(str.strip, row[width:])):
+            ignored["beyond the header" if header else "after the third"] = None
+        try:
+            source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
+        except LookupError:
+            if label := _declared([field.strip() for field in row], (s, t, w), f"{name}, line {number}"):
+                _ = nodes[label]
+            continue
+        first.append(source)
+        second.append(target)
+        codes.append(code)
+        numbers.append(number)
+    notes = ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
+    rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
+    rows.headerless, rows.notes = not header, notes
+    return rows
+
+
+def _declared(row: list[str], columns: tuple[int, int, int], place: str) -> str:
+    """Return the node that a row without an edge declares, "" if the row is empty; refuse any other."""
+    if len(row) < 2 or not any(row):
+        return "".join(row)
+    source, target, weight = (row[i] if i < len(row) else "" for i in columns)
+    if source and target:
+        edge = f"{shorten(source)} -> {shorten(target)}"
+        raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column")
+    if target or weight or not source:
+        raise FormatError(f"{place}: the {'target' if source else 'source'} is empty; name a node or remove the row")
+    return source
+
+
+def edge_list(graph: SignedDigraph, name: str) -> bytes:
+    """Write a graph as an edge list that is read back as an equal graph with the same order of nodes."""
+    labels = [_cell(label, name) for label in graph.labels]
+    declared = np.ones(graph.n_nodes, dtype=bool)
+    if ordered_labels(list(graph.labels[::-1]))[0] == list(graph.labels):  # the labels themselves tell their order
+        declared[graph.source] = declared[graph.target] = False
+    lines = ["source,target,weight", *(labels[k] for k in np.flatnonzero(declared))]
+    for i, (s, t) in enumerate(zip(graph.source.tolist(), graph.target.tolist(), strict=True)):
+        lines.append(f"{labels[s]},{labels[t]},{format_exact(graph.exact_weight(i))}")
+    return "".join(f"{line}\n" for line in lines).encode("utf-8")
+
+
+def _cell(label: str, name: str) -> str:
+    """Return a label as a field, quoted where it needs it; refuse what would not be read back."""
+    # Two labels and a weight of 4,000 characters, every character a doubled quote, fit a line.
+    odd = re.search("[\0\ud800-\udfff]", label) or not label or label != label.strip()
+    if odd or len(label) > MAX_LINE // 5:
+        what = f"is empty, not Unicode text, has blanks around it or is longer than {MAX_LINE // 5} characters"
+        raise FormatError(f'{name}: label "{shorten(label)}" {what}; rename the node')
+    if label[0] in "#%" or re.search(r'[,"\n\r]', label):
+        return '"' + label.replace('"', '""') + '"'
+    return label

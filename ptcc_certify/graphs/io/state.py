@@ -1,0 +1,204 @@
+"""Starts: one exact number for each node, from a text or a file, or random."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError
+from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
+from ptcc_certify.graphs.io.edge_list import column, records
+from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
+from ptcc_certify.graphs.rationals import parse_exact, shorten
+
+_NODE = ("node", "label", "name", "id")
+_VALUE = ("value", "state", "x", "x0", "sigma0")
+
+
+def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
+    """Read one exact number for each node of a graph.
+
+    Parameters
+    ----------
+    text_or_path : str or Path
+        Numbers in node order ``5,2,-4``; or ``label=value`` in any order, an item with a comma in its label quoted
+        whole (``"a,b=1"``); or the path of a file with rows ``node,value`` (header optional, separators, comments
+        and quotes as in an edge list).
+    graph : SignedDigraph
+
+    Returns
+    -------
+    list of Fraction
+        In node order.
+
+    Raises
+    ------
+    ParameterError
+        The text does not give each node of the graph exactly one finite number.
+    FormatError
+        The same for a file; names the line.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> read_state("5,-0.5", graph) == read_state("b=-1/2, a=5", graph)
+    True
+    """
+    if not isinstance(text_or_path, str) or os.path.isfile(text_or_path):  # noqa: PTH113 - Path.is_file may raise
+        return _state_of_file(text_or_path, graph)
+    place = f'start "{shorten(text_or_path)}"'
+    try:
+        items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
+    except csv.Error as error:
+        raise ParameterError(f"{place}: unclear quotes ({error}); close each") from None
+    if any("=" in item for item in items):
+        pairs = [item.rpartition("=")[::2] for item in items]
+        pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
+    elif len(items) == graph.n_nodes:
+        pairs = list(zip(graph.labels, items, strict=True))
+    else:
+        size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
+        raise ParameterError(f"{place}: no such file, and {size}; give one for each of {_some(graph.labels)}")
+    return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
+
+
+def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
+    """Put one entry for each node in node order: by label where there are labels, otherwise as they come.
+
+    Every state that a user hands in passes here, so that a label counts wherever there is one.
+
+    Parameters
+    ----------
+    values : mapping of label to entry, pandas Series or DataFrame, or anything else
+        A Series has its labels in its index, a DataFrame has one row for each node; labels are compared as texts.
+        Anything else is returned as it is.
+    graph : SignedDigraph
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    list, or ``values`` as they are
+
+    Raises
+    ------
+    ParameterError
+        A node has no entry, or two; or a label is that of no node.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> in_node_order({"b": 2, "a": 1}, graph), in_node_order([1, 2], graph)
+    ([1, 2], [1, 2])
+    """
+    found = by_label(values, name)
+    if found is None:
+        return values
+    missing = [label for label in graph.labels if label not in found]
+    unknown = [label for label in found if label not in graph.index]
+    if missing or unknown:
+        wrong = [f"no value for {_some(missing)}"] * bool(missing)
+        wrong += [f"{_some(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
+        mend = "give each node one value, or values without labels in node order"
+        raise ParameterError(f"the start {name}: {', and '.join(wrong)}; {mend}")
+    return [found[label] for label in graph.labels]
+
+
+def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
+    """Return the entries of a mapping, Series or DataFrame by label; None of what has no labels.
+
+    Raises
+    ------
+    ParameterError
+        Two labels are written alike.
+
+    Examples
+    --------
+    >>> by_label({1: 5, 2: 3}), by_label([5, 3])
+    ({'1': 5, '2': 3}, None)
+    """
+    if isinstance(values, Mapping):
+        labels, entries = [str(label) for label in values], list(values.values())
+    elif (beside := labels_beside(values)) is not None:
+        labels, entries = beside, list(values.to_numpy())
+    else:
+        return None
+    found = dict(zip(labels, entries, strict=True))
+    if len(found) < len(labels):
+        twice = next(label for label in found if labels.count(label) > 1)
+        raise ParameterError(f"the start {name} has two values for node {shorten(twice)}; keep one")
+    return found
+
+
+def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]:
+    """Draw starts uniform on [-10, 10], to three decimals, so that they can be written down.
+
+    Parameters
+    ----------
+    seed : int or sequence of int
+        The same seed draws the same start.
+    n, dimension : int
+        Number of nodes, and of numbers for each.
+
+    Returns
+    -------
+    list of list of Fraction
+        ``dimension`` numbers for each node.
+
+    Examples
+    --------
+    >>> states = random_states(7, 3, dimension=2)
+    >>> states == random_states(7, 3, dimension=2), [len(numbers) for numbers in states]
+    (True, [2, 2, 2])
+    """
+    thousandths = np.random.default_rng(seed).integers(-10_000, 10_001, size=(n, dimension))
+    return [[Fraction(int(x), 1000) for x in row] for row in thousandths]
+
+
+def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
+    name, _ = name_and_ending(path)
+    columns: tuple[int, int] | None = None
+    pairs = []
+    for number, texts in records(read_bytes(path, name), name):
+        place, row = f"{name}, line {number}", [text.strip() for text in texts]
+        if columns is None:
+            node, value = column(row, _NODE, place), column(row, _VALUE, place)
+            columns = (0, 1) if node is None or value is None else (node, value)
+            if node is not None and value is not None:
+                continue
+        cells = [row[i] for i in columns if i < len(row) and row[i]]
+        if any(row) and len(cells) < 2:
+            raise FormatError(f"{place}: a row needs a node and a value; write node,value")
+        if cells:
+            pairs.append((cells[0], cells[1], place))
+    return _in_node_order(pairs, graph, name, FormatError)
+
+
+def _in_node_order(
+    pairs: Sequence[tuple[str, str, str]], graph: SignedDigraph, name: str, refusal: type[PTCCError]
+) -> list[Fraction]:
+    """Put (label, value, place) in node order."""
+    state: dict[str, Fraction] = {}
+    for label, text, place in pairs:
+        if label not in graph.index:
+            nodes = _some(graph.labels)
+            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph; its nodes are {nodes}')
+        if label in state:
+            raise refusal(f"{place}: node {shorten(label)} has two values; keep one")
+        try:
+            state[label] = parse_exact(text)
+        except NumberError as error:
+            raise refusal(f"{place}: value of node {shorten(label)}: {error}; give a finite number") from None
+    if missing := [label for label in graph.labels if label not in state]:
+        count = f"{len(missing)} of {graph.n_nodes} nodes have no value"
+        raise refusal(f"{name}: {count}: {_some(missing)}; give one to each node")
+    return [state[label] for label in graph.labels]
+
+
+def _some(labels: Sequence[str]) -> str:
+    return ", ".join(map(shorten, labels[:5])) + (", ..." if len(labels) > 5 else "")

@@ -1,0 +1,548 @@
+"""What decides the behaviour of a signed digraph: components, closed components, camps, negative cycles.
+
+Everything here is combinatorial and exact: it looks at edges and at signs of exact weights, never at a float.
+Time and memory are linear in nodes and edges.
+
+A *closed strong component* (CSC) is a strongly connected component that nobody inside listens out of: a source of
+the condensation in the direction in which information flows. Its nodes are *leaders*, all other nodes *followers*.
+A graph is *structurally balanced* iff a *gauge* ``g`` in {-1, +1}^N exists with ``w_kl g_k g_l > 0`` on every edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from ptcc_certify.graphs.digraph import SignedDigraph
+
+STABILITY = "stability"
+BIPARTITE_CONSENSUS = "bipartite consensus"
+INTERVAL_BIPARTITE_CONSENSUS = "interval bipartite consensus"
+BIPARTITE_CONTAINMENT = "bipartite containment"
+CONSENSUS = "consensus"
+SIGNED_AVERAGE_CONSENSUS = "signed-average consensus"
+CONTAINMENT = "containment"
+
+#: What each behaviour implies besides itself (Definitions 3 to 5: each contains the one before).
+_IMPLIES: dict[str, tuple[str, ...]] = {
+    STABILITY: (),
+    CONSENSUS: (BIPARTITE_CONSENSUS, CONTAINMENT),
+    SIGNED_AVERAGE_CONSENSUS: (BIPARTITE_CONSENSUS,),
+    BIPARTITE_CONSENSUS: (INTERVAL_BIPARTITE_CONSENSUS,),
+    INTERVAL_BIPARTITE_CONSENSUS: (BIPARTITE_CONTAINMENT,),
+    CONTAINMENT: (BIPARTITE_CONTAINMENT,),
+    BIPARTITE_CONTAINMENT: (),
+}
+BEHAVIOURS = tuple(_IMPLIES)
+
+Edge = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class ClosedComponent:
+    """A closed strong component with the witness of its balance.
+
+    Attributes
+    ----------
+    nodes : tuple of int
+        Node indices, ascending.
+    balanced : bool
+        Whether it splits into two camps, allies within and opponents across.
+    gauge : tuple of +1/-1, or None
+        Camps in the order of ``nodes`` (Lemma 1), the first node +1; None if unbalanced.
+    negative_cycle : tuple of (source, target), or None
+        A closed walk of the underlying undirected multigraph whose signs multiply to -1; None if balanced.
+
+    References
+    ----------
+    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 1)])).closed_components[0]
+    ClosedComponent(nodes=(0, 1), balanced=True, gauge=(1, -1), negative_cycle=None)
+    """
+
+    nodes: tuple[int, ...]
+    balanced: bool
+    gauge: tuple[int, ...] | None
+    negative_cycle: tuple[Edge, ...] | None
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What Theorems 1 to 3 say about one weakly connected graph.
+
+    Attributes
+    ----------
+    theorem : str
+        ``"1.1"`` .. ``"3.2"``.
+    behaviour : str
+        ``stability``, ``bipartite consensus``, ``interval bipartite consensus`` or ``bipartite containment``.
+    corollaries : tuple of str
+        Those whose hypotheses hold, e.g. ``("1.1", "2")``.
+    special : tuple of str
+        Sharper behaviours that the corollaries give, e.g. ``("consensus",)``.
+
+    References
+    ----------
+    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> claim = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])).claim
+    >>> claim.theorem, claim.behaviour, claim.special
+    ('1.1', 'bipartite consensus', ('signed-average consensus', 'consensus'))
+    """
+
+    theorem: str
+    behaviour: str
+    corollaries: tuple[str, ...]
+    special: tuple[str, ...]
+
+    def holds(self, behaviour: str) -> bool:
+        """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.
+
+        Parameters
+        ----------
+        behaviour : str
+            ``stability``, ``bipartite-consensus``, ... or a special case such as ``consensus``.
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        ValueError
+            No behaviour is called so.
+
+        Examples
+        --------
+        >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).holds("bipartite-consensus")
+        True
+        """
+        wanted, reached, todo = behaviour_name(behaviour), set(), [self.behaviour, *self.special]
+        while todo:
+            word = todo.pop()
+            if word not in reached:
+                reached.add(word)
+                todo.extend(_IMPLIES[word])
+        return wanted in reached
+
+
+def behaviour_name(text: str) -> str:
+    """Return the behaviour that ``text`` names, blanks and hyphens alike.
+
+    Raises
+    ------
+    ValueError
+        No such behaviour; the message lists them.
+
+    Examples
+    --------
+    >>> behaviour_name("interval-bipartite-consensus")
+    'interval bipartite consensus'
+    """
+    for name in BEHAVIOURS:
+        if text.replace("-", " ") == name.replace("-", " "):
+            return name
+    raise ValueError(f'unknown behaviour "{text}"; one of ' + ", ".join(b.replace(" ", "-") for b in BEHAVIOURS))
+
+
+@dataclass(frozen=True)
+class WeakComponent:
+    """One weakly connected component: its nodes, how it is connected, which CSCs it holds, what it will do.
+
+    Attributes
+    ----------
+    nodes : tuple of int
+        Node indices, ascending.
+    connectivity : {"strong", "quasi-strong", "weak"}
+    closed : tuple of int
+        Indices of its closed strong components among ``closed_components`` of the graph.
+    claim : Claim
+
+    References
+    ----------
+    Section II and Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> two = analyse(SignedDigraph.from_edges([(1, 2, 1), (3, 4, 1), (4, 3, -1)]))
+    >>> [(c.nodes, c.connectivity, c.claim.behaviour) for c in two.components]
+    [((0, 1), 'quasi-strong', 'interval bipartite consensus'), ((2, 3), 'strong', 'stability')]
+    """
+
+    nodes: tuple[int, ...]
+    connectivity: str
+    closed: tuple[int, ...]
+    claim: Claim
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Structure:
+    """The structure of a signed digraph; made by :func:`analyse`.
+
+    Attributes
+    ----------
+    graph : SignedDigraph
+    connectivity : {"strong", "quasi-strong", "weak", "disconnected"}
+    strong_component, weak_component : (N,) int array
+        Component number of every node.
+    closed_components : tuple of ClosedComponent
+        Ordered by smallest node.
+    components : tuple of WeakComponent
+        Ordered by smallest node.
+    leaders, followers : (K,), (N-K,) int array
+        Node indices; leaders CSC after CSC, followers ascending.
+    gauge : (N,) int8 array or None
+        Camps of the whole graph; None if the whole graph is unbalanced.
+    negative_cycle : tuple of (source, target) or None
+        Witness that the whole graph is unbalanced.
+    sign_symmetric : bool
+        ``w_kl w_lk >= 0`` for all pairs.
+    undirected : bool
+        ``w_kl = w_lk`` for all pairs, exactly.
+    all_positive : bool
+        No edge is negative.
+
+    References
+    ----------
+    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)]))
+    >>> structure.connectivity, structure.leaders.tolist(), structure.followers.tolist()
+    ('quasi-strong', [0, 1], [2])
+    >>> structure.balanced, structure.negative_cycle, structure.claim.theorem
+    (False, ((0, 1), (1, 0)), '2.2')
+    """
+
+    graph: SignedDigraph
+    connectivity: str
+    strong_component: np.ndarray
+    weak_component: np.ndarray
+    closed_components: tuple[ClosedComponent, ...]
+    components: tuple[WeakComponent, ...]
+    leaders: np.ndarray
+    followers: np.ndarray
+    gauge: np.ndarray | None
+    negative_cycle: tuple[Edge, ...] | None
+    sign_symmetric: bool
+    undirected: bool
+    all_positive: bool
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the whole graph is structurally balanced."""
+        return self.gauge is not None
+
+    @property
+    def claim(self) -> Claim | None:
+        """The claim of a weakly connected graph; None if disconnected (see ``components``)."""
+        return self.components[0].claim if len(self.components) == 1 else None
+
+    def holds(self, behaviour: str) -> bool:
+        """Tell whether every component shows ``behaviour`` from every start that is not degenerate.
+
+        Theorems and corollaries decide, but for the signed average: a strongly connected balanced component meets at
+        it iff every node listens as much as it is listened to, undirected or not.
+
+        Parameters
+        ----------
+        behaviour : str
+            As in :meth:`Claim.holds`.
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        ValueError
+            No behaviour is called so.
+        """
+        wanted = behaviour_name(behaviour)
+        return all(
+            component.claim.holds(wanted)
+            or (wanted == SIGNED_AVERAGE_CONSENSUS and component.claim.theorem == "1.1" and self._even(component))
+            for component in self.components
+        )
+
+    def _even(self, component: WeakComponent) -> bool:
+        """Tell whether in-weights equal out-weights at every node of a component, exactly."""
+        inside = np.isin(self.graph.target, component.nodes)
+        surplus = dict.fromkeys(component.nodes, Fraction(0))
+        for edge in np.flatnonzero(inside).tolist():
+            weight = abs(self.graph.exact_weight(edge))
+            surplus[int(self.graph.target[edge])] += weight
+            surplus[int(self.graph.source[edge])] -= weight
+        return not any(surplus.values())
+
+    def _repr_html_(self) -> str:
+        from ptcc_certify.report.notebook import structure_html
+
+        return structure_html(self)
+
+    def __repr__(self) -> str:
+        balanced = sum(c.balanced for c in self.closed_components)
+        claim = (
+            f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
+            if self.claim
+            else (f"{len(self.components)} components")
+        )
+        return (
+            f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {len(self.closed_components)} closed "
+            f"component(s), {balanced} balanced, {self.leaders.size} leaders; {claim})"
+        )
+
+
+def analyse(graph: SignedDigraph) -> Structure:
+    """Find components, leaders, camps, negative cycles and the theorem that applies.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+
+    Returns
+    -------
+    Structure
+
+    References
+    ----------
+    Section II of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances (Lemmas 1 and 2, Theorems 1 to 3, Corollaries 1 to 5).
+
+    Examples
+    --------
+    >>> g = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])
+    >>> analyse(g)
+    Structure(3 nodes, quasi-strong, 1 closed component(s), 1 balanced, 2 leaders; Theorem 2.1: interval bipartite \
+consensus)
+    """
+    from scipy import sparse
+    from scipy.sparse.csgraph import connected_components
+
+    n, source, target, sign = graph.n_nodes, graph.source, graph.target, graph.sign
+    pattern = sparse.csr_array((np.ones(source.size, dtype=np.int8), (source, target)), shape=(n, n))
+    n_strong, strong = connected_components(pattern, directed=True, connection="strong")
+    n_weak, weak = connected_components(pattern, directed=True, connection="weak")
+    strong, n_strong = _by_first_node(strong), int(n_strong)
+    weak, n_weak = _by_first_node(weak), int(n_weak)
+
+    inside = strong[source] == strong[target]
+    is_closed = np.ones(n_strong, dtype=bool)
+    is_closed[strong[target[~inside]]] = False
+    leader = is_closed[strong]
+
+    closed = _closed_components(graph, strong, is_closed, inside & leader[target])
+    camps = _camps(n, source, target, sign)
+    opposed, one_way = _mutual_edges(graph)
+    flags = _WeakFlags(
+        balanced=_none_of(weak, source[camps.violated], n_weak),
+        all_positive=_none_of(weak, source[sign < 0], n_weak),
+        undirected=_none_of(weak, source[one_way], n_weak),
+    )
+    components = _weak_components(weak, n_weak, strong, closed, flags)
+    connectivity = components[0].connectivity if n_weak == 1 else "disconnected"
+    return Structure(
+        graph=graph,
+        connectivity=connectivity,
+        strong_component=strong,
+        weak_component=weak,
+        closed_components=closed,
+        components=components,
+        leaders=np.array([v for c in closed for v in c.nodes], dtype=np.int64),
+        followers=np.flatnonzero(~leader),
+        gauge=camps.gauge if camps.violated.size == 0 else None,
+        negative_cycle=camps.negative_cycle(int(camps.violated[0])) if camps.violated.size else None,
+        sign_symmetric=opposed.size == 0,
+        undirected=one_way.size == 0,
+        all_positive=bool((sign > 0).all()),
+    )
+
+
+class _Camps(NamedTuple):
+    """A gauge along a breadth-first forest, and the edges that violate it."""
+
+    gauge: np.ndarray  # (N,) int8, +1 at the smallest node of each component
+    violated: np.ndarray  # edge numbers, ascending
+    parent: np.ndarray  # (N,) predecessor in the forest; N at a root
+    parent_edge: np.ndarray  # (N,) edge number to the predecessor; -1 at a root
+    source: np.ndarray
+    target: np.ndarray
+
+    def negative_cycle(self, edge: int) -> tuple[Edge, ...]:
+        """Return the closed walk that a violating edge makes with the forest."""
+        start, end = int(self.source[edge]), int(self.target[edge])
+        left, right = self._path_to_root(start), self._path_to_root(end)
+        while left and right and left[-1] == right[-1]:
+            left.pop()
+            right.pop()
+        walk = [edge, *right, *reversed(left)]
+        return tuple((int(self.source[e]), int(self.target[e])) for e in walk)
+
+    def _path_to_root(self, node: int) -> list[int]:
+        path = []
+        while (edge := int(self.parent_edge[node])) >= 0:
+            path.append(edge)
+            node = int(self.parent[node])
+        return path
+
+
+def _camps(n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> _Camps:
+    """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1)."""
+    from scipy import sparse
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    low, high = np.minimum(source, target), np.maximum(source, target)
+    pair, first = np.unique(low * n + high, return_index=True)  # of parallel edges, the first counts
+    pattern = sparse.csr_array((np.ones(pair.size, dtype=np.int8), (pair // n, pair % n)), shape=(n, n))
+    _, component = connected_components(pattern, directed=False)
+    _, root = np.unique(component, return_index=True)
+    # A virtual node n reaches the smallest node of every component, so that one search covers them all.
+    rows, columns = np.concatenate([pair // n, np.full(root.size, n)]), np.concatenate([pair % n, root])
+    forest = sparse.csr_array((np.ones(rows.size, dtype=np.int8), (rows, columns)), shape=(n + 1, n + 1))
+    _, parent = breadth_first_order(forest, n, directed=False, return_predecessors=True)
+    parent = parent[:n].astype(np.int64)
+
+    child = np.flatnonzero(parent != n)
+    keys = np.minimum(child, parent[child]) * n + np.maximum(child, parent[child])
+    parent_edge = np.full(n, -1, dtype=np.int64)
+    parent_edge[child] = first[np.searchsorted(pair, keys)]
+
+    gauge, jump = np.ones(n + 1, dtype=np.int8), np.append(parent, n)
+    gauge[child] = sign[parent_edge[child]]
+    while (jump != n).any():  # doubling: gauge becomes the product of the signs up to the root
+        gauge, jump = gauge * gauge[jump], jump[jump]
+    gauge = gauge[:n]
+    violated = np.flatnonzero(sign * gauge[source] * gauge[target] < 0)
+    return _Camps(gauge, violated, parent, parent_edge, source, target)
+
+
+def _closed_components(
+    graph: SignedDigraph, strong: np.ndarray, is_closed: np.ndarray, edges: np.ndarray
+) -> tuple[ClosedComponent, ...]:
+    edge = np.flatnonzero(edges)
+    camps = _camps(graph.n_nodes, graph.source[edge], graph.target[edge], graph.sign[edge])
+    violating: dict[int, int] = {}
+    for position in camps.violated[::-1].tolist():
+        violating[int(strong[camps.source[position]])] = position
+    members = _groups(strong, is_closed.size)
+    result = []
+    for number in np.flatnonzero(is_closed).tolist():
+        nodes = members[number].tolist()
+        if number in violating:
+            result.append(ClosedComponent(tuple(nodes), False, None, camps.negative_cycle(violating[number])))
+        else:
+            result.append(ClosedComponent(tuple(nodes), True, tuple(camps.gauge[nodes].tolist()), None))
+    return tuple(result)
+
+
+class _WeakFlags(NamedTuple):
+    balanced: np.ndarray
+    all_positive: np.ndarray
+    undirected: np.ndarray
+
+
+def _weak_components(
+    weak: np.ndarray, n_weak: int, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: _WeakFlags
+) -> tuple[WeakComponent, ...]:
+    held: list[list[int]] = [[] for _ in range(n_weak)]
+    for i, component in enumerate(closed):
+        held[weak[component.nodes[0]]].append(i)
+    _, representative = np.unique(strong, return_index=True)
+    n_strong = np.bincount(weak[representative], minlength=n_weak).tolist()
+    result = []
+    for number, members in enumerate(_groups(weak, n_weak)):
+        connectivity = "strong" if n_strong[number] == 1 else "quasi-strong" if len(held[number]) == 1 else "weak"
+        claim = _claim(
+            connectivity,
+            any(closed[i].balanced for i in held[number]),
+            balanced=bool(flags.balanced[number]),
+            all_positive=bool(flags.all_positive[number]),
+            undirected=bool(flags.undirected[number]),
+        )
+        result.append(WeakComponent(tuple(members.tolist()), connectivity, tuple(held[number]), claim))
+    return tuple(result)
+
+
+def _claim(
+    connectivity: str, some_csc_balanced: bool, *, balanced: bool, all_positive: bool, undirected: bool
+) -> Claim:
+    """Apply Theorems 1 to 3 and Corollaries 1 to 5."""
+    corollaries: list[str] = []
+    special: list[str] = []
+    if connectivity == "strong":
+        if some_csc_balanced:
+            if undirected:
+                corollaries.append("1.1")
+                special.append(SIGNED_AVERAGE_CONSENSUS)
+            if all_positive:
+                corollaries.append("2")
+                special.append(CONSENSUS)
+            return Claim("1.1", BIPARTITE_CONSENSUS, tuple(corollaries), tuple(special))
+        return Claim("1.2", STABILITY, ("1.2",) if undirected else (), ())
+    if connectivity == "quasi-strong":
+        if some_csc_balanced:
+            if balanced:
+                corollaries.append("3")
+                special.append(BIPARTITE_CONSENSUS)
+            if all_positive:
+                corollaries.append("4")
+                special.append(CONSENSUS)
+            return Claim("2.1", INTERVAL_BIPARTITE_CONSENSUS, tuple(corollaries), tuple(special))
+        return Claim("2.2", STABILITY, (), ())
+    if some_csc_balanced:
+        if all_positive:
+            corollaries.append("5")
+            special.append(CONTAINMENT)
+        return Claim("3.1", BIPARTITE_CONTAINMENT, tuple(corollaries), tuple(special))
+    return Claim("3.2", STABILITY, (), ())
+
+
+def _mutual_edges(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edges whose reverse has the opposite sign, and those whose reverse is missing or differs."""
+    n, m = graph.n_nodes, graph.n_edges
+    forward, backward = graph.target * n + graph.source, graph.source * n + graph.target  # forward ascends
+    place = np.minimum(np.searchsorted(forward, backward), max(m - 1, 0))
+    mutual = forward[place] == backward if m else np.zeros(0, dtype=bool)
+    opposed = np.flatnonzero(mutual & (graph.sign != graph.sign[place]))
+    one_way = np.flatnonzero(~(mutual & graph.equal_weights(place)))
+    return opposed, one_way
+
+
+def _none_of(component: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
+    """Tell for each component whether none of ``nodes`` lies in it."""
+    return np.bincount(component[nodes], minlength=count) == 0
+
+
+def _groups(component: np.ndarray, count: int) -> list[np.ndarray]:
+    """Return the nodes of each component, ascending."""
+    order = np.argsort(component, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(component, minlength=count))[:-1])
+
+
+def _by_first_node(component: np.ndarray) -> np.ndarray:
+    """Renumber components by their smallest node."""
+    _, first, inverse = np.unique(component, return_index=True, return_inverse=True)
+    rank = np.empty(first.size, dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(first.size)
+    return rank[inverse]

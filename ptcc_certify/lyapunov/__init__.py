@@ -1,0 +1,1 @@
+"""Lyapunov functions: searches, large graphs, upper bounds on the decay rate."""

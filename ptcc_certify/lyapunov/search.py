@@ -1,0 +1,476 @@
+"""Sharper Lyapunov functions than the paper's: searched in several classes, chosen for the bound over time, proved.
+
+All are quadratic in the error: ``V = E' P E`` with ``V <= e^(-b s) V(0)``, hence
+``||E||^2 <= prefactor e^(-b s) ||E(0)||^2``. The classes:
+
+* ``perron``: diagonal, from the Perron vectors of leaders and followers, in closed form;
+* ``lmi``: the best diagonal matrix, searched by semidefinite programs;
+* ``full``: not diagonal, from Lyapunov equations on invariant subspaces; its rates come as near as wanted to the
+  spectral rate, which nothing exceeds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+
+import lmi
+import lmi.full
+from lmi.apart import apart
+from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
+from lmi.errors import LMIError, OutOfTime
+from lmi.exact.proofs import prove_generalized_margin
+from lmi.matrices import block_columns
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.dominance import DominantMember, dominant_members
+from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
+from ptcc_certify.theorems.base import BITS, Matrix, diagonal_matrix
+from ptcc_certify.theorems.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
+
+METHODS = ("paper", "perron", "lmi", "full", "best")
+DIAGONAL = ("perron", "lmi")
+#: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
+SEARCHED_GROUP = (300, 2000)
+#: The share of the time left that the searches may take together.
+SEARCHING = 0.6
+#: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
+APART_NODES = 40
+#: The member with the largest rate is chosen among those with at most this prefactor.
+LARGEST_PREFACTOR = 1e6
+#: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
+_COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
+#: Wanted losses of full matrices where the bound is optimised at one instant.
+_FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
+#: A bound is useful where it leaves this share of the error. One more candidate is taken for that, if all others need
+#: so many times more of the clock: it costs a proof, and tells which gains make a bound useful.
+USEFUL, _LATE = 0.01, 1.5
+#: Rates that differ by less, relatively, are the same.
+_SAME_RATE = 1e-6
+#: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
+LARGEST_ENTRY = 2.0
+#: By what factor one more member must improve the bound of deviations at some instant.
+WORTH_A_MEMBER = 1.25
+#: Beyond this prefactor a diagonal matrix is of no use to anybody.
+_HOPELESS = 1e15
+_MATRIX_BITS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A Lyapunov matrix in floats: ``log_weights`` (n,) of a diagonal one, or ``matrix`` (n, n).
+
+    No diagonal matrix has a larger rate than ``upper``.
+    """
+
+    kind: str
+    rate: float
+    condition: float
+    log_weights: np.ndarray | None = None
+    matrix: np.ndarray | None = None
+    upper: float = math.inf
+
+    def log_bound(self, clock: float) -> float:
+        """Return the logarithm of the bound of ``||E|| / ||E(0)||`` at a value of the clock."""
+        return (math.log(self.condition) - self.rate * clock) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class SharpMember:
+    """A proved Lyapunov function ``V = E' P E`` on the rows ``nodes`` of ``E``.
+
+    Attributes
+    ----------
+    kind : str
+        Class: ``perron``, ``lmi`` or ``full``.
+    nodes : tuple of int
+    diagonal : tuple of Fraction or None
+        Of a diagonal ``P`` that is proved as a whole.
+    matrix : rows of Fractions or None
+        Of a full ``P``.
+    rate : Fraction
+        ``P A + A' P > rate P`` on the error's subspace; negative rates, which bound the growth, occur too.
+    lowest, highest : Fraction
+        ``lowest I <= P <= highest I``.
+    numerical_rate : float
+        The rate of the matrix before it was rounded, in floating point.
+    dominance : DominantMember or None
+        Of a large graph: the diagonal ``P``, and what proves the rate row by row.
+    """
+
+    kind: str
+    nodes: tuple[int, ...]
+    diagonal: tuple[Fraction, ...] | None
+    matrix: Matrix | None
+    rate: Fraction
+    lowest: Fraction
+    highest: Fraction
+    numerical_rate: float
+    dominance: DominantMember | None = None
+
+    @property
+    def prefactor(self) -> Fraction:
+        """``highest / lowest``, which multiplies the squared norm."""
+        return self.highest / self.lowest
+
+
+@dataclass(frozen=True)
+class Sharpening:
+    """What was tried, what was taken, and how far the diagonal class reaches.
+
+    Attributes
+    ----------
+    members : tuple of SharpMember
+        Proved.
+    tried : dict of str to float
+        Largest rate found of each class at any prefactor, in floating point.
+    diagonal_limit : float or None
+        No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
+    notes : tuple of str
+        What failed.
+    cut_off : tuple of str
+        What the time limit ended.
+    """
+
+    members: tuple[SharpMember, ...] = ()
+    tried: dict[str, float] = field(default_factory=dict)
+    diagonal_limit: float | None = None
+    notes: tuple[str, ...] = ()
+    cut_off: tuple[str, ...] = ()
+
+
+def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Sharpening:
+    """Search the classes of a method, choose the members that bound best, and prove them.
+
+    Parameters
+    ----------
+    system : ErrorSystem
+    method : {"paper", "perron", "lmi", "full", "best"}
+        ``paper`` searches nothing; ``best`` everything.
+    clocks : sequence of float
+        Values of the stretched clock at which the bound should be small; the largest useful rate is taken besides.
+    at : float, optional
+        One more such value, for which the classes are searched more finely.
+
+    Returns
+    -------
+    Sharpening
+    """
+    if method == "paper" or not system.nodes:
+        return Sharpening()
+    results: dict[str, list[Candidate]] = {}
+    notes: list[str] = []
+    cut_off: list[str] = []
+    wanted = [*clocks] if at is None else [*clocks, at]
+    losses = lmi.full.LOSSES if at is None else _FINE_LOSSES
+    # The quickest search first; each takes a share of the time that is left, and leaves some for the proofs.
+    searches = {
+        "perron": (0.2, lambda: _perron_candidates(system)),
+        "full": (0.4, lambda: _full_candidates(system, losses)),
+        "lmi": (0.6, lambda: _lmi_candidates(system, method == "lmi" or at is not None)),
+    }
+    with np.errstate(all="ignore"), time_limit(SEARCHING * seconds_left()):  # the rest is for the proofs
+        for kind, (share, search) in searches.items():
+            if method not in (kind, "best"):
+                continue
+            found = results[kind] = []
+            with share_of_time(share, f"class {kind}", cut_off):
+                try:
+                    for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
+                        found.append(candidate)
+                except OutOfTime:
+                    raise
+                except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+                    notes.append(f"class {kind}: {error}")
+                    continue
+            if not found and f"class {kind}" not in cut_off:
+                notes.append(f"class {kind}: nothing was found in floating point")
+    with np.errstate(all="ignore"):
+        every = [c for kind in METHODS for c in results.get(kind, ())]
+        tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
+        candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
+        for kind, rate in tried.items():
+            if not any(c.rate > 0 for c in candidates if c.kind == kind):
+                notes.append(f"class {kind}: the rate {rate:.4g} needs a prefactor above {_HOPELESS:.0e}")
+        proved: list[SharpMember] = []
+        extra: SharpMember | None = None
+        with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
+            chosen = choose(candidates, wanted)
+            for candidate in chosen:
+                checkpoint()
+                member = prove_member(system, candidate)
+                if member is None:
+                    notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
+                else:
+                    proved.append(member)
+            checkpoint()
+            near = _for_deviations(system, candidates, chosen, wanted) if any(m.rate > 0 for m in proved) else None
+            extra = None if near is None else prove_member(system, near)
+    limit = min((c.upper for c in every), default=math.inf)
+    members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate))
+    if extra is not None:  # the largest rate, and its prefactor, stay those of a member that is small in E
+        fastest = max(members, key=lambda m: (m.rate, -m.prefactor))
+        if extra.rate < fastest.rate or extra.prefactor >= fastest.prefactor:
+            members.append(replace(extra, rate=min(extra.rate, fastest.rate)))
+    least = limit if math.isfinite(limit) else None
+    return Sharpening(tuple(members), tried, least, tuple(notes), tuple(cut_off))
+
+
+def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) -> Sharpening:
+    """Return diagonal Lyapunov functions of a large graph, to be proved row by row by the check of the certificate.
+
+    Leader groups take the Perron vector (class ``perron``), and those of some hundreds of nodes the best diagonal
+    matrix besides (class ``lmi``; asked for by ``method``, those of some thousands).
+
+    Parameters
+    ----------
+    structure : Structure
+    method : {"perron", "lmi", "best"}
+    clocks : sequence of float
+        See :func:`sharpen`.
+    """
+    members: dict[Candidate, SharpMember] = {}
+    notes: list[str] = []
+    tried: dict[str, float] = {}
+    groups = [len(c.nodes) for c in structure.closed_components]
+    largest = SEARCHED_GROUP[method == "lmi"]
+    searches = {"perron": 0}
+    if method != "perron" and any(EXACT_NODES < size <= largest for size in groups):
+        searches = {"lmi": largest} if method == "lmi" else {**searches, "lmi": largest}
+    elif method == "lmi":
+        notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
+    cut_off: list[str] = []
+    for kind, search in searches.items():
+        found: Sequence[DominantMember] = ()
+        try:
+            with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
+                found = list(apart(partial(dominant_members, structure, search=search)))
+        except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
+            notes.append(f"class {kind}: {error}")
+            continue
+        for m in found:
+            nodes, low, high = tuple(m.nodes.tolist()), m.lowest, m.highest
+            candidate = Candidate(kind, float(m.rate), float(high / low))
+            members[candidate] = SharpMember(kind, nodes, None, None, m.rate, low, high, float(m.rate), m)
+        if found:
+            tried[kind] = max(float(m.rate) for m in found)
+    chosen = sorted(choose(list(members), clocks), key=lambda c: c.rate)
+    return Sharpening(tuple(members[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
+
+
+def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
+    """Return the fastest candidate of a useful prefactor, the best at each clock value, and the fastest diagonal one.
+
+    Besides, unless one of these is nearly as early, the one that first leaves a hundredth of the error.
+
+    Examples
+    --------
+    >>> slow, fast = Candidate("perron", 1.0, 1.0), Candidate("full", 2.0, 100.0)
+    >>> [c.kind for c in choose([slow, fast], [1.0])]
+    ['full', 'perron']
+    """
+    if not candidates:
+        return []
+    useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
+    chosen = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
+    chosen += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
+    diagonal = [c for c in candidates if c.kind in DIAGONAL]
+    if diagonal:
+        chosen.append(_fastest(diagonal))
+    if decaying := [c for c in candidates if c.rate > 0]:
+        first = min(decaying, key=_useful_from)
+        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
+            chosen.append(first)
+    distinct: list[Candidate] = []
+    for candidate in chosen:
+        if not any(candidate is other for other in distinct):
+            distinct.append(candidate)
+    return distinct
+
+
+def _useful_from(candidate: Candidate) -> float:
+    """Return the clock value from which on a decaying candidate leaves the useful share."""
+    return (math.log(candidate.condition) - 2 * math.log(USEFUL)) / candidate.rate
+
+
+def _fastest(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the candidate of the largest rate, and of those that share it but for rounding the least prefactor."""
+    top = max(c.rate for c in candidates)
+    return min((c for c in candidates if c.rate >= top - _SAME_RATE * abs(top)), key=lambda c: c.condition)
+
+
+def _without_hair_splitting(members: list[SharpMember]) -> list[SharpMember]:
+    """Lower rates that are larger by rounding alone to that of the member with the smaller prefactor.
+
+    A smaller rate is proved with the larger one. The largest rate then comes with a prefactor that is worth it.
+    """
+    result = []
+    for member in members:
+        near = [m.rate for m in members if m.prefactor < member.prefactor and 0 < m.rate < member.rate]
+        close = [rate for rate in near if member.rate - rate <= Fraction(_SAME_RATE) * rate]
+        if close:
+            member = replace(member, rate=max(close))
+        result.append(member)
+    return result
+
+
+def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
+    """Round a candidate to rationals and prove its rate and prefactor in exact arithmetic; None if a step fails."""
+    n = len(system.nodes)
+    if candidate.log_weights is not None:
+        weights = rounded_diagonal(candidate.log_weights, BITS)
+        if min(weights) <= 0:
+            return None
+        rate = system.prove_rate(diagonal_matrix(weights), candidate.rate)
+        if rate is None:
+            return None
+        return SharpMember(
+            candidate.kind, system.nodes, weights, None, rate, min(weights), max(weights), candidate.rate
+        )
+    assert candidate.matrix is not None
+    P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
+    rate = system.prove_rate(P, candidate.rate)
+    if rate is None:
+        return None
+    size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
+    whole, identity = [[x.numerator for x in row] for row in P], np.eye(n, dtype=int).tolist()
+    lowest = prove_generalized_margin(whole, identity, float(size[0]))
+    negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
+    if lowest is None or lowest <= 0 or negated is None:
+        return None
+    return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, candidate.rate)
+
+
+# ---------------------------------------------------------------------- deviations
+
+
+def _for_deviations(
+    system: ErrorSystem, candidates: Sequence[Candidate], chosen: Sequence[Candidate], clocks: Sequence[float]
+) -> Candidate | None:
+    """Return, as a matrix in ``E``, what bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
+
+    ``d`` obeys the equation of ``E``, ``d' = -gain A d``, and ``E = -A d``: a good Lyapunov matrix ``P`` in ``E`` is
+    one for ``d`` too, namely ``A^-T P A^-1`` in ``E``. Judged by the bound of the largest entry of ``d`` at the clock
+    values, from entries at random.
+    """
+    if not any(c.kind == "full" for c in candidates):
+        return None
+    A, U = system.matrix, np.eye(len(system.nodes)) if system.basis is None else system.basis
+    own = U.T @ A @ U
+    own /= np.abs(own).max()  # the scale is immaterial
+    try:
+        inverse = np.linalg.inv(own)
+    except np.linalg.LinAlgError:
+        return None
+
+    def log_bounds(form: np.ndarray, rate: float) -> np.ndarray:
+        try:
+            largest = np.einsum("ij,ji->i", U, np.linalg.solve(form, U.T)).max() * np.trace(form)
+        except np.linalg.LinAlgError:
+            return np.full(len(clocks), np.inf)
+        return (math.log(largest) - rate * np.array(clocks)) / 2 if largest > 0 else np.full(len(clocks), np.inf)
+
+    def reduced(c: Candidate) -> np.ndarray:
+        return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
+
+    known = [log_bounds(own.T @ reduced(c) @ own, c.rate) for c in chosen]
+    known.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
+    best, least, found = np.min(known, axis=0), math.log(WORTH_A_MEMBER), None
+    for c in candidates:
+        if c.kind == "full":
+            gain = best - log_bounds(reduced(c), c.rate)
+            if gain.max() > math.log(WORTH_A_MEMBER) and np.maximum(gain, 0).sum() > least:
+                least, found = np.maximum(gain, 0).sum(), c
+    if found is None:
+        return None
+    P = inverse.T @ reduced(found) @ inverse
+    sizes = np.linalg.eigvalsh(P)
+    low, high = float(sizes[0]), float(sizes[-1])
+    if not low > high / _HOPELESS:
+        return None
+    P = U @ P @ U.T + math.sqrt(low * high) * (np.eye(len(A)) - U @ U.T)
+    return Candidate("full", found.rate, high / low, matrix=P)
+
+
+# ---------------------------------------------------------------------- classes
+
+
+def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
+    """Yield Perron vectors of every leader group and of the followers, coupled at several losses."""
+    A, basis = system.matrix, system.basis
+    log_weights = np.zeros(len(A))
+    for rows, component in zip(system.parts, system.leaders, strict=False):
+        graph = system.structure.graph.subgraph(component.nodes)
+        p = np.log(left_vector(graph))
+        log_weights[rows] = p - p.max()
+    if len(system.parts) == len(system.leaders):
+        yield from _coupled("perron", A, system.parts, log_weights, basis)
+        return
+    followers = system.parts[-1]
+    with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
+        for found in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
+            log_weights[followers] = found.log_omega
+            yield from _coupled("perron", A, system.parts, log_weights, basis)
+
+
+def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
+    """Yield the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
+    A, basis = system.matrix, system.basis
+    best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
+    yield replace(_diagonal("lmi", best), upper=best.upper)
+    for largest in (LARGEST_PREFACTOR, _HOPELESS / 1e3):
+        if best.log_condition > math.log(largest):
+            with contextlib.suppress(lmi.NoCertificate):
+                near = lmi.diagonal_lyapunov(
+                    A, objective="rate", max_condition=largest, basis=basis, start=best.log_omega
+                )
+                yield _diagonal("lmi", near)
+    if thorough:
+        yield from (_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best))
+
+
+def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[Candidate]:
+    """Yield full matrices on the error's subspace, continued beyond it."""
+    A, U = system.matrix, system.basis
+    spectral = laplacian_spectrum(system.structure).spectral_rate
+    reduced = A if U is None else U.T @ A @ U
+    for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
+        P = member.matrix
+        if U is not None:  # beyond the subspace anything between the extremes will do
+            P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)
+        yield Candidate("full", member.rate, member.condition, matrix=P)
+
+
+def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:
+    return Candidate(kind, found.rate, found.condition, log_weights=found.log_omega)
+
+
+def _coupled(
+    kind: str, A: np.ndarray, parts: Sequence[np.ndarray], log_weights: np.ndarray, basis: np.ndarray | None
+) -> list[Candidate]:
+    """Couple blocks at several rates below the slowest of them."""
+    rates = []
+    for part in parts:
+        own = None if basis is None else block_columns(basis, part)
+        rates.append(lmi.diagonal_rate(A[np.ix_(part, part)], log_weights[part], own))
+    slowest = min(rates)
+    if not slowest > 0:
+        raise lmi.NoCertificate(f"the slowest block decays at {slowest:.3g}, which is not positive")
+    if len(parts) == 1:
+        return [_diagonal(kind, lmi.DiagonalCertificate(log_weights - log_weights.max(), slowest))]
+    found = []
+    for loss in _COUPLING_LOSSES:
+        try:
+            coupled = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
+            rate = lmi.diagonal_rate(A, coupled, basis)
+        except lmi.NoCertificate:
+            continue
+        if rate > 0:
+            found.append(_diagonal(kind, lmi.DiagonalCertificate(coupled, rate)))
+    return found

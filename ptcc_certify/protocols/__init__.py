@@ -1,0 +1,1 @@
+"""Protocols: gain, nominal, sliding mode, disturbances."""

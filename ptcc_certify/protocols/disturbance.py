@@ -1,0 +1,940 @@
+r"""Bounded disturbances ``d_k(t)`` of the agents ``x_k' = u_k + d_k`` with ``|d_k| <= delta``.
+
+An expression is written in ``t`` and in ``k = 1, ..., N``, the position of the agent, and is read once into a postfix
+program. One loop runs that program over floats, over intervals or over CasADi: nothing here recurses, so that no text
+can exhaust the interpreter. The bound ``|d| <= delta`` on the whole horizon is established by interval arithmetic
+with outward rounding; an undefined operation makes an enclosure ``nan``, and what is computed from it stays ``nan``.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import reduce
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import Exact
+from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
+from ptcc_certify.protocols.latex import to_latex
+
+if TYPE_CHECKING:
+    import casadi as ca
+    from numpy.typing import ArrayLike
+
+MAX_CHARACTERS, MAX_NESTING = 1000, 50
+MAX_SWITCHES, MAX_SAMPLES = 10**6, 2 * 10**7
+TOLERANCE = 1e-12
+_CELLS, _BISECTIONS, _BOXES, _INSTANTS, _CHUNK = 256, 40, 200_000, 20_000, 64
+
+Program = tuple[float | str, ...]
+Interval = tuple[Any, Any]
+
+# ---------------------------------------------------------------------- from a text to a postfix program
+
+# a number, a name, an operator, or any other character but a blank
+_TOKEN = re.compile(
+    r"((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|([A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/(),]|([^ \t\r\n])"
+)
+_BINDING = {"(": 0, "+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
+_ATOMS = ("k", "t", "pi", "e")
+_FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "abs", "sign", "min", "max")
+_BINARY = frozenset(("+", "-", "*", "/", "**", "min", "max"))
+_KNOWN = f"{', '.join(_ATOMS)} and the functions {', '.join(_FUNCTIONS)}"
+
+
+def _refusal(text: str, column: int, what: str) -> ParameterError:
+    return ParameterError(f'disturbance "{shorten(text)}", column {column}: {what}')
+
+
+def _parse(text: str) -> Program:
+    """Order the operations by their binding: pending operators wait on a stack until a weaker one comes."""
+    if len(text) > MAX_CHARACTERS:
+        raise ParameterError(f"a disturbance of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
+    program: list[float | str] = []
+    pending: list[str] = []
+    calls: list[tuple[str, int, int]] = []  # function or "", arguments so far, column of each open parenthesis
+    function, operand_due, column, token = "", True, 1, ""
+
+    def release(binding: int) -> None:
+        while pending and _BINDING[pending[-1]] >= binding:
+            program.append(pending.pop())
+
+    def wait(operator_: str) -> None:
+        pending.append(operator_)
+        if sum(waiting in ("(", "**") for waiting in pending) > MAX_NESTING:
+            raise _refusal(text, column, f"nested deeper than {MAX_NESTING} levels; write it flatter")
+
+    for match in _TOKEN.finditer(text):
+        column, token = match.start() + 1, match[0]
+        if match[3]:
+            hint = "write a power as **" if token == "^" else f"write numbers, + - * / ** ( ) , {_KNOWN}"
+            raise _refusal(text, column, f'"{shorten(token)}" has no meaning; {hint}')
+        if function and token != "(":
+            break
+        if operand_due:
+            if match[1]:
+                if not math.isfinite(float(token)):
+                    raise _refusal(text, column, f"{shorten(token)} is beyond the range of floats; write less")
+                program.append(float(token))
+            elif token == "(":
+                calls.append((function, 1, column))
+                wait("(")
+                function = ""
+            elif token in _FUNCTIONS:
+                function = token
+            elif token in _ATOMS:
+                program.append(token)
+            elif match[2]:
+                raise _refusal(text, column, f'unknown name "{shorten(token)}"; the names are {_KNOWN}')
+            elif token == "-" and pending and pending[-1] == "neg":
+                pending.pop()  # two signs of one run cancel
+            elif token == "-":
+                wait("neg")
+            elif token != "+":
+                raise _refusal(text, column, f'a number, a name or "(" is missing before "{token}"')
+            operand_due = not match[1] and token not in _ATOMS
+        elif token in (",", ")"):
+            release(1)
+            if not calls:
+                raise _refusal(text, column, f'"{token}" without a "(" before it; remove it')
+            name, arguments, start = calls.pop()
+            if token == "," or name in ("min", "max"):
+                if name not in ("min", "max"):
+                    raise _refusal(text, column, f"only min and max take a comma; write {name or 'one value'} without")
+                if token == ")" and arguments < 2:
+                    raise _refusal(text, column, f"{name} takes two or more arguments; write {name}(a, b)")
+            if token == ",":
+                calls.append((name, arguments + 1, start))
+                operand_due = True
+            else:
+                pending.pop()
+                program.extend([name] * max(arguments - 1, 1) if name else [])
+        elif token in _BINARY and not match[2]:
+            release(_BINDING[token] + (token == "**"))
+            wait(token)
+            operand_due = True
+        else:
+            raise _refusal(text, column, f'an operator is missing before "{shorten(token)}"; write * for a product')
+    if function:
+        raise _refusal(text, column, f'"(" is missing after {function}; write {function}(...)')
+    if operand_due:
+        raise _refusal(text, len(text) + 1, "the expression ends too early; write a number, k or t here")
+    release(1)
+    if calls:
+        raise _refusal(text, calls[-1][2], 'this "(" is never closed; write ")"')
+    return tuple(program)
+
+
+def _run(program: Program, algebra: dict[str, Callable[..., Any]], atoms: dict[str, Any], number: Callable) -> Any:
+    stack: list[Any] = []
+    with np.errstate(all="ignore"):
+        for item in program:
+            if not isinstance(item, str):
+                stack.append(number(item))
+            elif item in atoms:
+                stack.append(atoms[item])
+            elif item in _BINARY:
+                right = stack.pop()
+                stack[-1] = algebra[item](stack[-1], right)
+            else:
+                stack[-1] = algebra[item](stack[-1])
+    return stack[0]
+
+
+_FLOATS: dict[str, Callable[..., Any]] = {
+    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative},
+    **{"sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh, "exp": np.exp, "log": np.log},
+    **{"sqrt": np.sqrt, "abs": np.abs, "sign": np.sign, "min": np.minimum, "max": np.maximum},
+}
+
+
+def _floats(program: Program, k: np.ndarray, t: np.ndarray) -> np.ndarray:
+    atoms = {"k": k, "t": t, "pi": np.float64(math.pi), "e": np.float64(math.e)}
+    return np.broadcast_to(_run(program, _FLOATS, atoms, np.float64), np.broadcast_shapes(k.shape, t.shape))
+
+
+# ---------------------------------------------------------------------- intervals
+
+# Errors of NumPy's functions are below 4 units in the last place, so two of their values are in order up to 8.
+_ULPS = 8
+
+
+def _hull(corners: Sequence[tuple[Any, Any]], ulps: int) -> Interval:
+    """Enclose values, each given with where it is exact; the others are moved outwards."""
+    low, high = [value for value, _ in corners], [value for value, _ in corners]
+    for _ in range(ulps):
+        low, high = [np.nextafter(value, -np.inf) for value in low], [np.nextafter(value, np.inf) for value in high]
+    lows = [np.where(exact, value, lo) for (value, exact), lo in zip(corners, low, strict=True)]
+    highs = [np.where(exact, value, hi) for (value, exact), hi in zip(corners, high, strict=True)]
+    return reduce(np.minimum, lows), reduce(np.maximum, highs)
+
+
+def _nowhere(undefined: Any, x: Interval) -> Interval:
+    return np.where(undefined, np.nan, x[0]), np.where(undefined, np.nan, x[1])
+
+
+def _sum(a: Any, b: Any) -> tuple[Any, Any]:
+    """Return ``a + b`` and where its rounding error, which is a float itself, is zero."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part) == 0
+
+
+def _product(a: Any, b: Any) -> tuple[Any, Any]:
+    """Return ``a b`` and where its rounding error is zero, by splitting each factor into halves of 26 bits."""
+    product, splitter = a * b, 134217729.0
+    a1, b1 = splitter * a - (splitter * a - a), splitter * b - (splitter * b - b)
+    a2, b2 = a - a1, b - b1
+    error = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+    return product, (a == 0) | (b == 0) | (error == 0) & (np.abs(product) > 1e-250)
+
+
+def _add(x: Interval, y: Interval) -> Interval:
+    return _hull([_sum(x[0], y[0]), _sum(x[1], y[1])], 1)
+
+
+def _divide(x: Interval, y: Interval) -> Interval:
+    return _nowhere((y[0] <= 0) & (y[1] >= 0), _hull([(a / b, a == 0) for a in x for b in y], 1))
+
+
+def _absolute(x: Interval) -> Interval:
+    sizes = np.abs(x[0]), np.abs(x[1])
+    return np.where((x[0] <= 0) & (x[1] >= 0), 0.0, np.minimum(*sizes)), np.maximum(*sizes)
+
+
+def _power(x: Interval, y: Interval) -> Interval:
+    """Enclose ``x**y``: an even whole power of ``|x|``, otherwise monotone in both ``x`` and ``y``."""
+    whole, reaches_zero = (y[0] == y[1]) & (y[0] == np.floor(y[0])), (x[0] <= 0) & (x[1] >= 0)
+    even = whole & (np.mod(y[0], 2) == 0)
+    base = tuple(np.where(even, size, end) for size, end in zip(_absolute(x), x, strict=True))
+    lo, hi = _hull([(np.power(a, b), (a == 0) | (np.abs(a) == 1) & whole) for a in base for b in y], _ULPS)
+    undefined = np.where(whole, (y[0] < 0) & reaches_zero, (x[0] < 0) | (x[0] == 0) & (y[0] <= 0))
+    return _nowhere(undefined | np.isnan(x[0]) | np.isnan(y[0]), (np.where(base[0] >= 0, np.maximum(lo, 0), lo), hi))
+
+
+def _monotone(name: str, low: float = -np.inf, high: float = np.inf) -> Callable[[Interval], Interval]:
+    """Return the enclosure of an increasing function of values in [low, high] that is exact at 0."""
+
+    def enclose(x: Interval) -> Interval:
+        lo, hi = _hull([(_FLOATS[name](end), end == 0) for end in x], _ULPS)
+        return np.maximum(lo, low), np.minimum(hi, high)
+
+    return enclose
+
+
+def _reaches(x: Interval, offset: float, period: float) -> Any:
+    """Tell where ``x`` may hold a point ``(offset + n) period``; the slack covers the rounding of the quotient."""
+    lo, hi = x[0] / period, x[1] / period
+    return np.ceil(lo - offset - 1e-15 * (1 + np.abs(lo))) <= np.floor(hi - offset + 1e-15 * (1 + np.abs(hi)))
+
+
+def _wave(name: str, peak: float) -> Callable[[Interval], Interval]:
+    """Return the enclosure of sin or cos, 1 at ``peak`` turns; undefined where the argument may overflow."""
+
+    def enclose(x: Interval) -> Interval:
+        ends, slack = [_FLOATS[name](end) for end in x], [np.where(end == 0, 0, 4e-15) for end in x]
+        lo = np.maximum(np.minimum(ends[0] - slack[0], ends[1] - slack[1]), -1.0)
+        hi = np.minimum(np.maximum(ends[0] + slack[0], ends[1] + slack[1]), 1.0)
+        turn = 2 * math.pi
+        waves = np.where(_reaches(x, peak + 0.5, turn), -1.0, lo), np.where(_reaches(x, peak, turn), 1.0, hi)
+        return _nowhere(np.isinf(x[0]) | np.isinf(x[1]), waves)
+
+    return enclose
+
+
+_INTERVALS: dict[str, Callable[..., Interval]] = {
+    "+": _add,
+    "-": lambda x, y: _add(x, (-y[1], -y[0])),
+    "*": lambda x, y: _hull([_product(a, b) for a in x for b in y], 1),
+    "/": _divide,
+    "**": _power,
+    "neg": lambda x: (-x[1], -x[0]),
+    "sin": _wave("sin", 0.25),
+    "cos": _wave("cos", 0.0),
+    "tan": lambda x: _nowhere(_reaches(x, 0.5, math.pi), _monotone("tan")(x)),
+    "atan": _monotone("atan"),
+    "tanh": _monotone("tanh", -1.0, 1.0),
+    "exp": _monotone("exp", 0.0),
+    "log": lambda x: _nowhere(x[0] <= 0, _monotone("log")(x)),
+    "sqrt": lambda x: _nowhere(x[0] < 0, _monotone("sqrt", 0.0)(x)),
+    "abs": _absolute,
+    "sign": lambda x: (np.sign(x[0]), np.sign(x[1])),
+    "min": lambda x, y: (np.minimum(x[0], y[0]), np.minimum(x[1], y[1])),
+    "max": lambda x, y: (np.maximum(x[0], y[0]), np.maximum(x[1], y[1])),
+}
+
+
+def _enclosure(program: Program, k: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> Interval:
+    """Enclose the values on the boxes ``t in [lo, hi]``; nan where they may be undefined."""
+    near = {name: (np.nextafter(value, 0), np.nextafter(value, 4)) for name, value in (("pi", math.pi), ("e", math.e))}
+    numbers = {value: (np.float64(value), np.float64(value)) for value in program if not isinstance(value, str)}
+    ends = _run(program, _INTERVALS, {"k": (k, k), "t": (lo, hi), **near}, numbers.__getitem__)
+    return np.broadcast_to(ends[0], lo.shape), np.broadcast_to(ends[1], lo.shape)
+
+
+# ---------------------------------------------------------------------- disturbances
+
+
+class Disturbance(ABC):
+    """The disturbances of all agents; ``agents`` count from 0, so that ``k = agent + 1``."""
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """A short description, which a certificate shows."""
+
+    @abstractmethod
+    def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
+        """Return ``d_k(t)`` at instants, for agents whose sliding variables have given signs.
+
+        Parameters
+        ----------
+        t : (M,) array_like
+            Instants, in units of time.
+        agents : (A,) array_like of int
+            Counted from 0.
+        signs : (A,) array_like
+            ``sign(sigma_k)`` of these agents; only the adversary reads it.
+
+        Returns
+        -------
+        (A, M) array
+        """
+
+    @abstractmethod
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
+        """Return how ``|d_k| <= delta`` was established on [0, until] for the agents of these labels.
+
+        Parameters
+        ----------
+        delta : Fraction
+            The bound, in units of the input.
+        labels : sequence of N str
+            The agents, by which a message names them.
+        until : float
+            In units of time.
+        slack : float
+            Relative excess that is let pass, for the rounding of floats.
+
+        Returns
+        -------
+        str
+            In words: "interval arithmetic", "by definition", ...
+
+        Raises
+        ------
+        ParameterError
+            Names agent, time and value where the bound is broken, or the numbers of signals and agents that differ.
+        """
+
+    def breaks(self, until: float) -> np.ndarray:
+        """Return the ascending instants in (0, until) where a signal or its slope may jump; none by default.
+
+        Parameters
+        ----------
+        until : float
+            In units of time.
+
+        Returns
+        -------
+        (B,) array
+        """
+        return np.empty(0)
+
+    def linear(self, t0: float, t1: float, agents: ArrayLike, signs: ArrayLike) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return ``a`` and ``b`` (A,) with ``d = a + b t`` between neighbouring breaks; None if it is not linear.
+
+        Parameters
+        ----------
+        t0, t1 : float
+            Ends of an interval without a break inside, in units of time.
+        agents : (A,) array_like of int
+            Counted from 0.
+        signs : (A,) array_like
+            ``sign(sigma_k)`` of these agents.
+
+        Returns
+        -------
+        pair of (A,) arrays, or None
+        """
+        return None
+
+
+@dataclass(frozen=True, init=False)
+class ExpressionDisturbance(Disturbance):
+    r"""Disturbances written as expressions of ``k`` and ``t``.
+
+    Known are the constants ``pi`` and ``e``, decimal numbers (the floats nearest to them), ``+ - * / **`` and
+    parentheses, which bind as in Python, and the functions sin, cos, tan, atan, tanh, exp, log, sqrt, abs, sign, min
+    and max, the last two of two or more arguments.
+
+    Parameters
+    ----------
+    text_or_texts : str or sequence of str
+        One expression for all agents, or one for each; at most 1,000 characters and 50 levels of nesting.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        The expressions, blanks aside.
+    common : bool
+        Whether one expression is for all agents.
+
+    Raises
+    ------
+    ParameterError
+        Names the column of what is not of this grammar.
+
+    Examples
+    --------
+    >>> d = ExpressionDisturbance("0.2*sin(2*k*t + pi/3)")
+    >>> d.values([0.0, 1.0], [0, 1], [1, -1]).round(4)
+    array([[ 0.1732,  0.0189],
+           [ 0.1732, -0.1889]])
+    >>> d.check(Fraction(1, 5), ["a", "b"], until=3.0)
+    'interval arithmetic'
+    >>> print(d.latex())
+    0.2 \sin\left(2 k t + \frac{\pi}{3}\right)
+    """
+
+    texts: tuple[str, ...]
+    common: bool
+    _programs: dict[str, Program] = field(repr=False, compare=False)
+
+    def __init__(self, text_or_texts: str | Sequence[str]):
+        common = isinstance(text_or_texts, str)
+        texts = [text_or_texts] if common else list(text_or_texts)
+        if not texts or not all(isinstance(text, str) for text in texts):
+            raise ParameterError("a disturbance is one text, or one text for each agent")
+        programs = {text: _parse(text) for text in dict.fromkeys(map(str, texts))}
+        object.__setattr__(self, "texts", tuple(" ".join(str(text).split()) for text in texts))
+        object.__setattr__(self, "common", common)
+        object.__setattr__(self, "_programs", {" ".join(text.split()): program for text, program in programs.items()})
+
+    @property
+    def text(self) -> str:
+        """The expression, or the first 400 characters of all expressions."""
+        return self.texts[0] if self.common else shorten("; ".join(self.texts), 400)
+
+    def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike = ()) -> np.ndarray:
+        """Return ``d_k(t)``: floats (A, M), infinite or nan where the expression is; ``signs`` does not matter."""
+        instants, agents = np.asarray(t, dtype=float), np.asarray(agents, dtype=int)
+        values = np.empty((agents.size, instants.size))
+        for text, rows in self._groups(agents):
+            values[rows] = _floats(self._programs[text], agents[rows, None] + 1.0, instants[None, :])
+        return values
+
+    def casadi(self, t: ca.SX | ca.MX, agent: int) -> ca.SX | ca.MX:
+        """Return the CasADi expression of the symbol ``t`` for ``agent`` (from 0), of the type of ``t``."""
+        number = type(t)
+        return self._symbolic(agent, {"k": number(agent + 1), "t": t, "pi": number(math.pi), "e": number(math.e)})
+
+    def latex(self, agent: int = 0) -> str:
+        """Return the LaTeX of the common expression, or of that of ``agent`` (counted from 0).
+
+        Raises
+        ------
+        ParameterError
+            The expression holds a number that is not finite, or a chain of operations too long to be printed.
+        """
+        import casadi as ca
+
+        try:
+            return to_latex(self._symbolic(agent, {name: ca.SX.sym(name) for name in _ATOMS}))
+        except RecursionError:
+            raise ParameterError(f'disturbance "{shorten(self.text)}" is too long to be printed as LaTeX') from None
+
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
+        """Bisect boxes of time until intervals enclose ``d`` in ``[-delta, delta]``; where that fails, sample it.
+
+        Returns
+        -------
+        str
+            "interval arithmetic" or "sampling at 20,000 instants".
+
+        Raises
+        ------
+        ParameterError
+            Names agent, time and value where the bound is broken, or where no bound can be given.
+        """
+        if not self.common:
+            _refuse_other_count(len(self.texts), "expressions", labels)
+        budget, sampled = _BOXES, False
+        for text, agents in self._groups(np.arange(len(labels))):
+            if "k" not in self._programs[text]:
+                agents = agents[:1]
+            for start in range(0, agents.size, _CHUNK):
+                chunk = agents[start : start + _CHUNK]
+                budget, by_samples = self._check_boxes(text, chunk, _Limit(delta, slack), labels, until, budget)
+                sampled |= by_samples
+        return f"sampling at {_INSTANTS:,} instants" if sampled else "interval arithmetic"
+
+    def _groups(self, agents: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """Return each expression with the indices of the agents that it belongs to."""
+        groups: dict[str, list[int]] = {}
+        for row, agent in enumerate(agents):
+            groups.setdefault(self.texts[0 if self.common else agent], []).append(row)
+        return [(text, np.array(rows)) for text, rows in groups.items()]
+
+    def _symbolic(self, agent: int, atoms: dict[str, Any]) -> Any:
+        import casadi as ca
+
+        names = {"abs": "fabs", "min": "fmin", "max": "fmax"}
+        algebra = {name: getattr(ca, names.get(name, name)) for name in _FUNCTIONS}
+        algebra |= {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+        algebra |= {"**": operator.pow, "neg": operator.neg}
+        return _run(self._programs[self.texts[0 if self.common else agent]], algebra, atoms, type(atoms["t"]))
+
+    def _check_boxes(
+        self, text: str, agents: np.ndarray, limit: _Limit, labels: Sequence[str], until: float, budget: int
+    ) -> tuple[int, bool]:
+        """Return the number of boxes left to spend, and whether samples had to do."""
+        program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', limit.bound
+
+        def sample(k: np.ndarray, t: np.ndarray) -> None:
+            _refuse_beyond(_floats(program, k + 1.0, t), t, k, limit, labels, place)
+
+        sample(agents[:, None], np.linspace(0, until, 2 * _CELLS + 1)[None, :])
+        edges, sampled = np.linspace(0, until, _CELLS + 1), False
+        k, lo, hi = np.repeat(agents, _CELLS), np.tile(edges[:-1], agents.size), np.tile(edges[1:], agents.size)
+        for level in range(_BISECTIONS + 1):
+            ends = _enclosure(program, k + 1.0, lo, hi)
+            size = np.maximum(-ends[0], ends[1])
+            left = ~(size <= bound)
+            if level == _BISECTIONS or 2 * left.sum() > budget:
+                sampled |= bool((left & np.isfinite(size)).any())
+                left &= ~np.isfinite(size)
+            if not left.any():
+                break
+            k, lo, hi = k[left], lo[left], hi[left]
+            if level == _BISECTIONS or 2 * k.size > _BOXES:  # unbounded ones may overspend: they are few
+                where = f"agent {shorten(labels[k[0]])}, t = {lo[0]:.9g}"
+                mend = "is it undefined there? keep clear of divisions by zero, or write sqrt(max(0, ...))"
+                raise ParameterError(f"{place}: no bound can be given near {where}; {mend}")
+            middle = (lo + hi) / 2
+            sample(k, middle)
+            k, lo, hi = np.tile(k, 2), np.concatenate([lo, middle]), np.concatenate([middle, hi])
+            budget -= k.size
+        if sampled:
+            # Not on a lattice, which a fast signal could hide between.
+            sample(agents[:, None], np.sort(np.random.default_rng(_INSTANTS).uniform(0, until, _INSTANTS))[None, :])
+        return budget, sampled
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class SampledDisturbance(Disturbance):
+    """Disturbances given at instants, linear between them, constant before the first and after the last.
+
+    Parameters
+    ----------
+    times : (M,) array_like
+        Ascending, not negative; in units of time.
+    values : (M,) or (N, M) array_like
+        Common to all agents, or one row for each; in units of the input.
+    hold : bool
+        Keep each value until the next instant instead.
+    text : str, optional
+        The description.
+
+    Attributes
+    ----------
+    samples : (1, M) or (N, M) array
+        The values, one row for each signal.
+
+    Raises
+    ------
+    ParameterError
+        The shapes do not fit, a number is not finite, or the times do not ascend.
+
+    Examples
+    --------
+    >>> d = SampledDisturbance([0, 1, 3], [0, 1, -1])
+    >>> d.values([0.5, 2.0, 9.0], [0], [1])
+    array([[ 0.5,  0. , -1. ]])
+    >>> d.linear(1, 3, [0], [1])
+    (array([2.]), array([-1.]))
+    """
+
+    times: np.ndarray
+    samples: np.ndarray
+    hold: bool
+    text: str = ""
+
+    def __init__(self, times: ArrayLike, values: ArrayLike, hold: bool = False, text: str = ""):
+        try:
+            instants, samples = np.array(times, dtype=float), np.array(values, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            raise ParameterError(
+                "a sampled disturbance needs arrays of numbers: times (M,) and values (N, M)"
+            ) from None
+        shape = samples.shape
+        samples = samples[None] if samples.ndim == 1 else samples
+        if instants.ndim != 1 or samples.ndim != 2 or not samples.size or samples.shape[1] != instants.size:
+            shapes = f"times {instants.shape} and values {shape}"
+            raise ParameterError(f"a sampled disturbance needs times (M,) and values (M,) or (N, M), not {shapes}")
+        if not np.isfinite(samples).all():
+            row, column = np.argwhere(~np.isfinite(samples))[0]
+            raise ParameterError(
+                f"sample {column + 1} of signal {row + 1} is {samples[row, column]}; give a finite number"
+            )
+        if not np.isfinite(instants).all() or instants[0] < 0 or (np.diff(instants) <= 0).any():
+            raise ParameterError("the times of a sampled disturbance must be finite, not negative and ascending")
+        between = "held" if hold else "linear between"
+        parts = {"times": instants, "samples": samples, "hold": bool(hold)}
+        for name, part in (parts | {"text": text or f"{instants.size} samples, {between}"}).items():
+            object.__setattr__(self, name, part)
+        instants.flags.writeable = samples.flags.writeable = False
+
+    def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike = ()) -> np.ndarray:
+        """Return ``d_k(t)``: floats (A, M); ``signs`` does not matter."""
+        t, rows = np.asarray(t, dtype=float), self._rows(agents)
+        index = self._index(t)
+        if self.hold or self.times.size == 1:
+            return rows[:, index]
+        index = np.minimum(index, self.times.size - 2)
+        share = np.clip((t - self.times[index]) / (self.times[index + 1] - self.times[index]), 0, 1)
+        return rows[:, index] * (1 - share) + rows[:, index + 1] * share
+
+    def breaks(self, until: float) -> np.ndarray:
+        """Return the instants of the samples in (0, until)."""
+        return self.times[(self.times > 0) & (self.times < until)]
+
+    def linear(self, t0: float, t1: float, agents: ArrayLike, signs: ArrayLike = ()) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``a`` and ``b`` (A,) with ``d = a + b t`` on [t0, t1], which holds no break inside."""
+        middle, rows = (t0 + t1) / 2, self._rows(agents)
+        i = int(self._index(middle))
+        if self.hold or middle < self.times[0] or i == self.times.size - 1:
+            return rows[:, i], np.zeros(len(rows))
+        with np.errstate(over="ignore"):
+            slope = (rows[:, i + 1] - rows[:, i]) / (self.times[i + 1] - self.times[i])
+        slope[~np.isfinite(slope)] = 0.0
+        return rows[:, i] - slope * self.times[i], slope
+
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
+        """Compare all samples on [0, until], and the values at both ends, with ``delta``."""
+        if len(self.samples) > 1:
+            _refuse_other_count(len(self.samples), "signals", labels)
+        agents = np.arange(len(self.samples))
+        instants = np.unique(np.concatenate([[0.0], self.breaks(until), [until]]))
+        for start in range(0, agents.size, _CHUNK):
+            chunk = agents[start : start + _CHUNK]
+            values = self.values(instants, chunk)
+            place = f"disturbance ({shorten(self.text)})"
+            _refuse_beyond(values, instants, chunk[:, None], _Limit(delta, slack), labels, place)
+        return "exact at the samples"
+
+    def _rows(self, agents: ArrayLike) -> np.ndarray:
+        agents = np.asarray(agents, dtype=int)
+        return self.samples[np.zeros_like(agents) if len(self.samples) == 1 else agents]
+
+    def _index(self, t: Any) -> Any:
+        return np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0)
+
+
+def telegraph_noise(amplitude: float, rate: float, n: int, until: float, seed: int = 0) -> SampledDisturbance:
+    """Return random telegraph signals: ``+-amplitude``, switching at the instants of independent Poisson processes.
+
+    Parameters
+    ----------
+    amplitude, rate : float
+        Not negative; ``amplitude`` in units of the input, ``rate`` is the mean number of switches of one agent per
+        unit of time.
+    n : int
+        Number of agents.
+    until : float
+        Positive, in units of time; the signals keep their last values from here on.
+    seed : int
+        Equal seeds give equal signals.
+
+    Returns
+    -------
+    SampledDisturbance
+        Constant between its switches.
+
+    Raises
+    ------
+    ParameterError
+        A parameter is outside its domain, or more than 10^6 switches or 2 10^7 samples are to be expected.
+
+    Examples
+    --------
+    >>> noise = telegraph_noise(0.5, rate=10, n=2, until=1.0, seed=1)
+    >>> abs(noise.values([0.0, 0.9], [0, 1]))
+    array([[0.5, 0.5],
+           [0.5, 0.5]])
+    """
+    amplitude, rate, until = (
+        _number(value, name) for value, name in ((amplitude, "amplitude"), (rate, "rate"), (until, "until"))
+    )
+    if amplitude < 0 or rate < 0 or until <= 0 or n < 1 or seed < 0:
+        raise ParameterError("telegraph signals need amplitude, rate, seed >= 0, until > 0 and at least one agent")
+    expected = n * rate * until
+    if expected > MAX_SWITCHES or n * expected > MAX_SAMPLES:
+        limit = f"the limits are {MAX_SWITCHES:,} switches and {MAX_SAMPLES:,} samples, one of each agent at each"
+        raise ParameterError(f"{expected:.3g} switches of {n} telegraph signals are too many; {limit}; lower rate")
+    random = np.random.default_rng(seed)
+    agents = np.repeat(np.arange(n), random.poisson(rate * until, size=n))
+    times, columns = np.unique(np.append(random.uniform(0, until, agents.size), 0.0), return_inverse=True)
+    signals = np.ones((n, times.size))
+    signals[:, 0] = amplitude * random.choice([-1.0, 1.0], size=n)
+    np.multiply.at(signals, (agents, columns[:-1]), -1.0)
+    np.cumprod(signals, axis=1, out=signals)
+    text = f"random telegraph signals, +-{amplitude:g}, rate {rate:g}, seed {seed}"
+    return SampledDisturbance(times, signals, hold=True, text=text)
+
+
+@dataclass(frozen=True, init=False)
+class Adversary(Disturbance):
+    """The worst disturbance against reaching: ``d_k = delta sign(sigma_k)``, zero while sliding.
+
+    Parameters
+    ----------
+    delta : int, float, str or Fraction
+        Not negative; in units of the input.
+
+    Attributes
+    ----------
+    text : str
+        The description.
+
+    Raises
+    ------
+    ParameterError
+        ``delta`` is negative or not a number.
+
+    References
+    ----------
+    Equation (49) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances: of all ``|d_k| <= delta`` this one makes ``|sigma_k|'`` largest.
+
+    Examples
+    --------
+    >>> Adversary("1/2").values([0.0, 1.0], [0, 1], [1, -1])
+    array([[ 0.5,  0.5],
+           [-0.5, -0.5]])
+    """
+
+    delta: Fraction
+    text: str = field(default="adversary: delta sign(sigma_k)", init=False, repr=False)
+
+    def __init__(self, delta: Exact):
+        object.__setattr__(self, "delta", _exact(delta, "delta"))
+        if self.delta < 0:
+            raise ParameterError(f"delta of the adversary is {float(self.delta):g}; give zero or more")
+
+    def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
+        """Return ``delta sign(sigma_k)``: floats (A, M)."""
+        return np.outer(self.linear(0, 0, agents, signs)[0], np.ones(np.size(t)))
+
+    def linear(self, t0: float, t1: float, agents: ArrayLike, signs: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``a = delta sign(sigma_k)`` and ``b = 0``."""
+        level = nearest_float(self.delta) * np.asarray(signs, dtype=float)
+        return level, np.zeros(level.size)
+
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
+        """Compare the adversary's ``delta`` with that of the protocol."""
+        if self.delta > delta:
+            value, limit = nearest_float(self.delta), nearest_float(delta)
+            raise ParameterError(
+                f"the adversary's |d_k| = {value!r} of agent {shorten(labels[0])} from t = 0 on is beyond "
+                f"delta = {limit!r}; make the adversary with that delta"
+            )
+        return "by definition"
+
+
+@dataclass(frozen=True)
+class StateDependent(Disturbance):
+    """A disturbance computed by a Python function of time and state.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(t, x, sigma)`` of a float and two arrays (N,) returns an array (N,) or a number.
+    text : str
+        The description.
+
+    Examples
+    --------
+    >>> d = StateDependent(lambda t, x, sigma: 0.1 * np.cos(x))
+    >>> d.at(0.0, np.zeros(2), np.zeros(2), Fraction(1, 10), ["a", "b"])
+    array([0.1, 0.1])
+    """
+
+    function: Callable[[float, np.ndarray, np.ndarray], ArrayLike]
+    text: str = "state-dependent (Python)"
+
+    def at(
+        self,
+        t: float,
+        x: np.ndarray,
+        sigma: np.ndarray,
+        delta: Fraction,
+        labels: Sequence[str],
+        slack: float = TOLERANCE,
+    ) -> np.ndarray:
+        """Return the disturbances at one instant.
+
+        Parameters
+        ----------
+        t : float
+            In units of time.
+        x, sigma : (N,) arrays
+            States and sliding variables.
+        delta : Fraction
+            The bound, in units of the input.
+        labels : sequence of N str
+            The agents, by which a message names them.
+        slack : float
+            Relative excess that is let pass, for the rounding of floats.
+
+        Returns
+        -------
+        (N,) array
+
+        Raises
+        ------
+        ParameterError
+            The function does not return N numbers; or names agent, time and value beyond ``delta``.
+        """
+        given = self.function(t, x, sigma)
+        try:
+            values = np.array(given, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            raise ParameterError(f"{self.text} at t = {t:.9g}: {shorten(repr(given))} is no array of numbers") from None
+        if values.shape not in ((), (len(labels),)):
+            wanted = f"return a number or shape ({len(labels)},)"
+            raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {wanted}")
+        values = np.broadcast_to(values, (len(labels),))
+        limit, agents = _Limit(delta, slack), np.arange(len(labels))
+        _refuse_beyond(values, np.array(t), agents, limit, labels, f"disturbance ({self.text})")
+        return values
+
+    def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
+        """Refuse: without the state there is no value; use :meth:`at`.
+
+        Raises
+        ------
+        ParameterError
+            Always.
+        """
+        raise ParameterError(f"{self.text}: a disturbance that depends on the state has no values without it; use at")
+
+    def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
+        """Leave the check to :meth:`at`."""
+        return "at every evaluation of the run"
+
+
+def as_disturbance(value: Any, n: int, delta: Exact, until: float, seed: int = 0) -> Disturbance:
+    """Read a disturbance of ``n`` agents.
+
+    Parameters
+    ----------
+    value : Disturbance, str, number, callable or sequence
+        An expression of ``k`` and ``t``; "none"; "adversary"; "telegraph" (amplitude ``delta``, 20 switches of each
+        agent to be expected until ``until``); a constant; ``n`` expressions or constants; or a function of
+        ``(t, x, sigma)``.
+    n : int
+        Number of agents.
+    delta : int, float, str or Fraction
+        The bound of the protocol.
+    until : float
+        End of the horizon.
+    seed : int
+        Of the telegraph signals.
+
+    Raises
+    ------
+    ParameterError
+        ``value`` is none of these, or not of ``n`` items.
+
+    Examples
+    --------
+    >>> as_disturbance("adversary", 2, "0.1", 1.0).text
+    'adversary: delta sign(sigma_k)'
+    >>> as_disturbance([0.1, "1/3"], 2, 1, 1.0)
+    Traceback (most recent call last):
+    ...
+    ptcc_certify.errors.ParameterError: texts and numbers are mixed; write the numbers as texts too
+    """
+    if isinstance(value, Disturbance):
+        return value
+    if isinstance(value, str):
+        word = value.strip()
+        if word == "none":
+            return SampledDisturbance([0], [0], text="none")
+        if word == "adversary":
+            return Adversary(delta)
+        if word == "telegraph":
+            horizon = _number(until, "until")
+            rate = 20 / horizon if horizon > 0 else 0.0
+            return telegraph_noise(nearest_float(_exact(delta, "delta")), rate, n, horizon, seed)
+        return ExpressionDisturbance(value)
+    if callable(value):
+        return StateDependent(value)
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
+        items = list(value)
+        if len(items) != n:
+            raise ParameterError(f"{len(items)} disturbances for {n} agents; give one for each, or one for all")
+        texts = sum(isinstance(item, str) for item in items)
+        if 0 < texts < n:
+            raise ParameterError("texts and numbers are mixed; write the numbers as texts too")
+        if texts:
+            return ExpressionDisturbance(items)
+        levels = [[_number(item, f"disturbance of agent {i}")] for i, item in enumerate(items, 1)]
+        return SampledDisturbance([0], levels, text="constant")
+    level = _number(value, "the disturbance")
+    return SampledDisturbance([0], [level], text=f"constant {level!r}")
+
+
+def _exact(value: Any, name: str) -> Fraction:
+    try:
+        return as_fraction(value, name)
+    except NumberError as error:
+        raise ParameterError(f"{error}; give a finite number, or a text such as 0.1*sin(t)") from None
+
+
+def _number(value: Any, name: str) -> float:
+    number = nearest_float(_exact(value, name))
+    if math.isinf(number):
+        raise ParameterError(f"{name} is beyond the range of floats; give a smaller number")
+    return number
+
+
+class _Limit(NamedTuple):
+    """The bound of a disturbance, and how far floats may exceed it, relatively."""
+
+    delta: Fraction
+    slack: float
+
+    @property
+    def bound(self) -> float:
+        return nearest_float(self.delta) * (1 + self.slack)
+
+
+def _refuse_other_count(count: int, what: str, labels: Sequence[str]) -> None:
+    if count != len(labels):
+        raise ParameterError(f"the disturbance has {count} {what} for {len(labels)} agents; give one for each")
+
+
+def _refuse_beyond(
+    values: np.ndarray, t: np.ndarray, agents: np.ndarray, limit: _Limit, labels: Sequence[str], place: str
+) -> None:
+    """Refuse values that are not finite or beyond ``delta``; the three arrays broadcast."""
+    size = np.where(np.isfinite(values), np.abs(values), np.inf)
+    worst = int(size.argmax())
+    if size.flat[worst] <= limit.bound:
+        return
+    agent, instant = (np.broadcast_to(array, size.shape).flat[worst] for array in (agents, t))
+    value, delta = float(values.flat[worst]), nearest_float(limit.delta)
+    where = f"{place} of agent {shorten(labels[agent])} at t = {float(instant):.9g}"
+    if not math.isfinite(value):
+        raise ParameterError(f"{where} is {value}, not finite; keep clear of poles and of the ends of domains")
+    raise ParameterError(f"{where} is {value!r}, beyond delta = {delta!r}; lower it or raise delta")

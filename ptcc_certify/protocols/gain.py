@@ -1,0 +1,307 @@
+"""The time-varying gain of the prescribed-time protocols, and the stretched clock that it drives.
+
+    phi(t)  = (T/(T - t))^kappa  on [0, T),  1 from T on
+    gain(t) = rho1 + rho2 phi'/phi = rho1 + rho2 kappa/(T - t)  on [0, T),  rho1 from T on
+    s(t)    = integral of the gain = rho1 t + rho2 kappa ln(T/(T - t)),  infinite from T on
+
+``tau = -ln(1 - t/T)`` resolves the last instants before the deadline, which ``t`` itself cannot: a float ``t`` comes
+no nearer to ``T`` than ``1 - t/T = 1e-16``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import Exact
+from ptcc_certify.graphs.rationals import as_fraction, shorten
+from ptcc_certify.protocols.latex import to_latex
+
+if TYPE_CHECKING:
+    import casadi as ca
+    from numpy.typing import ArrayLike
+
+_PARAMETERS = ("T", "rho1", "rho2", "kappa")
+_SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
+#: Bits of the longest parameter, whose products are written in certificates.
+LONGEST_BITS = 3000
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class Gain:
+    r"""``gain(t) = rho1 + rho2 kappa/(T - t)`` before the deadline ``T``, ``rho1`` from there on.
+
+    With ``rho2 = 0`` the gain is ``rho1`` for ever: the asymptotic baseline without a deadline.
+
+    Parameters
+    ----------
+    T, rho1, kappa : int, float, str or Fraction
+        Positive; a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in 1/time/weight.
+    rho2 : int, float, str or Fraction
+        Not negative, 1/weight.
+
+    Raises
+    ------
+    ParameterError
+        Names the parameter, its value and its domain.
+
+    References
+    ----------
+    Lemma 6 and equation (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> gain = Gain(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
+    >>> gain.value([0, 0.3, 0.6]).round(12)
+    array([0.6, 1.1, 0.1])
+    >>> print(gain.latex())
+    \begin{cases} 0.1 + \frac{0.3}{0.6 - t}, & t < 0.6 \\ 0.1, & t \ge 0.6 \end{cases}
+    """
+
+    T: Fraction
+    rho1: Fraction
+    rho2: Fraction
+    kappa: Fraction
+
+    def __init__(self, T: Exact, rho1: Exact, rho2: Exact, kappa: Exact):
+        for name, given in (("T", T), ("rho1", rho1), ("rho2", rho2), ("kappa", kappa)):
+            object.__setattr__(self, name, parameter(name, given, zero_allowed=name == "rho2"))
+        for name, value in (("rho1 T", self.rho1 * self.T), ("rho2 kappa", self.pole), ("rho2 kappa/T", self._peak)):
+            _refuse_out_of_range(name, value)
+
+    @property
+    def pole(self) -> Fraction:
+        """``rho2 kappa``, the strength of the pole at ``T``: the two enter the gain only as this product."""
+        return self.rho2 * self.kappa
+
+    @property
+    def _peak(self) -> Fraction:
+        return self.pole / self.T
+
+    # ------------------------------------------------------------------ numbers
+
+    def phi(self, t: ArrayLike) -> np.ndarray:
+        """Return ``phi(t) = (T/(T - t))^kappa`` on [0, T), 1 from T on; floats of the shape of ``t``."""
+        q = self._remaining(t)
+        with np.errstate(over="ignore"):
+            return np.where(q > 0, np.where(q > 0, q, 1) ** -float(self.kappa), 1.0)
+
+    def value(self, t: ArrayLike) -> np.ndarray:
+        """Return the gain at ``t``; floats of the shape of ``t``."""
+        return self.value_at_remaining(self._remaining(t))
+
+    def value_at_remaining(self, q: ArrayLike) -> np.ndarray:
+        """Return the gain where ``1 - t/T = q``, however small; ``rho1`` where ``q <= 0``."""
+        q = np.asarray(q, dtype=float)
+        with np.errstate(over="ignore"):
+            return float(self.rho1) + np.where(q > 0, float(self._peak) / np.where(q > 0, q, 1), 0.0)
+
+    def clock(self, t: ArrayLike) -> np.ndarray:
+        """Return ``s(t) = rho1 t + rho2 kappa ln(T/(T - t))``, infinite from ``T`` on unless ``rho2 = 0``."""
+        t = np.asarray(t, dtype=float)
+        return float(self.rho1) * t + (float(self.pole) * self.tau(t) if self.rho2 else 0.0)
+
+    def clock_at_tau(self, tau: ArrayLike) -> np.ndarray:
+        """Return ``s = rho1 T (1 - e^-tau) + rho2 kappa tau``, the clock at ``t = T (1 - e^-tau)``."""
+        return float(self.rho1) * self.time_at_tau(tau) + (float(self.pole) * np.asarray(tau) if self.rho2 else 0.0)
+
+    def clock_at_remaining(self, q: ArrayLike) -> np.ndarray:
+        """Return the clock where ``1 - t/T = q``, accurate for ``q`` far below the resolution of ``t``.
+
+        Examples
+        --------
+        >>> Gain(1, 1, 1, 1).clock_at_remaining(1e-100).round(6)
+        np.float64(231.258509)
+        """
+        with np.errstate(divide="ignore"):
+            return self.clock_at_tau(-np.log(np.asarray(q, dtype=float)))
+
+    def tau(self, t: ArrayLike) -> np.ndarray:
+        """Return ``tau = -ln(1 - t/T)``, infinite from ``T`` on."""
+        share = np.minimum(np.asarray(t, dtype=float) / float(self.T), 1)
+        with np.errstate(divide="ignore"):
+            return -np.log1p(-share)
+
+    def time_at_tau(self, tau: ArrayLike) -> np.ndarray:
+        """Return ``t = T (1 - e^-tau)``."""
+        return -float(self.T) * np.expm1(-np.asarray(tau, dtype=float))
+
+    def clock_rate(self, tau: ArrayLike) -> np.ndarray:
+        """Return ``ds/dtau = rho1 T e^-tau + rho2 kappa``: smooth, where the gain itself has a pole."""
+        return float(self.rho1 * self.T) * np.exp(-np.asarray(tau, dtype=float)) + float(self.pole)
+
+    def _remaining(self, t: ArrayLike) -> np.ndarray:
+        return 1 - np.asarray(t, dtype=float) / float(self.T)
+
+    # ------------------------------------------------------------------ expressions
+
+    def expression(self, t: ca.SX) -> ca.SX:
+        """Return the gain as a CasADi expression of the symbol ``t``."""
+        return self._gain(t, self._numbers())
+
+    def phi_expression(self, t: ca.SX) -> ca.SX:
+        """Return ``phi`` as a CasADi expression of the symbol ``t``."""
+        return self._phi(t, self._numbers())
+
+    def clock_expression(self, t: ca.SX) -> ca.SX:
+        """Return the clock ``s`` as a CasADi expression of the symbol ``t``."""
+        return self._clock(t, self._numbers())
+
+    def latex(
+        self,
+        of: Literal["gain", "phi", "clock"] = "gain",
+        *,
+        numbers: bool = True,
+        letters: Iterable[str] = _PARAMETERS,
+    ) -> str:
+        r"""Return the LaTeX of the expression itself, with the parameters as numbers or as letters.
+
+        Parameters
+        ----------
+        of : {"gain", "phi", "clock"}
+        numbers : bool
+            Print the values of the parameters; otherwise their letters.
+        letters : four str
+            What to call ``T``, ``rho1``, ``rho2`` and ``kappa``, for a gain whose parameters are called otherwise.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ParameterError
+            ``of`` is another word.
+
+        Examples
+        --------
+        >>> print(Gain(1, 1, 1, 1).latex("clock", numbers=False))
+        \begin{cases} \rho_{1} t + \rho_{2} \kappa \ln\left(\frac{T}{T - t}\right), & t < T \\ \infty, & t \ge T \end{cases}
+        """  # noqa: E501
+        import casadi as ca
+
+        forms = {"gain": self._gain, "phi": self._phi, "clock": self._clock}
+        if of not in forms:
+            raise ParameterError(f'LaTeX of "{shorten(str(of))}" is unknown; use "gain", "phi" or "clock"')
+        parameters = (
+            self._numbers()
+            if numbers
+            else {name: ca.SX.sym(letter) for name, letter in zip(_PARAMETERS, letters, strict=True)}
+        )
+        return to_latex(forms[of](ca.SX.sym("t"), parameters))
+
+    def _numbers(self) -> dict[str, Any]:
+        return {name: float(getattr(self, name)) for name in _PARAMETERS}
+
+    def _gain(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
+        import casadi as ca
+
+        if not self.rho2:
+            return ca.SX(p["rho1"])
+        return ca.if_else(t < p["T"], p["rho1"] + p["rho2"] * p["kappa"] / (p["T"] - t), p["rho1"])
+
+    def _phi(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
+        import casadi as ca
+
+        return ca.if_else(t < p["T"], (p["T"] / (p["T"] - t)) ** p["kappa"], 1)
+
+    def _clock(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
+        import casadi as ca
+
+        if not self.rho2:
+            return p["rho1"] * t
+        return ca.if_else(
+            t < p["T"], p["rho1"] * t + p["rho2"] * p["kappa"] * ca.log(p["T"] / (p["T"] - t)), float("inf")
+        )
+
+    def __repr__(self) -> str:
+        return f"Gain({parameters_text(self, _PARAMETERS)})"
+
+
+def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Exact, kappa: Exact) -> np.ndarray:
+    """Return the bound ``phi(t)^-b e^(-a t) V0`` on [0, T), 0 from ``T`` on.
+
+    It holds for every ``V >= 0`` with ``V' <= -a V - b (phi'/phi) V``, with equality where that is an equality.
+    Lemma 6 of the paper asks for ``kappa > 2``; ``kappa > 0`` is enough.
+
+    Parameters
+    ----------
+    V0, t : float or array of any shapes
+        Broadcast against each other; ``t >= 0`` in units of time.
+    a, b : float
+        Positive; 1/time and 1.
+    T, kappa : int, float, str or Fraction
+        Positive; ``T`` in units of time.
+
+    Returns
+    -------
+    array
+        Of the shape to which ``V0`` and ``t`` broadcast, in units of ``V0``.
+
+    Raises
+    ------
+    ParameterError
+        ``a``, ``b``, ``T`` or ``kappa`` is not positive and finite.
+
+    Examples
+    --------
+    >>> prescribed_time_bound(8.0, 1e-9, 3, [0, 0.5, 1, 2], T=1, kappa=1).round(6)
+    array([8., 1., 0., 0.])
+    """
+    rates = {"a": a, "b": b, "T": T, "kappa": kappa}
+    decay, power, deadline, exponent = (float(parameter(name, value)) for name, value in rates.items())
+    t = np.asarray(t, dtype=float)
+    q = np.maximum(1 - t / deadline, 0)
+    return np.asarray(V0, dtype=float) * q ** (exponent * power) * np.exp(-decay * t)
+
+
+def parameters_text(owner: object, names: Iterable[str]) -> str:
+    """Return ``name=value, ...`` of rational attributes, for a readable ``repr``."""
+    return ", ".join(f"{name}={readable(getattr(owner, name))}" for name in names)
+
+
+def readable(value: Fraction) -> str:
+    """Write a rational as short as it can be read back exactly: a float's decimals, or ``p/q``.
+
+    Examples
+    --------
+    >>> readable(Fraction(0.6)), readable(Fraction(3, 5)), readable(Fraction(2))
+    ('0.6', '3/5', '2')
+    """
+    if value.denominator != 1 and Fraction(float(value)) == value:
+        return repr(float(value))
+    return shorten(str(value))
+
+
+def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
+    """Return a parameter as an exact rational, or refuse it by name.
+
+    Examples
+    --------
+    >>> parameter("mu1", "1.2")
+    Fraction(6, 5)
+    """
+    domain = ">= 0" if zero_allowed else "> 0"
+    try:
+        value = as_fraction(given, name)
+    except NumberError:
+        raise ParameterError(
+            f"{name} = {shorten(str(given))} is not a finite number; {name} must be a number {domain}"
+        ) from None
+    _refuse_out_of_range(name, value)
+    if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
+        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
+    if value < 0 or (value == 0 and not zero_allowed):
+        raise ParameterError(f"{name} = {readable(value)} is outside its domain; {name} must be {domain}")
+    return value
+
+
+def _refuse_out_of_range(name: str, value: Fraction) -> None:
+    if value and not _SMALLEST <= abs(value) <= _LARGEST:
+        raise ParameterError(f"{name} is not between 1e-300 and 1e300 in size; choose other units of time or weight")

@@ -1,0 +1,416 @@
+"""The sliding variables: when each reaches 0, how large it is until then, and what is certain about both.
+
+    sigma_k' = -mu1 sign(sigma_k) - (mu2 + mu3 kappa/(T_r - t)) sigma_k + d_k,      |d_k| <= delta < mu1
+
+A disturbance that does not depend on the states decouples them. With ``s`` the sign of ``sigma_k(0)`` and
+``psi(t) = e^(-mu2 t) ((T_r - t)/T_r)^(mu3 kappa)``,
+
+    |sigma_k(t)| = psi(t) (|sigma_k(0)| - int_0^t (mu1 - s d_k(r)) / psi(r) dr)
+
+until the bracket is 0, and 0 from there on. The integrand is positive, so the root is simple and the only one. It can
+lie nearer to ``T_r`` than a float tells: everything is computed in ``z = ln(T_r/(T_r - t))``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lmi.exact.rounding import down, float_down, near, up
+from ptcc_certify.errors import SimulationError
+from ptcc_certify.protocols.disturbance import Adversary, Disturbance
+
+if TYPE_CHECKING:
+    from ptcc_certify.protocols.nominal import SlidingModeProtocol
+
+#: Beyond this z the time is T_r to the last bit of a float.
+LAST_Z = 40.0
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(15)
+# Panels times agents at most, but so many panels in any case; panels times agents at a time.
+_MAX_PANELS = 200_000
+_LEAST_PANELS = 3000
+_BATCH = 200_000
+_BITS = (96, 256, 1024, 4096)
+#: By how much a sum of panels, or a decay, may be off, relative to the start.
+SUM_ERROR = 1e-12
+_LARGEST_Z = Fraction(2) ** 1000
+
+
+# ---------------------------------------------------------------------- what is certain
+
+
+@dataclass(frozen=True)
+class ReachingTime:
+    """A proved reaching time: whatever the disturbance, ``sigma_k = 0`` from this instant on.
+
+    Attributes
+    ----------
+    deadline : Fraction
+        ``T_r``, in units of time.
+    z : Fraction or None
+        ``ln(T_r/(T_r - t))`` of the instant; None where only ``T_r`` itself is certain.
+
+    References
+    ----------
+    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances, bounds the norm of all sliding variables; each by itself follows from their equation (49).
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3="1/2", delta=1)
+    >>> small, large = certified_reaching_times(p, [Fraction(1), Fraction(100)])
+    >>> small.time < 1, large.time, large.z is None  # the adversary keeps the large one away from 0 until T_r
+    (True, 1.0, True)
+    """
+
+    deadline: Fraction
+    z: Fraction | None
+
+    @property
+    def remaining(self) -> float:
+        """``T_r - t``, rounded down; 0 where only ``T_r`` is certain, and where it is below the range of floats."""
+        if not self.z:
+            return 0.0 if self.z is None else float_down(self.deadline)
+        z = float(min(self.z, Fraction(1000)))
+        left = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
+        return left if left > 1e-300 else 0.0
+
+    @property
+    def time(self) -> float:
+        """The instant, rounded up, at most the float nearest to ``T_r``."""
+        if self.z is None:
+            return float(self.deadline)
+        early = -float(self.deadline) * math.expm1(-float(min(self.z, Fraction(1000)))) * (1 + 1e-15)
+        return min(early, float(self.deadline))
+
+    def __repr__(self) -> str:
+        if self.z is None:
+            return f"ReachingTime(T_r = {near(self.deadline)})"
+        return f"ReachingTime({up(Fraction(self.time))}, {down(self.remaining, 3)} before T_r)"
+
+
+def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:
+    """Prove for every agent an instant from which its sliding variable is 0, whatever the disturbance.
+
+    ``|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r)`` is shown in ball arithmetic, the integral being an incomplete
+    gamma function. With ``mu3 kappa >= 1`` such a ``t < T_r`` always exists. With ``mu3 kappa < 1`` the integral is
+    finite: a large ``sigma_k(0)`` is certain to be 0 at ``T_r`` only, and the adversary attains it.
+
+    Parameters
+    ----------
+    protocol : SlidingModeProtocol
+    sigma0 : sequence of N Fraction
+
+    Returns
+    -------
+    tuple of N ReachingTime
+        Above the least provable instant by a part in 10^12, as a rule.
+
+    References
+    ----------
+    Equation (49) and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
+    (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
+    """
+    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
+    known: dict[Fraction, Fraction | None] = {Fraction(0): Fraction(0)}
+    for value, z in zip(sigma0, worst.z.tolist(), strict=True):
+        if abs(value) not in known:
+            known[abs(value)] = _least_certain(protocol, abs(value), z)
+    return tuple(ReachingTime(protocol.T_r, known[abs(value)]) for value in sigma0)
+
+
+def _least_certain(protocol: SlidingModeProtocol, size: Fraction, guess: float) -> Fraction | None:
+    """Return a ``z`` at which 0 is proved to be reached, as near to the guess as proves."""
+    if math.isfinite(guess):
+        for slack in (1e-12, 1e-9, 1e-6, 1e-3):
+            z = Fraction(guess * (1 + slack))
+            if _certainly_reached(protocol, size, z):
+                return z
+    return _bracket(protocol, size)
+
+
+def _bracket(protocol: SlidingModeProtocol, size: Fraction) -> Fraction | None:
+    """Return a ``z`` at which 0 is proved to be reached, too large by a tenth at most; None if none was found."""
+    if not size:
+        return Fraction(0)
+    # With mu3 kappa < 1 the integral is within e^(-(1 - mu3 kappa) z) of its limit.
+    power = protocol.mu3 * protocol.kappa
+    last = _LARGEST_Z if power >= 1 else min(_LARGEST_Z, 60 / (1 - power))
+    high = Fraction(1)
+    while not _certainly_reached(protocol, size, high):
+        if high >= last:
+            return None
+        high *= 2
+    while _certainly_reached(protocol, size, high / 2):
+        high /= 2
+    low = high / 2
+    while high > low * Fraction(11, 10):
+        middle = (low + high) / 2
+        low, high = (low, middle) if _certainly_reached(protocol, size, middle) else (middle, high)
+    return high
+
+
+def _certainly_reached(protocol: SlidingModeProtocol, size: Fraction, z: Fraction) -> bool:
+    """Prove ``size <= (mu1 - delta) int dr/psi`` up to the instant ``z``; False if it is wrong or not provable."""
+    import flint
+
+    bits = flint.ctx.prec
+    try:
+        for precision in _BITS:
+            flint.ctx.prec = precision
+            surplus = _ball(protocol.mu1 - protocol.delta) * inverse_decay_integral(protocol, z) - _ball(size)
+            if surplus >= 0:
+                return True
+            if surplus < 0:
+                return False
+    finally:
+        flint.ctx.prec = bits
+    return False
+
+
+def inverse_decay_integral(protocol: SlidingModeProtocol, z: Fraction) -> Any:
+    """Return ``int_0^t dr/psi(r)`` up to the instant ``z`` as a ball of python-flint, at its present precision.
+
+    With ``m = mu3 kappa`` and ``u = T_r - r`` it is ``T_r^m e^(mu2 T_r) int u^-m e^(-mu2 u) du``, a difference of upper
+    incomplete gamma functions of order ``1 - m``.
+    """
+    T, mu2, m = _ball(protocol.T_r), _ball(protocol.mu2), protocol.mu3 * protocol.kappa
+    order, whole = _ball(1 - m), mu2 * T
+    tail = (whole * (-_ball(z)).exp()).gamma_upper(order) - whole.gamma_upper(order)
+    return T * (whole ** _ball(m - 1)) * whole.exp() * tail
+
+
+def _ball(x: Fraction) -> Any:
+    import flint
+
+    return flint.arb(x.numerator) / flint.arb(x.denominator)
+
+
+# ---------------------------------------------------------------------- one run
+
+
+class ReachingProblem:
+    """The sliding variables of one run under a disturbance that does not depend on the states.
+
+    Parameters
+    ----------
+    protocol : SlidingModeProtocol
+    sigma0 : (N,) array
+    disturbance : Disturbance
+
+    Attributes
+    ----------
+    z : (N,) array
+        ``ln(T_r/(T_r - t))`` where each sliding variable reaches 0, to near machine precision; 0 for one that starts
+        there, infinite for one that is 0 at ``T_r`` only.
+
+    Raises
+    ------
+    SimulationError
+        The disturbance varies too fast to be resolved.
+    """
+
+    def __init__(self, protocol: SlidingModeProtocol, sigma0: np.ndarray, disturbance: Disturbance):
+        self._protocol, self._disturbance = protocol, disturbance
+        # Each sliding variable in units of its own start: the bracket begins at 1.
+        self._unit, self._sign = np.abs(sigma0), np.sign(sigma0)
+        self._agents = np.flatnonzero(self._sign)
+        # An adversary of the full size leaves mu1 - delta, which floats would cancel.
+        self._gap = float(protocol.mu1 - protocol.delta)
+        self._worst = isinstance(disturbance, Adversary) and disturbance.delta == protocol.delta
+        self.z = np.zeros(len(sigma0))
+        if self._agents.size:
+            largest = _bracket(protocol, Fraction(float(self._unit.max())))
+            self._end = LAST_Z if largest is None else float(min(largest, Fraction(LAST_Z)))
+            self._edges, self._steps = self._panels()
+            self._sums = np.concatenate([np.zeros((self._agents.size, 1)), np.cumsum(self._steps, axis=1)], axis=1)
+            self.z[self._agents] = [self._root(row) for row in range(self._agents.size)]
+
+    def sigma(self, z: np.ndarray) -> np.ndarray:
+        """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
+        values, sigma0 = np.zeros((self.z.size, z.size)), self._sign * self._unit
+        if not self._agents.size:
+            return values
+        for row, agent in enumerate(self._agents.tolist()):
+            before = np.flatnonzero(z < self.z[agent])
+            near = before[z[before] <= self._end]
+            panel = self._panel(z[near])
+            start = self._edges[panel]
+            spent = self._sums[row, panel] + self._integrals(start, z[near], [row])[0]
+            left = np.maximum(1 - spent, 0) * self._decay(z[near])
+            values[agent, near] = sigma0[agent] * left
+            far = before[z[before] > self._end]
+            values[agent, far] = sigma0[agent] * self._tail(row, z[far])
+        return values
+
+    def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
+        """Bound the (N, M) sizes of the sliding variables at increasing ``z >= 0``, 0 from ``certain`` (N,) on.
+
+        What is left of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
+        the certain instant, too, which nothing cancels.
+        """
+        bounds = np.zeros((self.z.size, z.size))
+        for row, agent in enumerate(self._agents.tolist()):
+            before = z < certain[agent]
+            near, far = before & (z <= self._end), before & (z > self._end)
+            panel = self._panel(z[near])
+            spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+            left = np.minimum(np.maximum(1 - spent, 0) + SUM_ERROR, 1)
+            if certain[agent] <= self._end:
+                left = np.minimum(left, self._rest(row, z[near], float(certain[agent])))
+            bounds[agent, near] = left * self._decay(z[near])
+            bounds[agent, far] = self._tail(row, z[far], SUM_ERROR)
+            bounds[agent] *= self._unit[agent] * (1 + SUM_ERROR / 2)
+        return bounds
+
+    def _rest(self, row: int, z: np.ndarray, end: float) -> np.ndarray:
+        """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision."""
+        panel, last = self._panel(z), int(self._panel(np.array([end]))[0])
+        later = np.append(np.cumsum(self._steps[row, :last][::-1])[::-1], 0.0)  # from an edge on to the last panel
+        whole = panel < last
+        own = self._integrals(z, np.where(whole, self._edges[panel + 1], end), [row])[0]
+        final = float(self._integrals(self._edges[[last]], np.array([end]), [row])[0, 0])
+        return own + np.where(whole, later[np.minimum(panel + 1, last)] + final, 0.0)
+
+    def _panel(self, z: np.ndarray) -> np.ndarray:
+        return np.clip(np.searchsorted(self._edges, z, side="right") - 1, 0, self._steps.shape[1] - 1)
+
+    def _decay(self, z: np.ndarray) -> np.ndarray:
+        return np.exp(-self._protocol.reaching_gain.clock_at_tau(z))
+
+    def _push(self, z: np.ndarray, rows: Any) -> np.ndarray:
+        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their starts."""
+        agents = self._agents[rows]
+        unit = self._unit[agents, None]
+        if self._worst:
+            return np.broadcast_to(self._gap / unit, (len(rows), z.size))
+        signs = self._sign[agents]
+        t = self._protocol.reaching_gain.time_at_tau(z)
+        d = self._disturbance.values(t, agents, signs.astype(int))
+        return (float(self._protocol.mu1) - signs[:, None] * d) / unit
+
+    def _integrals(self, a: np.ndarray, b: np.ndarray, rows: Any) -> np.ndarray:
+        """Return the (A, P) integrals of ``(mu1 - s d)/psi dt`` over panels of ``z``."""
+        half = (b - a) / 2
+        z = (a + half)[:, None] + half[:, None] * _NODES
+        push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small start
+            return (push * self._weight(z)) @ _WEIGHTS * half
+
+    def _panels(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return panel edges and the (A, P) integrals over them, refined until halving changes nothing."""
+        gain, T = self._protocol.reaching_gain, float(self._protocol.T_r)
+        fine = np.concatenate([[0.0], np.geomspace(1e-12, 1, 400) * self._end])
+        clock = gain.clock_at_tau(fine)
+        even = np.interp(np.linspace(0, clock[-1], 64 + min(int(clock[-1]), 4000)), clock, fine)
+        breaks = -np.log1p(-self._disturbance.breaks(T) / T)
+        edges = np.unique(np.concatenate([even, np.linspace(0, self._end, 65), breaks[breaks < self._end]]))
+        a, b = edges[:-1], edges[1:]
+        previous = np.full(a.size, np.inf)
+        rows = range(self._agents.size)
+        batch = max(1, _BATCH // self._agents.size)
+        most = max(_MAX_PANELS // self._agents.size, _LEAST_PANELS)
+        done: list[tuple[np.ndarray, np.ndarray]] = []
+        count = 0
+        while a.size:
+            count += min(a.size, batch)
+            if count > most:
+                raise SimulationError(
+                    "the disturbance varies too fast, or jumps too often, to be resolved before T_r; try a slower one"
+                )
+            (low, a), (high, b), (before, previous) = (np.split(part, [batch]) for part in (a, b, previous))
+            middle = (low + high) / 2
+            whole, left, right = (self._integrals(p, q, rows) for p, q in ((low, high), (low, middle), (middle, high)))
+            size = np.abs(left) + np.abs(right)
+            with np.errstate(invalid="ignore"):
+                error = np.nan_to_num(np.abs(whole - left - right) / np.where(size > 0, size, 1)).max(axis=0)
+            # Halving makes a smooth error vanish; one that only halves is rounding, if it is small, or else a jump.
+            rounding = (error <= 1e-12) & (error > before / 8)
+            fits = (error <= 4e-15) | rounding | (high - low <= 1e-13 * high)
+            done.append((low[fits], (left + right)[:, fits]))
+            split = ~fits
+            a = np.concatenate([a, low[split], middle[split]])
+            b = np.concatenate([b, middle[split], high[split]])
+            previous = np.concatenate([previous, error[split], error[split]])
+        starts = np.concatenate([part[0] for part in done])
+        order = np.argsort(starts)
+        steps = np.concatenate([part[1] for part in done], axis=1)[:, order]
+        return np.append(starts[order], self._end), steps
+
+    def _root(self, row: int) -> float:
+        """Return where the bracket of one agent vanishes."""
+        panel = int(np.searchsorted(self._sums[row, 1:], 1.0))
+        if panel == self._steps.shape[1]:
+            return self._far_root(row)
+        start, low, high = self._edges[panel], self._edges[panel], self._edges[panel + 1]
+        rest = 1 - self._sums[row, panel]
+        z = low + (high - low) * rest / max(self._steps[row, panel], rest)
+        for _ in range(100):
+            excess = float(self._integrals(np.array([start]), np.array([z]), [row])[0, 0]) - rest
+            low, high = (low, z) if excess > 0 else (z, high)
+            slope = float(self._push(np.array([z]), [row])[0, 0] * self._weight(z))
+            better = z - excess / slope if slope > 0 else math.nan
+            if not low <= better <= high:
+                better = (low + high) / 2
+            if abs(better - z) <= 4e-16 * z:
+                return float(better)
+            z = better
+        return float(z)
+
+    def _weight(self, z: np.ndarray | float) -> np.ndarray:
+        """Return ``dt/psi``, per unit of ``z``."""
+        with np.errstate(over="ignore"):
+            return np.exp(self._protocol.reaching_gain.clock_at_tau(z) - z) * float(self._protocol.T_r)
+
+    def _far_push(self, row: int) -> float:
+        """``(mu1 - s d)/psi dt/dz`` at the last instant that a float tells from ``T_r``."""
+        return float(self._push(np.array([self._end]), [row])[0, 0] * self._weight(self._end))
+
+    def _far_root(self, row: int) -> float:
+        """Beyond the last panel time stands still, and the bracket is elementary."""
+        rest = 1 - self._sums[row, -1]
+        growth = float(self._protocol.mu3 * self._protocol.kappa - 1)
+        with np.errstate(over="ignore", divide="ignore"):
+            share = float(np.divide(rest, self._far_push(row)))
+        if growth == 0:
+            return self._end + share
+        return self._end + math.log1p(growth * share) / growth if growth * share > -1 else math.inf
+
+    def _tail(self, row: int, z: np.ndarray, more: float = 0.0) -> np.ndarray:
+        rest = min(1 - self._sums[row, -1] + more, 1.0)
+        growth, beyond = float(self._protocol.mu3 * self._protocol.kappa - 1), z - self._end
+        # psi first: what it multiplies may leave the range of floats.
+        with np.errstate(over="ignore", invalid="ignore"):
+            grown = np.expm1(growth * beyond) / growth if growth else beyond
+            left = self._decay(z) * np.maximum(rest - self._far_push(row) * grown, 0)
+        return np.where(np.isfinite(left), left, 0.0)
+
+
+def sliding_bound(
+    protocol: SlidingModeProtocol,
+    sigma0: Sequence[Fraction],
+    z: np.ndarray,
+    reaching: Sequence[ReachingTime] | None = None,
+) -> np.ndarray:
+    """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below what the adversary leaves.
+
+    ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, sharper than Proposition 1 and kept by every
+    disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
+    lose digits, and may be 0.
+    """
+    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
+    times = certified_reaching_times(protocol, sigma0) if reaching is None else reaching
+    return worst.above(z, np.array([math.inf if r.z is None else float(r.z) for r in times]) * (1 + 1e-15))

@@ -1,0 +1,107 @@
+"""What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
+
+The classes call these functions for ``_repr_html_``. Everywhere else their plain ``repr`` is shown. Labels are escaped,
+figures are inline SVG images with a text in their place for those who do not see them.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.report.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
+from ptcc_certify.report.screen import certificate_lines, structure_lines
+from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, FigureBase
+
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.gain_design import Design
+    from ptcc_certify.graphs.digraph import SignedDigraph
+
+#: Largest graph that is drawn unasked: a layout takes seconds above.
+SHOWN_NODES = 120
+# Where the text of a line of a screen begins, after its head.
+_HEAD = 11
+
+
+def graph_html(graph: SignedDigraph) -> str:
+    """Show a graph: its size, how it was read, its nodes, and a drawing of up to 120 of them."""
+    lines = structure_lines(analyse(graph), "signed digraph")
+    return _page([line for line in lines if line.startswith(("graph", "read", "nodes"))], _graph_figure(graph))
+
+
+def structure_html(structure: Structure) -> str:
+    """Show a structure: the screen of ``ptcc classify``, and a drawing of up to 120 nodes."""
+    return _page(structure_lines(structure, "signed digraph"), _graph_figure(structure.graph, structure))
+
+
+def certificate_html(certificate: Certificate) -> str:
+    """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound."""
+
+    def draw() -> FigureBase:
+        return plot_decay(certificate).figure
+
+    run = certificate.trajectory
+    moves = run is not None and certificate.comparison is not None and bool(run.error.any())
+    drawable = moves and bool(certificate.envelope.members)
+    alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
+    return _page(certificate_lines(certificate, "signed digraph"), [(draw, alt)] if drawable else [])
+
+
+def trajectory_html(trajectory: Trajectory) -> str:
+    """Show a trajectory: what its ``repr`` says, and the states (and sliding variables) of one start over time."""
+    structure = analyse(trajectory.graph)
+
+    def draw() -> Figure:
+        return plot_run(trajectory, structure)
+
+    drawable = trajectory.states.ndim == 2 and trajectory.t.size > 1 and len(trajectory.labels) <= SHOWN_NODES
+    also = " and sliding variables" if isinstance(trajectory, SlidingTrajectory) else ""
+    return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], [(draw, f"states{also} over time")] if drawable else [])
+
+
+def design_html(found: Design) -> str:
+    """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
+
+    def draw() -> FigureBase:
+        return plot_trade_off(found).figure
+
+    return _page(found.lines(), [(draw, "certified peak input against the deadline, and what no gains can stay below")])
+
+
+def _base64(figure: FigureBase) -> str:
+    return base64.b64encode(figure_bytes(figure, ".svg")).decode()
+
+
+_Drawing = tuple[Callable[[], "FigureBase"], str]
+
+
+def _graph_figure(graph: SignedDigraph, structure: Structure | None = None) -> list[_Drawing]:
+    if graph.n_nodes > SHOWN_NODES:
+        return []
+    known = analyse(graph) if structure is None else structure
+    alt = f"drawing of the graph: {graph.n_nodes} nodes, {known.leaders.size} of them leaders, {graph.n_edges} edges"
+    return [(lambda: plot_graph(known).figure, alt)]
+
+
+def _page(lines: Iterable[str], figures: Sequence[_Drawing]) -> str:
+    """Return lines, each with a head of ten characters, as a table beside figures."""
+    rows = "".join(
+        f'<tr><th scope="row" style="text-align:left;vertical-align:top">{html.escape(line[:_HEAD].strip())}</th>'
+        f'<td style="text-align:left">{html.escape(line[_HEAD:].strip())}</td></tr>'
+        for line in lines
+    )
+    images = "".join(
+        f'<img alt="{html.escape(alt)}" style="max-width:100%;background:white" '
+        f'src="data:image/svg+xml;base64,{_base64(draw())}">'
+        for draw, alt in figures
+    )
+    return (
+        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">'
+        f'<table style="max-width:60em">{rows}</table>{images}</div>'
+    )

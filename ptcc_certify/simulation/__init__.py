@@ -1,0 +1,1 @@
+"""Simulated motions: CVODES, Filippov solutions, limited and sampled gains."""

@@ -1,0 +1,309 @@
+"""Sampled trajectories of the closed loops: states, clock, input, and how settled they are at the deadline."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.errors import ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+    from ptcc_certify.simulation.limited import Actuator
+
+#: A state at the deadline is settled when its residual is below this multiple of the tolerances.
+RESOLVED = 100
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory:
+    """The states of N agents at M instants.
+
+    Attributes
+    ----------
+    graph : SignedDigraph
+    protocol : NominalProtocol or SlidingModeProtocol
+    t : (M,) array
+        Instants, in units of time.
+    remaining : (M,) array
+        ``max(0, 1 - t/T)``, accurate where ``t`` itself no longer tells it from 0.
+    clock : (M,) array
+        ``s``; infinite from ``T`` on unless ``rho2 = 0``. Behind an actuator the integral of the gain that acts.
+    states : (N, M) or (N, S, M) array
+        ``X``, or S columns of states.
+    rtol, atol : float
+        The integrator's tolerances; ``atol`` is relative to the largest entry of each starting column.
+    deadline_index : int or None
+        Which instant is ``T``; None if none is, or if there is no deadline.
+    deadline_residual : float or None
+        How far from settled the state at ``T`` is: the larger of ``max_k |e_k|/(2 D_k)`` and of the change over the
+        last doubling of ``tau``, relative to the largest entry of the start. None if ``T`` was not reached. If an
+        actuator bounds the gain, the former alone, at the first instant from ``T`` on.
+    stats : mapping
+        ``steps``, ``rhs`` (evaluations of the right-hand side, and of its derivatives in GMRES), ``seconds``.
+    actuator : Actuator or None
+        What limits the nominal protocol's input; None if nothing does.
+    forcing : str or None
+        Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
+    held_input : (N, M) or (N, S, M) array or None
+        The input held at the instants, if the actuator samples.
+
+    References
+    ----------
+    The network (3) under the protocol (4) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], times=[0, 0.5, 1, 2])
+    >>> run.states.shape, run.deadline_index, run.deadline_resolved
+    ((2, 4), 2, True)
+    >>> run.final_state.round(9), run.input[:, 0]
+    (array([ 1., -1.]), array([-8., -8.]))
+    """
+
+    graph: SignedDigraph
+    protocol: Protocol
+    t: np.ndarray
+    remaining: np.ndarray
+    clock: np.ndarray
+    states: np.ndarray
+    rtol: float
+    atol: float
+    deadline_index: int | None
+    deadline_residual: float | None
+    stats: Mapping[str, float]
+    actuator: Actuator | None = field(default=None, kw_only=True)
+    forcing: str | None = field(default=None, kw_only=True)
+    held_input: np.ndarray | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        for array in (self.t, self.remaining, self.clock, self.states, self.held_input):
+            if array is not None:
+                array.flags.writeable = False
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The N agents, in the order of the rows of ``states``."""
+        return self.graph.labels
+
+    @property
+    def deadline_resolved(self) -> bool:
+        """Whether the state at ``T`` has settled to within 100 tolerances; False if ``T`` was not reached.
+
+        A float cannot see motion some 15 decades slower than the fastest: where links of very different weight almost
+        balance, ask the exact outcome.
+        """
+        settled = RESOLVED * max(self.rtol, self.atol)
+        return self.deadline_residual is not None and self.deadline_residual <= settled
+
+    @property
+    def final_state(self) -> np.ndarray:
+        """(N,) or (N, S) array: the state at the deadline ``T``.
+
+        Raises
+        ------
+        ParameterError
+            ``T`` is not among the instants, or there is no deadline.
+        """
+        if self.deadline_index is None:
+            why = "T is not among the instants" if self.protocol.prescribed else "with rho2 = 0 there is no deadline"
+            raise ParameterError(f"there is no state at the deadline: {why}")
+        return self.states[..., self.deadline_index]
+
+    @property
+    def error(self) -> np.ndarray:
+        """``E = -L X``, of the shape of ``states``."""
+        flat = self.states.reshape(len(self.labels), -1)
+        return -(self.graph.laplacian() @ flat).reshape(self.states.shape)
+
+    @property
+    def input(self) -> np.ndarray:
+        """``u = gain E``, of the shape of ``states``; the gain is ``rho1`` from ``T`` on.
+
+        Behind an actuator with the gain that acts, or as it is held. Measurement noise is left out.
+        """
+        if self.held_input is not None:
+            return self.held_input
+        if self.actuator is not None:
+            return self.actuator.limit(self.protocol.gain).value(self.t, self.remaining) * self.error
+        return self.protocol.gain.value_at_remaining(self.remaining) * self.error
+
+    def at(self, fraction: float) -> np.ndarray:
+        """Return the state at the sampled instant ``t = fraction T``.
+
+        Parameters
+        ----------
+        fraction : float
+            ``t/T`` of one of the instants.
+
+        Returns
+        -------
+        (N,) or (N, S) array
+
+        Raises
+        ------
+        ParameterError
+            No instant of the trajectory is there: give it to :func:`simulate` as one of ``times``.
+        """
+        if fraction == 1 and self.deadline_index is not None:
+            return self.final_state
+        wanted = fraction * float(self.protocol.T)
+        near = np.flatnonzero(np.isclose(self.t, wanted, rtol=1e-14, atol=0))
+        if not near.size:
+            raise ParameterError(f"no instant of the trajectory is {fraction} T; simulate with times=[{wanted}]")
+        return self.states[..., near[0]]
+
+    def to_csv(self) -> str:
+        r"""Return ``t,remaining,<label>,...`` as text, one row per instant, floats in full.
+
+        Columns of a start with S columns are headed ``<label>[1] .. <label>[S]``; those of sliding variables follow,
+        headed ``sigma(<label>)``.
+
+        Examples
+        --------
+        >>> from ptcc_certify.graphs.digraph import SignedDigraph
+        >>> from ptcc_certify.protocols.nominal import NominalProtocol
+        >>> from ptcc_certify.simulation.run import simulate
+        >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
+        >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_csv()
+        't,remaining,a,b\n0.0,1.0,1.0,0.0\n'
+        """
+        names = list(self.labels)
+        if self.states.ndim == 3:
+            names = [f"{label}[{column}]" for label in names for column in range(1, self.states.shape[1] + 1)]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        more = self._more_columns()
+        writer.writerow(["t", "remaining", *names, *(name for name, _ in more)])
+        states = self.states.reshape(len(names), -1)
+        table = np.vstack([self.t, self.remaining, states, *(values for _, values in more)])
+        writer.writerows(table.T.tolist())
+        return text.getvalue()
+
+    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
+        return []
+
+    def _repr_html_(self) -> str:
+        from ptcc_certify.report.notebook import trajectory_html
+
+        return trajectory_html(self)
+
+    def __repr__(self) -> str:
+        runs = f" x {self.states.shape[1]} columns" if self.states.ndim == 3 else ""
+        span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g}" if self.t.size else "none"
+        if self.deadline_residual is None:
+            deadline = "deadline not reached" if self.protocol.prescribed else "no deadline"
+        else:
+            word = "settled" if self.deadline_resolved else "NOT settled"
+            deadline = f"{word} at T = {float(self.protocol.T):.6g} (residual {self.deadline_residual:.1e})"
+        more = "".join(f", {part}" for part in (self.actuator, self.forcing) if part is not None)
+        return f"Trajectory({len(self.labels)} agents{runs}, {self.t.size} instants, {span}, {deadline}{more})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlidingTrajectory(Trajectory):
+    """A trajectory under the sliding-mode protocol: the Filippov solution, or its boundary-layer imitation.
+
+    Attributes
+    ----------
+    sigma : (N, M) array
+        The sliding variables; exactly 0 from each reaching time on.
+    disturbance : (N, M) array
+        ``d_k`` at the instants.
+    sigma0 : (N,) array
+        ``sigma(0)``.
+    reaching_remaining : (M,) array
+        ``max(0, 1 - t/T_r)``, accurate where ``t`` itself no longer tells it from 0.
+    reaching_z : (N,) array
+        ``ln(T_r/(T_r - t))`` where each sliding variable reaches 0; 0 for one that starts there, infinite for one that
+        is 0 at ``T_r`` only.
+    source : str
+        The disturbance in words.
+    bounded_by : str
+        How ``|d_k| <= delta`` was established.
+    boundary_layer : float or None
+        Width ``w`` of the imitation ``tanh(sigma/w)`` of the sign; None for the true solution.
+    reads_states : bool
+        Whether the disturbance depends on the states: then reaching times are as accurate as the integrator, otherwise
+        roots of scalar equations to near machine precision.
+
+    References
+    ----------
+    The network (2) under the protocol (47)-(48) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+    Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, simulate
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*t)", times=[0, 1, 2])
+    >>> run.sigma  # exactly 0 from the reaching time on
+    array([[1., 0., 0.],
+           [0., 0., 0.]])
+    >>> bool(0 < run.reaching_times[0] < 1), float(run.reaching_times[1])
+    (True, 0.0)
+    """
+
+    protocol: SlidingModeProtocol
+    sigma: np.ndarray
+    disturbance: np.ndarray
+    sigma0: np.ndarray
+    reaching_remaining: np.ndarray
+    reaching_z: np.ndarray
+    source: str
+    bounded_by: str
+    boundary_layer: float | None
+    reads_states: bool
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for array in (self.sigma, self.disturbance, self.sigma0, self.reaching_remaining, self.reaching_z):
+            array.flags.writeable = False
+
+    @property
+    def reaching_times(self) -> np.ndarray:
+        """(N,) array: the instants at which the sliding variables reach 0, at most ``T_r``."""
+        return -self._deadline * np.expm1(-self.reaching_z)
+
+    @property
+    def reaching_left(self) -> np.ndarray:
+        """(N,) array: ``T_r`` minus the reaching times, accurate however small."""
+        return self._deadline * np.exp(-self.reaching_z)
+
+    @property
+    def input(self) -> np.ndarray:
+        """(N, M) array: ``u`` as the Filippov solution has it.
+
+        The input (48) before a sliding variable is 0; from then on the *equivalent control* ``u^nom - d``, the mean of
+        what the switching does, which keeps it there.
+        """
+        if self.boundary_layer is not None:
+            return self._driven(np.tanh(self.sigma / self.boundary_layer))
+        return np.where(self.sigma != 0, self.switching_input, super().input - self.disturbance)
+
+    @property
+    def switching_input(self) -> np.ndarray:
+        """(N, M) array: ``u`` of (48) to the letter, with ``sign(0) = 0``; while sliding it jumps by up to ``mu1``."""
+        return self._driven(np.sign(self.sigma))
+
+    def _driven(self, sign: np.ndarray) -> np.ndarray:
+        gain = self.protocol.reaching_gain.value_at_remaining(self.reaching_remaining)
+        return super().input - float(self.protocol.mu1) * sign - gain * self.sigma
+
+    @property
+    def _deadline(self) -> float:
+        return float(self.protocol.T_r)
+
+    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
+        return [(f"sigma({label})", row) for label, row in zip(self.labels, self.sigma, strict=True)]

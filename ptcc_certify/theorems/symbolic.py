@@ -1,0 +1,260 @@
+"""The Lyapunov functions of the theorem rows as CasADi expressions, and their derivatives along the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.theorems import LyapunovFunction, theorem_for
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SymbolicLyapunov:
+    """A Lyapunov function along the closed loop, symbolically.
+
+    Attributes
+    ----------
+    protocol : NominalProtocol
+    t, x : casadi.SX
+        The instant, in units of time, and the states (N, 1).
+    gain : casadi.SX
+        ``rho1 + rho2 phi'/phi``.
+    E : (N, 1) casadi.SX
+        ``-L x``.
+    z : (n, 1) casadi.SX
+        The coordinates of ``V``: rows of ``E``, or the weighted deviation ``eps``.
+    agents : tuple of int
+        The node index of every coordinate.
+    weights : (n,) array
+        The diagonal of ``Omega``.
+    decrease : (n, n) array
+        ``Omega A + A' Omega``, where ``z' = -gain A z``.
+    V : casadi.SX
+        ``z' Omega z``.
+    V_dot : casadi.SX
+        ``grad V . x'`` with ``x' = gain E``, by CasADi's differentiation of ``V``.
+    proof_form : casadi.SX
+        What the proof says ``V_dot`` is: ``-gain z'(Omega A + A' Omega)z``.
+    bounding_form : casadi.SX
+        What the proof bounds it by: ``-gain z'Sz`` with ``S`` the matrix whose smallest eigenvalue gives the rate.
+
+    References
+    ----------
+    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
+    >>> form = symbolic_lyapunov(st, theorem_for(st).lyapunov(st), NominalProtocol(T=1, rho1=1, rho2=0, kappa=1))
+    >>> import casadi as ca
+    >>> [float(ca.substitute(V, form.x, ca.DM([1, 3]))) for V in (form.V, form.V_dot)]  # V' = -8 V, gain 1
+    [64.0, -512.0]
+    """
+
+    protocol: NominalProtocol
+    t: ca.SX
+    x: ca.SX
+    gain: ca.SX
+    E: ca.SX
+    z: ca.SX
+    agents: tuple[int, ...]
+    weights: np.ndarray
+    decrease: np.ndarray
+    V: ca.SX
+    V_dot: ca.SX
+    proof_form: ca.SX
+    bounding_form: ca.SX
+
+    def latex(self) -> str:
+        r"""Return the coordinates ``e_{k}``, ``V``, ``V'`` and the gain ``g`` in LaTeX, printed from expressions.
+
+        Agents are numbered from 1; ``V'`` is the form of the proof, written in the coordinates.
+        """
+        import casadi as ca
+
+        n, S = len(self.agents), self.decrease
+        e = [ca.SX.sym(f"e{k + 1}") for k in self.agents]
+        pairs = [(i, j) for i in range(n) for j in range(i, n) if S[i, j]]
+        squares = [e[i] ** 2 for i in range(n)]
+        value = sum((self.weights[i] * squares[i] for i in range(n)), ca.SX(0))
+        form = sum((S[i, i] * squares[i] if i == j else 2 * S[i, j] * (e[i] * e[j]) for i, j in pairs), ca.SX(0))
+        rows = [f"{to_latex(e[i])} &= {to_latex(self.z[i])}" for i in range(n)]
+        rows.append(f"V &= {to_latex(value)}")
+        rows.append(rf"\dot V &= -g \left({to_latex(form)}\right)")
+        rows.append(rf"g &= {self.protocol.gain.latex()}")
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def __repr__(self) -> str:
+        return f"SymbolicLyapunov({len(self.agents)} coordinates of {self.x.numel()} agents)"
+
+    def _repr_latex_(self) -> str:
+        return f"${self.latex()}$"
+
+
+def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Protocol) -> SymbolicLyapunov:
+    """Write ``E``, ``V`` and ``V'`` of a theorem row as CasADi expressions.
+
+    Parameters
+    ----------
+    structure : Structure
+    V : LyapunovFunction
+        From the theorem that applies to the graph (``certificate.lyapunov``).
+    protocol : NominalProtocol or SlidingModeProtocol
+        Of the sliding-mode protocol, the motion on the sliding manifold: the nominal one with ``T = T_r + T_s``.
+
+    Returns
+    -------
+    SymbolicLyapunov
+
+    References
+    ----------
+    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
+    >>> V = theorem_for(st).lyapunov(st)
+    >>> form = symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2))
+    >>> import casadi as ca
+    >>> float(ca.substitute(form.V, form.x, ca.DM([1, 3])))
+    64.0
+    """
+    import casadi as ca
+
+    graph = structure.graph
+    if isinstance(protocol, SlidingModeProtocol):
+        protocol = protocol.nominal
+    loop = protocol.closed_loop(graph)
+    t, x = loop["t"], loop["x"]
+    gain = protocol.gain.expression(t)
+    L = ca.DM(graph.laplacian().tocsc())
+    E = -ca.mtimes(L, x)
+    nodes, weights = list(V.nodes), np.array([float(w) for w in V.weights])
+    if V.coordinates == "E":
+        z, A = E[nodes], L[nodes, nodes]
+    else:
+        assert structure.gauge is not None
+        g = structure.gauge.astype(float)
+        z, A = x - ca.DM(g) * ca.dot(ca.DM(g * weights / weights.sum()), x), L
+    product = ca.mtimes(ca.diag(ca.DM(weights)), A)
+    decrease = product + product.T
+    value = ca.sum1(ca.DM(weights) * z**2)
+    S = ca.DM(theorem_for(structure).decrease(structure, V))
+    return SymbolicLyapunov(
+        protocol=protocol,
+        t=t,
+        x=x,
+        gain=gain,
+        E=E,
+        z=z,
+        agents=tuple(nodes),
+        weights=weights,
+        decrease=decrease.full(),
+        V=value,
+        V_dot=ca.jtimes(value, x, loop["ode"]),
+        proof_form=-gain * ca.bilin(decrease, z, z),
+        bounding_form=-gain * ca.bilin(S, z, z),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SymbolicSliding:
+    """Proposition 1 along the closed loop, symbolically.
+
+    Attributes
+    ----------
+    protocol : SlidingModeProtocol
+    t, x, varsigma, d : casadi.SX
+        The instant, in units of time; states, auxiliary variables and disturbances, (N, 1) each.
+    sigma : (N, 1) casadi.SX
+        ``x + varsigma``.
+    V : casadi.SX
+        ``sigma'sigma / 2``.
+    V_dot : casadi.SX
+        By CasADi's differentiation of ``V`` along the closed loop.
+    bounding_form : casadi.SX
+        ``-(mu1 - delta) sum |sigma_k| - (reaching gain) sigma'sigma``, above ``V_dot`` for every ``|d_k| <= delta``.
+
+    References
+    ----------
+    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
+    >>> import casadi as ca
+    >>> float(ca.substitute(form.V, ca.vertcat(form.x, form.varsigma), ca.DM([1, 2, 0, -4])))  # sigma = (1, -2)
+    2.5
+    """
+
+    protocol: SlidingModeProtocol
+    t: ca.SX
+    x: ca.SX
+    varsigma: ca.SX
+    d: ca.SX
+    sigma: ca.SX
+    V: ca.SX
+    V_dot: ca.SX
+    bounding_form: ca.SX
+
+    def __repr__(self) -> str:
+        return f"SymbolicSliding({self.x.numel()} agents)"
+
+
+def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> SymbolicSliding:
+    """Write ``sigma``, ``V`` and ``V'`` of Proposition 1 as CasADi expressions.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        N agents.
+    protocol : SlidingModeProtocol
+
+    Returns
+    -------
+    SymbolicSliding
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
+    >>> form.sigma
+    SX([(x1+varsigma1), (x2+varsigma2)])
+    """
+    import casadi as ca
+
+    loop, n = protocol.closed_loop(graph), graph.n_nodes
+    t, x, varsigma = loop["t"], loop["x"][:n], loop["x"][n:]
+    sigma = x + varsigma
+    value = ca.sumsqr(sigma) / 2
+    reach = float(protocol.mu1 - protocol.delta) * ca.sum1(ca.fabs(sigma))
+    return SymbolicSliding(
+        protocol=protocol,
+        t=t,
+        x=x,
+        varsigma=varsigma,
+        d=loop["p"],
+        sigma=sigma,
+        V=value,
+        V_dot=ca.jtimes(value, loop["x"], loop["ode"]),
+        bounding_form=-reach - protocol.reaching_gain.expression(t) * ca.sumsqr(sigma),
+    )

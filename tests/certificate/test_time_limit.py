@@ -1,0 +1,245 @@
+"""Searches end: at the time limit with what was proved by then, and at Ctrl-C at once."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+
+import lmi
+from lmi.apart import apart
+from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
+from ptcc_certify import NominalProtocol, ParameterError, SignedDigraph, certify, check, simulate
+from ptcc_certify.certificate.certificate import STEPS
+from ptcc_certify.examples import load_graph
+from ptcc_certify.lyapunov import search as sharpen
+from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.search import Candidate
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+
+
+def ring(n: int) -> SignedDigraph:
+    return SignedDigraph.from_edges([(i, (i + 1) % n, 1 if i else -1) for i in range(n)])
+
+
+def test_limits_inside_each_other_end_at_the_first():
+    with time_limit(1000), time_limit(2000):
+        assert seconds_left() <= 1000
+        with time_limit(0), pytest.raises(lmi.OutOfTime):
+            checkpoint()
+        checkpoint()
+    assert seconds_left() == math.inf
+
+
+def test_a_share_of_no_limit_is_no_limit():
+    cut_off: list[str] = []
+    with share_of_time(0.5, "a search", cut_off):
+        assert seconds_left() == math.inf
+    assert not cut_off
+
+
+def test_each_thread_has_its_own_limit():
+    seen = []
+    with time_limit(0):
+        thread = threading.Thread(target=lambda: seen.append(seconds_left()))
+        thread.start()
+        thread.join()
+    assert seen == [math.inf]
+
+
+def test_every_search_ends_at_a_limit():
+    A = ring(40).laplacian().toarray() + np.eye(40)
+    for search in (
+        lambda: lmi.diagonal_lyapunov(A),
+        lambda: lmi.diagonal_lyapunov(A, objective="rate"),
+        lambda: lmi.diagonal_lyapunov(A, solver="clarabel"),
+        lambda: lmi.rate_frontier(A),
+        lambda: lmi.full_frontier(A),
+        lambda: lmi.h_matrix_certificate(A),
+        lambda: lmi.prove_generalized_margin((A + A.T).astype(int).tolist(), np.eye(40, dtype=int).tolist(), 0.5),
+    ):
+        with time_limit(0), pytest.raises(lmi.OutOfTime):
+            search()
+
+
+@pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig5a", "fig5b"])
+def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
+    cert = certify(load_graph(name), PROTOCOL, [1] * load_graph(name).n_nodes, time_limit=1e-9)
+    assert cert.verdict == "undecided" and cert.rate is None and cert.trajectory is None
+    assert {STEPS[0], STEPS[1]} <= set(cert.cut_off) and cert.upper_bound is not None  # which needs no search
+    assert "raise --time-limit" in cert.assessment.text and cert.assessment.exit_code == 4
+    document = cert.to_dict()
+    assert document["unverified"]["cut_off"] == list(cert.cut_off)
+    report = check(document)
+    assert report.accepted and report.verdict == "undecided"
+
+
+def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch):
+    search = sharpen._lmi_candidates
+
+    def without_end(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
+        yield next(search(system, thorough))
+        while True:
+            time.sleep(0.01)
+            checkpoint()
+
+    monkeypatch.setattr(sharpen, "_lmi_candidates", without_end)
+    cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
+    assert cert.cut_off == ("class lmi",)
+    assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.sharpening.tried)
+    assert check(cert.to_dict()).accepted
+
+
+HOLDS = """
+import ctypes, sys
+from ptcc_certify import NominalProtocol, SignedDigraph, certify
+from ptcc_certify.lyapunov import search as sharpen
+
+def holds(system, thorough):
+    yield from ()
+    ctypes.PyDLL(None).sleep(600)  # the interpreter is held: no other thread, no handler of a signal runs
+
+sharpen._lmi_candidates = holds
+ring = SignedDigraph.from_edges([(i, (i + 1) % 50, 1 if i else -1) for i in range(50)])
+print("began", flush=True)
+cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, time_limit=float(sys.argv[1]))
+print(cert.verdict, cert.cut_off)
+"""
+linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux only")
+
+
+@linux
+def test_a_solver_that_holds_the_interpreter_is_ended_at_the_limit():
+    run = subprocess.run([sys.executable, "-c", HOLDS, "12"], capture_output=True, text=True, timeout=300, check=True)
+    assert run.stdout.splitlines() == ["began", "certified ('class lmi',)"]
+
+
+@linux
+def test_a_solver_that_holds_the_interpreter_is_ended_by_an_interrupt():
+    run = subprocess.Popen(
+        [sys.executable, "-c", HOLDS, "600"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert run.stdout is not None and run.stdout.readline() == "began\n"
+    time.sleep(4)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode != 0 and "KeyboardInterrupt" in err
+
+
+def test_work_apart_hands_over_values_errors_and_its_end():
+    assert list(apart(lambda: [{"a": np.arange(3)}, 2]))[1] == 2
+
+    def fails() -> Iterator[int]:
+        yield 1
+        raise lmi.NoCertificate("none")
+
+    found = []
+    with pytest.raises(lmi.NoCertificate, match="none"):
+        for value in apart(fails):
+            found.append(value)
+    assert found == [1]
+
+
+@linux
+def test_the_death_of_a_process_is_told():
+    def dies() -> Iterator[int]:
+        yield 1
+        os._exit(3)
+
+    with pytest.raises(lmi.LMIError, match="without an answer"):
+        list(apart(dies))
+
+
+@linux
+def test_work_apart_is_done_where_children_are_not_waited_for():
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        assert list(apart(lambda: range(3))) == [0, 1, 2]
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+@linux
+def test_work_apart_is_done_here_where_no_process_can_be_made(monkeypatch: pytest.MonkeyPatch):
+    def refused() -> int:
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(os, "fork", refused)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    assert list(apart(lambda: range(3))) == [0, 1, 2]
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_an_error_that_cannot_be_handed_over_is_told_in_words():
+    class OddError(Exception):
+        def __init__(self, one: int, other: int):
+            super().__init__(f"{one} and {other}")
+
+    def fails() -> Iterator[int]:
+        yield from ()
+        raise OddError(1, 2)
+
+    with pytest.raises((lmi.LMIError, OddError), match="1 and 2"):
+        list(apart(fails))
+
+
+@linux
+def test_what_came_before_the_limit_is_kept():
+    found = []
+
+    def slow() -> Iterator[int]:
+        yield 1
+        time.sleep(600)
+
+    with time_limit(2), pytest.raises(lmi.OutOfTime):
+        for value in apart(slow):
+            found.append(value)
+    assert found == [1]
+
+
+def test_without_a_limit_nothing_is_cut_off():
+    cert = certify(load_graph("fig3a"), PROTOCOL, [1] * 6, time_limit=math.inf)
+    assert cert.cut_off == () and cert.verdict == "certified"
+    assert cert.to_dict()["unverified"]["time_limit"] is None
+
+
+def test_the_default_grows_with_the_graph():
+    assert certify(ring(3), PROTOCOL, simulation=False).time_limit == pytest.approx(60.003)
+
+
+@pytest.mark.parametrize("seconds", [0, -1, math.nan])
+def test_a_limit_that_is_not_positive_is_refused(seconds: float):
+    with pytest.raises(ParameterError, match="time_limit"):
+        certify(ring(3), PROTOCOL, time_limit=seconds)
+    run = ptcc("certify", "fig1a", "--time-limit", str(seconds))
+    assert run.code == 2 and run.err.count("\n") == 1 and "time_limit" in run.err
+
+
+def test_the_integrator_ends_at_the_limit_and_leaves_signals_as_they_were():
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, getattr(signal, "SIGALRM", signal.SIGINT))]
+    rng = np.random.default_rng(0)
+    pairs = rng.integers(0, 3000, (12000, 2))
+    graph = SignedDigraph.from_edges([(int(a), int(b), 1) for a, b in {tuple(p) for p in pairs.tolist()} if a != b])
+    with time_limit(0.05), pytest.raises(lmi.OutOfTime):
+        simulate(graph, PROTOCOL, rng.normal(size=graph.n_nodes), samples=5000)
+    assert [signal.getsignal(n) for n in (signal.SIGINT, getattr(signal, "SIGALRM", signal.SIGINT))] == handlers
+    if hasattr(signal, "setitimer"):
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert simulate(ring(3), PROTOCOL, [1, 2, 3]).deadline_resolved
+
+
+def test_the_screen_names_what_was_cut_off():
+    run = ptcc("certify", "fig1a", "--time-limit", "1e-9")
+    assert run.code == 4
+    assert "cut off" in run.out and "the paper's certificate" in run.out

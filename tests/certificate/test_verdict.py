@@ -1,0 +1,233 @@
+"""The verdict line tells what a certificate is worth and what became of what was asked; the exit code agrees."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+from generators import all_classes, random_graph
+
+from ptcc_certify import (
+    Expectations,
+    NominalProtocol,
+    SignedDigraph,
+    SlidingModeProtocol,
+    certify,
+    read_certificate,
+    report_html,
+    report_latex,
+)
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
+from ptcc_certify.examples import load_graph
+from ptcc_certify.report.screen import certificate_lines
+
+CLASSES = dict(all_classes())
+WEAK = {"rho1": "0.1", "rho2": "0.05", "kappa": 2}
+
+
+@cache
+def weak(k: int, sliding: bool = False) -> Certificate:
+    """A random graph under gains that are too small."""
+    rng = np.random.default_rng(k)
+    graph = random_graph(rng, **{**list(CLASSES.values())[k % len(CLASSES)], "weights": "decimals"}).graph
+    x0 = rng.integers(-9, 9, graph.n_nodes).tolist()
+    if sliding:
+        robust = SlidingModeProtocol(T_r=1, T_s="0.5", mu1=2, mu2=1, mu3=1, delta=1, **WEAK)
+        return certify(graph, robust, x0, sigma0=[1] * graph.n_nodes, simulation=False)
+    return certify(graph, NominalProtocol(T=1, **WEAK), x0, simulation=False)
+
+
+# ---------------------------------------------------------------------- usefulness
+
+
+@pytest.mark.parametrize("sliding", [False, True])
+@pytest.mark.parametrize("k", range(1, 11))
+def test_the_gains_that_are_named_leave_one_percent(k: int, sliding: bool):
+    """Certified with what the line says, nothing else changed, at most a hundredth is left."""
+    cert = weak(k, sliding)
+    found = cert.assessment
+    assert cert.verdict == "certified" and found.useful is False
+    said = re.search(r"--rho2 (\S+) \(rho2 kappa (\S+)\) leaves 1 %$", found.text)
+    assert said is not None, found.text
+    rho2, product = map(Fraction, said.groups())
+    assert product == rho2 * cert.protocol.kappa and rho2 > cert.protocol.rho2
+    p = {name: getattr(cert.protocol, name) for name in cert.protocol.to_dict() if name not in ("kind", "disturbance")}
+    protocol = type(cert.protocol)(**{**p, "rho2": said[1]})
+    again = certify(cert.graph, protocol, cert.start, sigma0=cert.sigma0, simulation=False)
+    assert again.assessment.useful and again.assessment.exit_code == 0
+    left = re.search(r"\|\| <= (\S+) \|\|", again.assessment.text)
+    assert left is not None and float(left[1]) <= 0.01
+
+
+def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alone():
+    """The bound of the error at T(1 - 1e-9) is above the error at the start, and the verdict was `certified`."""
+    slow = certify(load_graph("fig5b"), NominalProtocol(T=1, rho1="0.01", rho2="0.001", kappa=1), simulation=False)
+    assert slow.verdict == "certified" and slow.envelope.residual(1e-9) > 0.9
+    assert slow.assessment.text.startswith("certified, but with these gains the bound says little by T: ||E|| <= ")
+    assert slow.assessment.exit_code == 0 and slow.to_dict()["verdict"] == "certified"
+    assert "says little" in certificate_lines(slow, "fig5b")[-1]
+
+
+def test_what_is_useful_is_stated_and_true():
+    cert = certify(load_graph("fig1a"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), simulation=False)
+    said = re.fullmatch(r"certified; \|\|E\|\| <= (\S+) \|\|E\(0\)\|\| at 0.99 T", cert.assessment.text)
+    assert said is not None and cert.envelope.residual(float(LAST)) <= float(said[1]) <= 0.01
+
+
+def test_a_bound_is_useful_too_if_no_agent_has_more_than_a_hundredth_of_the_longest_way_left():
+    """Of ``||E||`` from any start more may be left than of the way of the last of a chain, who alone has one."""
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", 1)])
+    found = []
+    for rho2 in ("0.6", 1, 2):
+        cert = certify(graph, NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), [0, 0, 0, 1], simulation=False)
+        way, left = cert.longest_way, float(cert.outcome_distance([float(LAST)]).max())
+        assert way is not None
+        assert cert.assessment.useful == (cert.envelope.residual(float(LAST)) <= 0.01 or left <= 0.01 * way)
+        found.append(cert.assessment.text)
+    assert any("every agent within" in text for text in found)
+    assert any("says little" in text for text in found) and any("||E(0)||" in text for text in found)
+
+
+def test_agents_that_do_not_move_are_certified_whatever_the_gains():
+    still = certify(SignedDigraph.from_edges([], ["a", "b"]), NominalProtocol(T=1, **WEAK), [1, 2])
+    assert still.assessment.text == "certified; nothing to decay" and still.assessment.exit_code == 0
+
+
+# ---------------------------------------------------------------------- expectations
+
+
+ASKED = {
+    "met": {"behaviour": "stability", "min_rate": Fraction(9), "max_input": Fraction(1000)},
+    "refuted": {"behaviour": "consensus", "min_rate": Fraction(10), "max_input": Fraction(1, 100)},
+    "left open": {"min_rate": Fraction("9.0437"), "max_input": Fraction(900)},
+}
+
+
+@cache
+def strong() -> Certificate:
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    return certify(load_graph("fig1a"), protocol, [9, -8, 7, -6, 5, 4], simulation=False)
+
+
+@pytest.mark.parametrize("rate", ["met", "refuted", "left open", None])
+@pytest.mark.parametrize("most", ["met", "refuted", "left open", None])
+@pytest.mark.parametrize("behaviour", ["met", "refuted", None])
+def test_what_was_asked_is_in_the_line_and_the_exit_code_agrees(
+    behaviour: str | None, rate: str | None, most: str | None
+):
+    peak = strong().effort.peak.largest  # type: ignore[union-attr]
+    wanted = {"behaviour": behaviour, "min_rate": rate, "max_input": most}
+    asked = {key: ASKED[status][key] for key, status in wanted.items() if status is not None}
+    if most in ("met", "left open"):
+        asked["max_input"] = peak if most == "met" else peak * Fraction(99, 100)
+    found = replace(strong(), expectations=Expectations(**asked)).assessment
+    statuses = {status for status in wanted.values() if status}
+    assert {answer.status for answer in found.answers} == statuses and len(found.answers) == len(asked)
+    worst = next((s for s in ("refuted", "left open") if s in statuses), None)
+    assert found.exit_code == {"refuted": 3, "left open": 4, None: 0}[worst]
+    assert found.text.startswith(f"{worst}: " if worst else "certified; ") and "certified" in found.text
+    for answer in found.answers:
+        before = found.text[: found.text.index(answer.what)]
+        assert re.findall("met:|refuted:|left open:", before)[-1] == f"{answer.status}:"
+    assert found.word == (worst or "certified")
+
+
+def test_codes_are_worst_first():
+    assert exit_code(True, True, True) == 1 and exit_code(False, True, True) == 3 and exit_code(False, False, True) == 4
+    assert worst_code([4, 0, 1, 3]) == 1 and worst_code([0, 4]) == 4 and worst_code([]) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
+        (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified with a period of 0.00"),
+        (("--noise", "1"), 4, "left open: noise (not certified)"),
+        (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (not certified)"),
+        (("--gain-cap", "20"), 0, "certified; "),
+        (
+            ("--gain-cap", "20", "--noise", "1", "--delta", "1"),
+            0,
+            "certified, but with these gains the bound says little",
+        ),
+        (("--gain-cap", "0.001"), 0, "certified, but with these gains the bound says little by T: under the limits"),
+        (("--stop-before", "0.9", "--initial-bound", "2"), 0, "certified, but with these gains the bound says little"),
+        (("--expect", "consensus", "--min-rate", "9.0438"), 3, "refuted: consensus (it is stability); left open: rate"),
+    ],
+)
+def test_an_expectation_that_is_not_met_is_in_the_verdict_line(options: tuple[str, ...], code: int, says: str):
+    run = ptcc("certify", "fig1a", "--no-simulation", *options)
+    assert run.code == code and run.out.splitlines()[-1].startswith(f"verdict    {says}"), run.out
+    assert run.err == ""
+    told = ptcc("certify", "fig1a", "--no-simulation", "--json", *options)
+    assert told.code == code and (f"verdict    {says}" in told.err) == bool(code)
+
+
+# ---------------------------------------------------------------------- what to try next
+
+
+FAR = [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d", "-1e300"), ("d", "c", "1e-300")]
+
+
+@pytest.mark.parametrize(
+    ("graph", "method", "says"),
+    [
+        (
+            FAR,
+            "best",
+            "no rate is proved, weights span 600 decades: rescale them, or leave out the smallest",
+        ),
+        ([(i, (i + 1) % 130, 1) for i in range(130)], "full", "--method full proves no rate; try --method best"),
+        ([(i, (i + 1) % 130, 1) for i in range(130)], "paper", "--method paper proves no rate; try --method best"),
+    ],
+)
+def test_where_nothing_is_decided_it_says_what_to_try(graph: Any, method: str, says: str):
+    cert = certify(SignedDigraph.from_edges(graph), strong().protocol, method=method, simulation=False)
+    assert cert.assessment.text == f"undecided: {says}"
+    assert cert.assessment.exit_code == 4 and cert.assessment.useful is None
+
+
+# ---------------------------------------------------------------------- page, statement, notebook, file
+
+
+def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
+    """With what was asked; the page of a bound that says little is not green."""
+    asked = Expectations("stability", Fraction(10), Fraction(10**6))
+    protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.01", kappa=1)
+    weak = certify(load_graph("fig1a"), protocol, [1] * 6, noise=1, expectations=asked, simulation=False)
+    weak.save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    assert saved.expectations == asked and saved.assessment == weak.assessment
+    assert saved.assessment.text.startswith("refuted: rate >= 10 (none exceeds 9.04416")
+    page, text = report_html(saved), report_latex(saved)
+    assert '<div class="verdict doubt">' in page and "says little by T" in page and "refuted: rate &gt;= 10" in page
+    assert "With these gains the bound says little by the deadline." in text
+    assert "says little by T" in weak._repr_html_() and "refuted: rate" in weak._repr_html_()
+    strong().save(tmp_path / "d.json")
+    fine = read_certificate(tmp_path / "d.json")
+    assert '<div class="verdict good">' in report_html(fine) and "says little" not in report_latex(fine)
+
+
+@pytest.mark.parametrize("asked", [None, 3, [], {"min_rate": []}, {"limits": 5, "behaviour": "x", "max_input": "-1"}])
+def test_what_a_file_says_was_asked_need_not_be_sound(asked: Any, tmp_path: Path):
+    """It is no part of the claim."""
+    document = strong().to_dict()
+    document["unverified"]["asked"] = asked
+    (tmp_path / "c.json").write_text(json.dumps(document))
+    saved = read_certificate(tmp_path / "c.json")
+    assert saved.expectations == Expectations() and saved.assessment.exit_code == 0
+
+
+@pytest.mark.parametrize("sliding", [False, True])
+def test_lines_are_short(sliding: bool):
+    assert all(len(weak(k, sliding).assessment.text) <= 150 for k in range(12))
+    assert len(certificate_lines(strong(), "fig1a")[-1]) <= 80

@@ -1,0 +1,376 @@
+"""``FORMAT.md`` and ``certificate.schema.json`` describe what is written, and nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph, smallest
+from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
+from mutations import Json, at, changed, containers, leaves
+from side_files import with_factors, with_side_files
+
+from ptcc_certify import checker
+from ptcc_certify.bounds import final_state as outcomes
+from ptcc_certify.certificate import certificate as certificate_module
+from ptcc_certify.certificate import document
+from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
+from ptcc_certify.checker.reading import RejectedError, exact
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+
+FOLDER = Path(checker.__file__).parent
+FORMAT = (FOLDER / "FORMAT.md").read_text(encoding="utf-8")
+SCHEMA = json.loads((FOLDER / "certificate.schema.json").read_text(encoding="utf-8"))
+VALIDATOR = Draft202012Validator(SCHEMA)
+CLASSES = dict(all_classes())
+NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+SLIDING = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa="1.5", mu1=2, mu2=1, mu3=1, delta=1)
+SAMPLE = (("1.1", False), ("2.1 K>=2", True), ("3.1 mixed", False), ("disconnected 1.2 2.1 isolated", True))
+BAD_NUMBERS: tuple[Any, ...] = (
+    "", " 1", "1 ", "1\n", "+", ".", "1.e", "1e401", "1e-401", "1e000400", "0x1p1401", "0x.8p1", "0x1", "1/0", "1/-2",
+    "1/2/3", "1.5/2", "1_0", "١", "inf", "nan", "9" * 4001, 1, 0.5, True, [], ["1"], {"mid": "1"},
+)  # fmt: skip
+GOOD_NUMBERS = (
+    "0", "-12", "+7", "007", "3/4", "-6/008", "0.1", "5.", ".5", "-.5e-3", "1E400", "1e-00400", "2e+9", "9" * 4000,
+    "0x1.8p-1", "-0XaB.P+1400", "0x1p-01400", "0x0p0",
+)  # fmt: skip
+
+
+@cache
+def made(name: str, slides: bool = False, method: str = "paper") -> Json:
+    """The JSON of a certificate of a small graph of one class, with labels that are no numbers."""
+    rng = np.random.default_rng(list(CLASSES).index(name))
+    kwargs: dict[str, Any] = {"weights": "decimals", **CLASSES[name]}
+    fixed = "n" in kwargs or (kwargs.get("isolated") and not kwargs["parts"])
+    drawn = random_graph(rng, **{**kwargs, "n": smallest(**kwargs) + 2 * (not fixed)}).graph
+    edges = [(f"a{s}", f"a{t}", w) for s, t, w in drawn.edges]
+    graph = SignedDigraph.from_edges(edges, [f"a{v}" for v in drawn.labels])
+    start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
+    sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)] if slides else None
+    protocol = SLIDING if slides else NOMINAL
+    return json.loads(certify(graph, protocol, start, sigma0=sigma0, simulation=False, method=method).to_json())
+
+
+def valid(data: Any) -> bool:
+    return VALIDATOR.is_valid(data)
+
+
+def depth(value: Any) -> int:
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return 0 if items is None else 1 + max(map(depth, items), default=0)
+
+
+def objects(schema: Any) -> Iterator[Json]:
+    """Every object schema below a schema, ``unverified`` left out."""
+    if isinstance(schema, dict):
+        if "properties" in schema and schema.get("type") == "object":
+            yield schema
+        for key, item in schema.items():
+            if key != "unverified":
+                yield from objects(item)
+    elif isinstance(schema, list):
+        for item in schema:
+            yield from objects(item)
+
+
+def example() -> Json:
+    text = FORMAT.partition("## 18. Example")[2]
+    return json.loads(re.findall(r"```json\n(.*?)```", text, re.DOTALL)[0])
+
+
+# ---------------------------------------------------------------------- the schema
+
+
+def test_the_schema_is_a_strict_schema():
+    Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$id"] == checker.SCHEMA
+    for found in objects(SCHEMA):
+        assert found["additionalProperties"] is False
+        if "minProperties" not in found:
+            left_open = {"components"} if found is SCHEMA else set()
+            assert set(found["properties"]) - left_open == set(found["required"])
+
+
+@pytest.mark.parametrize(
+    ("name", "slides"), [*((name, False) for name in CLASSES), *((name, True) for name in list(CLASSES)[::3])]
+)
+def test_certificates_of_every_class_are_valid(name: str, slides: bool):
+    data = made(name, slides)
+    VALIDATOR.validate(data)
+    assert depth({**data, "unverified": {}}) <= 8
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_certificates_with_every_lyapunov_function_are_valid(name: str, slides: bool):
+    data = made(name, slides, "best")
+    VALIDATOR.validate(data)
+    assert depth({**data, "unverified": {}}) <= 8
+
+
+def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.MonkeyPatch):
+    pairs = [(f"a{i}", f"b{i}", -1) for i in range(MANY_COMPONENTS + 5)]
+    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, simulation=False).to_json())
+    VALIDATOR.validate(data)
+    assert isinstance(data["components"], dict) and data["outcome"]["influence"]["followers"] is None
+    for key in data["components"]:
+        assert not valid(changed(data, ("components", key), data["components"][key][:MANY_COMPONENTS]))
+    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    data = made.__wrapped__("3.1 no single")
+    VALIDATOR.validate(data)
+    assert data["proof"][2]["witness"] is not None
+
+
+def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(document, "LONG", 1)
+    certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, simulation=False).save(tmp_path / "c.json")
+    data = checker.read(tmp_path / "c.json")
+    VALIDATOR.validate(data)
+    assert isinstance(data["graph"]["edges"], dict)
+    assert not valid(changed(data, ("graph", "edges", "source", "file"), "../x.npy"))
+    assert not valid(changed(data, ("graph", "edges", "count"), "2"))
+
+
+def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(certificate_module, "EXACT_NODES", 0)
+    monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
+    data, _ = with_side_files(with_factors(made.__wrapped__("3.1 mixed", True, "best")))
+    VALIDATOR.validate(data)
+    assert depth({**data, "unverified": {}}) <= 8
+    step = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "dominance")
+    for path in (
+        ("structure", "leaders"),
+        ("initial_state",),
+        ("outcome", "final_state", "mid"),
+        ("proof", step, "witness", "vector"),
+        ("lyapunov", "members", 0, "blocks", 0, "diagonal"),
+    ):
+        said = at(data, path)
+        assert not valid(changed(data, path, {**said, "count": str(said["count"])})), path
+        assert not valid(changed(data, path, {**said, "scale": 1})), path
+        assert not valid(changed(data, path, {**said, "more": None})), path
+    path = ("proof", step, "witness", "groups", 0)
+    entry = at(data, path)
+    for new in (
+        {"rate": entry["rate"]},
+        {**entry, "more": 1},
+        {**entry, "factor": {**entry["factor"], "bits": "1"}},
+        {**entry, "factor": {**entry["factor"], "data": [0.5]}},
+    ):
+        assert not valid(changed(data, path, new))
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_another_key_or_one_less_is_not_valid(name: str, slides: bool):
+    data = made(name, slides)
+    labels, count = set(data["graph"]["nodes"]), 0
+    for path in containers({k: v for k, v in data.items() if k != "unverified"}):
+        value = at(data, path)
+        if isinstance(value, dict):
+            assert not valid(changed(data, path, {**value, "more": {}})), path
+            # Which agents, and whether there is a rho or an end of its interval, is for the checker.
+            for key in value:
+                if key not in labels and not (path[-1:] == ("numbers",) and key in ("rho", "printed", "exact")):
+                    assert not valid(changed(data, path, {k: v for k, v in value.items() if k != key})), (path, key)
+                    count += 1
+    assert count > 100
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_a_number_outside_the_grammar_is_not_valid(name: str, slides: bool):
+    data = made(name, slides)
+    count = 0
+    for path, value in leaves({k: v for k, v in data.items() if k not in ("unverified", "digest", "producer")}):
+        try:
+            exact(value)
+        except RejectedError:
+            continue
+        bad = BAD_NUMBERS[count % len(BAD_NUMBERS)]
+        assert not valid(changed(data, path, bad)), (path, bad)
+        count += 1
+    assert count > 30
+
+
+def test_the_grammar_of_the_schema_is_that_of_the_checker():
+    number = VALIDATOR.evolve(schema=SCHEMA["$defs"]["number"])
+    for text in GOOD_NUMBERS:
+        assert number.is_valid(text), text
+        exact(text)
+    for text in BAD_NUMBERS:
+        assert not number.is_valid(text), text
+        with pytest.raises(RejectedError):
+            exact(text)
+    rng = np.random.default_rng(1)
+    alphabet = list("0011289+-./eExXpPaF\n ")
+    for length in rng.integers(1, 8, 4000):
+        text = "".join(rng.choice(alphabet, length))
+        try:
+            exact(text)
+        except RejectedError:
+            assert not number.is_valid(text), text
+        else:
+            assert number.is_valid(text), text
+
+
+def test_words_and_sections_that_do_not_fit_are_not_valid():
+    data, sliding = made("1.1"), made("2.1 K>=2", True)
+    for path, new in (
+        (("schema",), "ptcc-certificate/2"),
+        (("verdict",), "proved"),
+        (("effort",), "1"),
+        (("claim", "theorem"), "7.1"),
+        (("claim", "behaviour"), "consensus"),
+        (("structure", "connectivity"), "disconnected"),
+        (("claim",), None),
+        (("protocol", "kind"), "sliding-mode"),
+        (("sigma0",), data["initial_state"]),
+        (("lyapunov", "members", 0, "class"), "best"),
+        (("proof", 0, "kind"), "claim"),
+        (("proof", 0, "statement"), "everything is well"),
+        (("proof", 0, "witness"), {}),
+        (("structure", "closed_components", 0, "gauge", 0), 2),
+        (("digest",), data["digest"].upper()),
+    ):
+        assert not valid(changed(data, path, new)), path
+    assert not valid({**data, "components": []})
+    assert not valid({**sliding, "sigma0": None}) and not valid({**sliding, "reaching_time": None})
+
+
+# ---------------------------------------------------------------------- the text
+
+
+def test_every_key_is_described():
+    rows = set(re.findall(r"^\| `(\w+)` \|", FORMAT.partition("## 4.")[2].partition("## 5.")[0], re.MULTILINE))
+    assert rows == set(SCHEMA["properties"])
+    for found in objects(SCHEMA):
+        for key in found["properties"]:
+            assert re.search(rf"[`\"]{re.escape(key)}[`\"]|`rates\.{key}`|`influence\.{key}`", FORMAT), key
+
+
+def test_every_word_is_described():
+    words: set[str] = set()
+
+    def collect(schema: Any) -> None:
+        if isinstance(schema, dict):
+            words.update(x for x in schema.get("enum", []) if isinstance(x, str))
+            if isinstance(schema.get("const"), str):
+                words.add(schema["const"])
+            for item in schema.values():
+                collect(item)
+        elif isinstance(schema, list):
+            for item in schema:
+                collect(item)
+
+    collect({key: item for key, item in SCHEMA.items() if key != "$schema"})
+    assert {word for word in words if word not in FORMAT} == set()
+
+
+def test_obligations_are_described_with_their_texts():
+    blocks = re.findall(r"```json\n(.*?)```", FORMAT, re.DOTALL)
+    assert json.loads(blocks[0]) == {kind: list(texts) for kind, texts in OBLIGATIONS.items()}
+    table = re.findall(r"^\| `([a-z-]+)` \| `[a-z]", FORMAT.partition("## 14.")[2].partition("## 15.")[0], re.MULTILINE)
+    assert table == ["structure", "claim", "outcome", *[kind for kind in table if kind not in table[:3]]]
+    assert set(table) == set(OBLIGATIONS) and len(table) == len(OBLIGATIONS)
+    for kind in OBLIGATIONS:
+        assert f"- **{kind}**: " in FORMAT, kind
+
+
+@pytest.mark.parametrize(("name", "slides"), SAMPLE)
+def test_obligations_stand_in_the_order_of_the_table(name: str, slides: bool):
+    table = re.findall(r"^\| `([a-z-]+)` \| `[a-z]", FORMAT.partition("## 14.")[2].partition("## 15.")[0], re.MULTILINE)
+    groups: list[tuple[str, list[int]]] = []
+    for step in made(name, slides, "best")["proof"]:
+        of = step["of"] if step["of"].startswith("lyapunov") else "rest"
+        if not groups or groups[-1][0] != of:
+            groups.append((of, []))
+        groups[-1][1].append(table.index(step["kind"]))
+    assert all(places == sorted(places) for _, places in groups)
+    rest = [place for of, places in groups if of == "rest" for place in places]
+    assert rest == sorted(rest)
+
+
+def test_lines_are_short_and_the_number_of_the_schema_is_that_of_the_checker():
+    assert max(map(len, FORMAT.splitlines())) <= 120
+    assert FORMAT.startswith(f"# The certificate format `{checker.SCHEMA}`\n")
+
+
+# ---------------------------------------------------------------------- the example
+
+
+def test_the_example_is_the_file_that_is_made_and_is_accepted(tmp_path: Path):
+    told = example()
+    assert told["unverified"] == {}
+    VALIDATOR.validate(told)
+    (tmp_path / "c.json").write_text(json.dumps(told), encoding="utf-8")
+    for stdlib in (True, False):
+        report = check(tmp_path / "c.json", stdlib=stdlib)
+        assert report.accepted and report.verdict == "certified", (report.rejected, report.reason)
+    graph = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
+    now = json.loads(certify(graph, protocol, [3, 5], simulation=False, method="paper").to_json())
+    # Where the search's floats end, and so the last digits of rates and witnesses, is for the platform.
+    exactly = ("schema", "graph", "structure", "claim", "protocol", "initial_state", "sigma0", "outcome", "verdict")
+    assert {key: now[key] for key in exactly} == {key: told[key] for key in exactly}
+    assert list(now) == list(told)
+    assert [step["kind"] for step in now["proof"]] == [step["kind"] for step in told["proof"]]
+
+
+def test_the_example_by_hand():
+    """The lines below the example."""
+    told = example()
+    numbers = {step["kind"]: step["numbers"] for step in told["proof"]}
+    assert Fraction(numbers["deviation-decrease"]["b"]) < 4
+    distance = told["lyapunov"]["members"][0]["distance"]
+    assert all(Fraction(c) >= 1 for c in distance["agents"].values()) and Fraction(distance["norm"]) > 2
+    assert numbers["rate-mean"] == {"limit": "4"} and told["rates"]["limit"] == "4"
+    lines = ['["1"]', '["2"]', '["1", "2", "-1"]', '["2", "1", "-1"]']
+    canonical = "".join(f"{line}\n" for line in lines)
+    assert hashlib.sha256(canonical.encode()).hexdigest() == told["graph"]["sha256"]
+
+
+def spelled(text: str, ascii_only: bool) -> str:
+    """A text as sections 5 and 16 say that it is written."""
+    short = {'"': '\\"', "\\": "\\\\", "\b": "\\b", "\t": "\\t", "\n": "\\n", "\f": "\\f", "\r": "\\r"}
+
+    def one(char: str) -> str:
+        if char in short:
+            return short[char]
+        if ord(char) >= 0x20 and (ord(char) <= 0x7E or not ascii_only):
+            return char
+        units = char.encode("utf-16-be", "surrogatepass")
+        return "".join(f"\\u{units[i]:02x}{units[i + 1]:02x}" for i in range(0, len(units), 2))
+
+    return '"' + "".join(map(one, text)) + '"'
+
+
+def written(value: Any) -> str:
+    """A document in the form of section 16."""
+    if isinstance(value, dict):
+        return "{" + ",".join(f"{spelled(k, True)}:{written(value[k])}" for k in sorted(value)) + "}"
+    if isinstance(value, list):
+        return "[" + ",".join(map(written, value)) + "]"
+    if isinstance(value, str):
+        return spelled(value, True)
+    return "null" if value is None else str(value).lower()
+
+
+def test_both_hashes_are_those_that_the_text_describes():
+    names = ["\x00\x1f\x7f\x80", 'quote" back\\ slash/', "tab\t line\n\r\b\f", "é\u2028", "\U0001f600", "\uffff", "z"]
+    edges = [(names[i - 1], name, Fraction(i - 3 or 9, 2)) for i, name in enumerate(names)]
+    data = json.loads(certify(SignedDigraph.from_edges(edges), NOMINAL, simulation=False, method="paper").to_json())
+    assert check(data).accepted
+    said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
+    assert hashlib.sha256(written(said).encode("ascii")).hexdigest() == data["digest"]
+    rows = [[label] for label in sorted(data["graph"]["nodes"])]
+    rows += sorted([s, t, str(Fraction(w))] for s, t, w in data["graph"]["edges"])
+    text = "".join("[" + ", ".join(spelled(x, False) for x in row) + "]\n" for row in rows)
+    assert hashlib.sha256(text.encode("utf-8")).hexdigest() == data["graph"]["sha256"]

@@ -1,0 +1,979 @@
+"""The command line as a user meets it: what it prints, writes, refuses, and with which code it ends."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import re
+import shlex
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bad_inputs import BAD_INPUTS, BadInput, Run, listing, ptcc, write
+from generators import all_classes, random_graph
+from scipy.linalg import expm
+
+from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.checker import read
+from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph, select
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import write_graph
+from ptcc_certify.graphs.structure import BEHAVIOURS, analyse
+
+X0 = "5,2,-4,3,-2,1"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def one_object(text: str) -> dict[str, Any]:
+    """Parse exactly one JSON object; no NaN, no infinity, no key twice."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in pairs]
+        assert len(set(keys)) == len(keys)
+        return dict(pairs)
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    def finite(number: str) -> float:
+        assert math.isfinite(float(number)), number
+        return float(number)
+
+    data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
+    assert isinstance(data, dict)
+    return data
+
+
+def save(name: str, edges: list[tuple], nodes: list = []) -> str:  # noqa: B006
+    write_graph(SignedDigraph.from_edges(edges, nodes), name)
+    return name
+
+
+def ring(n: int, last: int = 1) -> list[tuple[int, int, int]]:
+    """A directed ring; balanced iff ``last`` is positive."""
+    return [(i, i % n + 1, last if i == n else 1) for i in range(1, n + 1)]
+
+
+# ---------------------------------------------------------------------- bad input
+
+
+def assert_refused(run: Run) -> None:
+    assert run.code == 2, run
+    assert run.out == ""
+    (line,) = run.err.splitlines()
+    assert line.startswith("ptcc: ") and len(line) > 10
+    assert line.isprintable()
+    assert "Traceback" not in line
+
+
+@pytest.mark.parametrize("case", BAD_INPUTS, ids=lambda case: case.name)
+def test_bad_input_is_refused_in_one_line(case: BadInput, folder: Path):
+    write(case.files, folder)
+    before, started = listing(folder), time.perf_counter()
+    run = ptcc(*case.args, stdin=case.stdin)
+    assert time.perf_counter() - started < 10
+    assert_refused(run)
+    assert re.search(case.says, run.err), run.err
+    assert listing(folder) == before
+
+
+def test_the_names_of_the_table_differ():
+    assert len({case.name for case in BAD_INPUTS}) == len(BAD_INPUTS) >= 45
+
+
+SAMPLE = ("weight NaN", "directory", "gzip cut short", "XML entity bomb", "T NaN", "x0 too short", "unknown command")
+
+
+@pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
+def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
+    write(case.files, folder)
+    before = listing(folder)
+    assert_refused(process(*case.args))
+    assert listing(folder) == before
+
+
+def process(*args: str, stdin: bytes = b"", env: dict[str, str] | None = None) -> Run:
+    done = subprocess.run(
+        [sys.executable, "-m", "ptcc_certify.cli", *args],
+        input=stdin,
+        capture_output=True,
+        timeout=60,
+        env=os.environ | (env or {}),
+    )
+    encoding = (env or {}).get("PYTHONIOENCODING", "utf-8")
+    return Run(done.returncode, done.stdout.decode(encoding), done.stderr.decode(encoding))
+
+
+@pytest.mark.parametrize(
+    "edges",
+    [
+        [("a", "b", "1e-300"), ("b", "a", "1e300")],
+        [("a", "b", "1e-300"), ("b", "a", "-1e300")],
+        [("a", "b", "1e-300"), ("b", "c", "1e300"), ("c", "b", "1e300")],
+        [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d", "-1e300"), ("d", "c", "1e-300")],
+        [("a", "c", "1e300"), ("b", "c", "-1e-300"), ("c", "d", "1e-300"), ("d", "c", "1")],
+        [("a", "c", "1.6e308"), ("b", "c", "-1.6e308")],
+        [("a", "b", "1.6e308"), ("b", "a", "1.6e308"), ("c", "a", "1.6e308"), ("a", "c", "1.6e308")],
+        [("a", "b", "1e-300"), ("b", "a", "-1e-300")],
+    ],
+)
+def test_weights_at_the_ends_of_float64_give_an_answer(edges: list[tuple]):
+    name = save("wide.csv", edges)
+    for command in ("classify", "certify", "simulate"):
+        run = ptcc(command, name)
+        assert run.code in ({0} if command == "classify" else {0, 2, 4}), run
+        assert "Traceback" not in run.err and "Warning" not in run.err
+        if run.code == 2:
+            assert_refused(run)
+    run = ptcc("certify", name, "--json")
+    assert run.code in {0, 4}
+    assert one_object(run.out)["verdict"] == {0: "certified", 4: "undecided"}[run.code]
+
+
+def test_starts_of_any_size_are_compared_alike():
+    """The problem is linear: a start 10^200 times as large has the same ratios."""
+    ratios = []
+    for scale in ("", "e200", "e-200"):
+        run = ptcc("certify", "fig1a", "--x0", ",".join(x + scale for x in X0.split(",")), "--json")
+        assert run.code == 0 and run.err == ""
+        ratios.append(one_object(run.out)["unverified"]["simulation"]["worst_ratio"])
+    assert ratios[0] > 0.01
+    assert ratios == pytest.approx([ratios[0]] * 3, rel=1e-3)
+
+
+# ---------------------------------------------------------------------- exit codes
+
+
+def test_proved_is_0():
+    run = ptcc("certify", "fig1b", "--x0", X0)
+    assert run.code == 0
+    says = r"verdict    certified; \|\|E\|\| <= [0-9.e-]+ \|\|E\(0\)\|\| at 0.99 T"
+    assert re.fullmatch(says, run.out.splitlines()[-1])
+    assert run.err == ""
+
+
+def test_a_violated_bound_is_1(monkeypatch: pytest.MonkeyPatch):
+    compare = Envelope.compare
+    monkeypatch.setattr(Envelope, "compare", lambda self, run: replace(compare(self, run), worst_ratio=1.01))
+    run = ptcc("certify", "fig1b", "--expect", "stability")
+    assert run.code == 1
+    says = "VIOLATED: the simulated run exceeds the proved bound; please report this graph; refuted: stability"
+    assert run.out.splitlines()[-1].startswith(f"verdict    {says}")
+    assert ptcc("examples", "fig1a").code == 1
+
+
+def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: pytest.MonkeyPatch):
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr("ptcc_certify.certificate.certificate.certify", fail)
+    run = ptcc("certify", "fig1b")
+    assert run.code == 70
+    assert "RuntimeError" in run.err and "report" in run.err and run.out == ""
+    for error, code in ((MemoryError(), 2), (OverflowError(), 2), (KeyboardInterrupt(), 130)):
+        monkeypatch.setattr(
+            "ptcc_certify.certificate.certificate.certify", lambda *_, error=error, **__: (_ for _ in ()).throw(error)
+        )
+        run = ptcc("certify", "fig1b")
+        assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
+
+
+@pytest.mark.parametrize("method", ["paper", "perron", "lmi", "full", "best"])
+def test_the_method_decides_which_classes_are_searched(method: str):
+    data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
+    classes = [member["class"] for member in data["lyapunov"]["members"]]
+    wanted = {"paper": {"paper"}, "best": {"paper", "lmi", "full"}}.get(method, {"paper", method})
+    assert classes[0] == "paper" and set(classes) == wanted
+    assert set(data["unverified"]["search"]["tried"]) == (
+        {"perron", "lmi", "full"} if method == "best" else wanted - {"paper"}
+    )
+    screen = ptcc("certify", "fig3a", "--method", method, "--x0", X0).out
+    assert ("tried" in screen) == ("taken" in screen) == (method != "paper")
+    assert len(screen.splitlines()) <= 24
+
+
+def test_the_bound_at_an_instant_is_printed_for_every_agent():
+    run = ptcc("certify", "fig3a", "--x0", X0, "--at", "0.3")
+    assert run.code == 0 and "at t = 0.3: 1 " in run.out and len(run.out.splitlines()) <= 24
+    sliding = ptcc("certify", "fig3a", "--protocol", "sliding-mode", "--sigma0", "random", "--at", "0.9")
+    assert sliding.code == 0 and "at t = 0.9: 1 " in sliding.out and len(sliding.out.splitlines()) <= 24
+    for bad in ("1", "-0.1", "soon", "nan", "1e999"):
+        refused = ptcc("certify", "fig3a", f"--at={bad}")
+        assert_refused(refused)
+        assert "at" in refused.err
+
+
+@pytest.mark.parametrize("command", ["classify", "certify"])
+def test_a_refuted_expectation_is_3(command: str):
+    run = ptcc(command, "fig1b", "--expect", "stability")
+    assert run.code == 3
+    said = "refuted: stability (it is bipartite consensus)"
+    if command == "certify":
+        assert run.out.splitlines()[-1] == f"verdict    {said}; certified" and run.err == ""
+    else:
+        assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
+
+
+def test_check_reads_the_graph_as_the_certificate_says(folder: Path):
+    """Orientation, repeated edges, self-loops and ties without direction; options of the command override."""
+    Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
+    reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
+    assert ptcc("certify", "g.csv", *reading, "--no-simulation", "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", "g.csv")
+    assert run.code == 0
+    assert run.out.splitlines()[0] == f"graph      g.csv, read as the certificate says: {' '.join(reading)}"
+    assert one_object(ptcc("check", "c.json", "g.csv", "--json").out)["graph_read"].endswith(" ".join(reading))
+    run = ptcc("check", "c.json", "g.csv", "--duplicates", "last")
+    assert run.code == 1 and "read as the options say: --edges listens --duplicates last" in run.out
+    assert "another weight" in run.out
+    Path("ties.csv").write_text("a,b,1\nb,c,2\n")
+    assert ptcc("certify", "ties.csv", "--undirected", "--no-simulation", "-o", "t.json").code == 0
+    assert ptcc("check", "t.json", "ties.csv").code == 0
+
+
+@pytest.mark.parametrize(
+    ("edges", "said"),
+    [
+        ("b,a,1 c,b,-0.123456789 a,c,2 d,c,3", "every edge points the other way: read it with --edges listens?"),
+        ("a,b,1 b,c,0.123456789 c,a,2 c,d,3", "1 of 4 edges has another sign (the signs are dropped), such as b -> c"),
+        (
+            "a,b,1 b,c,-0.123456789 c,a,-2 c,d,-3",
+            "2 of 4 edges have another sign, such as c -> a: 2 in the certificate",
+        ),
+        ("a,b,1 b,c,-0.12346 c,a,2 c,d,3", "1 of 4 edges has another weight, as if rounded: the largest relative"),
+        (
+            "a,b,1 b,c,-0.12346 c,a,4 c,d,3",
+            "2 of 4 edges have another weight: the largest relative difference is 1, of c",
+        ),
+        ("a,b,1 b,c,-0.123456789 c,a,2 d,c,3", "1 of 4 edges points the other way, such as c -> d in the certificate"),
+        ("a,b,1 b,c,-0.123456789 c,a,2 a,d,3", "1 edge of the certificate alone, such as c -> d; 1 edge of the graph"),
+        ("a,b,1 b,c,-0.123456789 c,a,2 c,e,3", "1 node of the certificate alone, such as d; 1 node of the graph alone"),
+        (
+            "b,a,1 c,b,0.123456789 a,c,2 d,c,3",
+            "every edge points the other way: read it with --edges listens? Then 1 of 4",
+        ),
+    ],
+)
+def test_a_graph_that_is_another_one_is_told_apart(folder: Path, edges: str, said: str):
+    Path("g.csv").write_text("a,b,1\nb,c,-0.123456789\nc,a,2\nc,d,3\n")
+    assert ptcc("certify", "g.csv", "--no-simulation", "-o", "c.json").code == 0
+    Path("h.csv").write_text(edges.replace(" ", "\n") + "\n")
+    run = ptcc("check", "c.json", "h.csv")
+    assert run.code == 1 and run.err == ""
+    assert run.out.splitlines()[-1].startswith(f"rejected   graph: another graph than h.csv: {said}")
+
+
+@pytest.mark.parametrize(("nodes", "digits"), [(6, 1800), (30, 300), (130, 1800)])
+def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: Path, nodes: int, digits: int):
+    """Quotients of long numbers without a common factor."""
+    ends = [(i, (i + k) % nodes) for i in range(nodes) for k in (1, 2)]
+    rows = [f"n{i},n{j},{10**digits + 2 * k + 1}/{10**digits + 6 * k + 7}" for k, (i, j) in enumerate(ends)]
+    Path("g.csv").write_text("\n".join(rows) + "\n")
+    run = ptcc("certify", "g.csv")
+    assert run.code == 2 and run.out == "" and len(run.err.splitlines()) == 1
+    assert f"too many for exact proofs of {nodes} agents (the longest is that of edge n" in run.err
+    assert run.err.rstrip().endswith("round them, to 17 digits say")
+
+
+@pytest.mark.parametrize("ending", ["npy", "mtx"])
+@pytest.mark.parametrize("options", [(), ("--edges", "information"), ("--edges", "listens")])
+def test_check_reads_a_matrix_as_its_certificate_says(folder: Path, ending: str, options: tuple[str, ...]):
+    W = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    if ending == "npy":
+        np.save("m.npy", W)
+    else:
+        from scipy.io import mmwrite
+
+        mmwrite("m.mtx", W)
+    assert ptcc("certify", f"m.{ending}", *options, "--x0", "1,2,3", "--no-simulation", "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", f"m.{ending}")
+    assert run.code == 0 and "accepted" in run.out, run.out
+
+
+@pytest.mark.parametrize("digits", [50, 200, 400])
+def test_long_weights_short_of_the_limit_are_certified(folder: Path, digits: int):
+    rows = [
+        f"n{i},n{(i + k) % 6},{10**digits + 2 * i + 1}/{10**digits + 6 * i + 7 * k}" for i in range(6) for k in (1, 2)
+    ]
+    Path("g.csv").write_text("\n".join(rows) + "\n")
+    start = ",".join(f"{k}.{10**digits + k}" for k in range(6))
+    run = ptcc("certify", "g.csv", "--no-simulation", "--x0", start, "--T", f"1.{10**digits + 1}")
+    assert run.code == 0 and run.out.splitlines()[-1].startswith("verdict    certified; ")
+
+
+def test_parameters_of_thousands_of_digits_are_refused_by_name(folder: Path):
+    long = "1." + "123456789" * 300
+    for flag, name in (("--T", "T"), ("--rho1", "rho1"), ("--kappa", "kappa")):
+        run = ptcc("certify", "fig1a", flag, long, "--no-simulation")
+        assert run.code == 2 and len(run.err.splitlines()) == 1, run.err
+        assert name in run.err and "round it" in run.err
+
+
+def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path):
+    """0 proved, 1 rejected (a changed field, another graph), 4 undecided; the same from the module."""
+    assert ptcc("certify", "fig5b", "-o", "c.json").code == 0
+    for options in ((), ("--stdlib",), ("fig5b",)):
+        run = ptcc("check", "c.json", *options)
+        assert run.code == 0 and run.err == ""
+        lines = run.out.splitlines()
+        if options == ("fig5b",):
+            assert lines.pop(0) == "graph      fig5b, read as the certificate says: --edges information"
+        assert len(lines) == len(read("c.json")["proof"]) + 1
+        assert all(line.startswith("verified   ") for line in lines[:-1])
+        assert lines[-1].startswith("accepted   certified;")
+        assert ("python-flint" in lines[-1]) == (options != ("--stdlib",))
+    said = one_object(ptcc("check", "c.json", "--json").out)
+    assert said["accepted"] is True and said["rejected"] is None
+    assert [(step["kind"], step["of"]) for step in said["obligations"]] == [
+        (step["kind"], step["of"]) for step in read("c.json")["proof"]
+    ]
+    run = ptcc("check", "c.json", "fig5a")
+    assert run.code == 1
+    assert run.out.splitlines()[-1].startswith("rejected   graph: another graph than fig5a: ")
+    data = read("c.json")
+    data["rates"]["certified"] = "1000"
+    Path("false.json").write_text(json.dumps(data))
+    run = ptcc("check", "false.json")
+    assert run.code == 1
+    assert run.out.splitlines()[-1] == "rejected   rates: the rate certified is not the proved one"
+    assert ptcc("check", "false.json", "--json").code == 1
+    Path("ring.csv").write_text("".join(f"{i},{(i + 1) % 130},1\n" for i in range(130)))
+    assert ptcc("certify", "ring.csv", "--method", "full", "-o", "ring.json").code == 4
+    run = ptcc("check", "ring.json", "ring.csv")
+    assert run.code == 4 and run.out.splitlines()[-1].startswith("accepted   undecided;")
+    module = [sys.executable, "-m", "ptcc_certify.checker"]
+    for name, code in (("c.json", 0), ("false.json", 1), ("ring.json", 4), ("nowhere.json", 2)):
+        assert subprocess.run([*module, name], capture_output=True, cwd=folder).returncode == code
+
+
+def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
+    """fig1b: the bound by its slowest mode, below that by its mean eigenvalue; below it, doubt."""
+    data = one_object(ptcc("certify", "fig1b", "--json").out)
+    proved, limit = Fraction(data["rates"]["certified"]), Fraction(data["rates"]["limit"])
+    mean = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
+    hair = Fraction(1, 10**6)
+    assert proved + hair < limit < mean
+    for wanted, code in ((proved, 0), (proved + hair, 4), (limit, 4), (limit + hair, 3), (mean, 3)):
+        run = ptcc("certify", "fig1b", "--min-rate", str(wanted))
+        assert run.code == code
+        verdict = run.out.splitlines()[-1].removeprefix("verdict    ")
+        assert verdict.startswith({0: "certified; ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
+        bound = re.search(r"none exceeds ([0-9.]+), proved|at most ([0-9.]+) can be|met: rate", verdict)
+        assert bound is not None and (code == 0 or Fraction(bound[1] or bound[2]) >= limit)
+
+
+def test_of_one_mode_the_mean_eigenvalue_is_the_limit():
+    """Two agents: 8 is twice the only nonzero eigenvalue."""
+    name = save("pair.csv", [(1, 2, -1), (2, 1, -3)])
+    assert one_object(ptcc("certify", name, "--json").out)["rates"]["limit"] == "8"
+    assert ptcc("certify", name, "--min-rate", "8").code == 4
+    assert ptcc("certify", name, "--min-rate", "8.000000000001").code == 3
+
+
+def test_a_class_that_is_not_proved_for_a_large_graph_leaves_it_undecided():
+    name = save("ring.csv", ring(121))
+    assert ptcc("certify", name).code == 0
+    run = ptcc("certify", name, "--method", "full")
+    assert run.code == 4
+    assert "the paper's certificate is proved up to 120 nodes" in run.out
+    assert "not proved; numerically" in run.out
+    assert ptcc("certify", name, "--method", "full", "--min-rate", "0.001").code == 4
+    assert ptcc("certify", name, "--min-rate", "0.001").code == 0
+    assert ptcc("certify", name, "--min-rate", "1000").code == 3
+    assert ptcc("certify", name, "--expect", "stability").code == 3
+    assert ptcc("classify", name).code == 0
+
+
+def test_every_behaviour_can_be_expected_with_hyphens_and_implies_the_weaker_ones():
+    graphs = {
+        "stability": save("s.csv", ring(3, -1)),
+        "consensus": save("c.csv", ring(3)),
+        "signed-average-consensus": save("a.csv", [(1, 2, -1), (2, 1, -1)]),
+        "bipartite-consensus": save("b.csv", [(1, 2, -1), (2, 1, -2)]),
+        "interval-bipartite-consensus": save("i.csv", [(1, 2, -1), (1, 3, 1), (2, 3, 1)]),
+        "containment": save("h.csv", [(1, 3, 1), (2, 3, 1)]),
+        "bipartite-containment": save("d.csv", [(1, 3, 1), (2, 3, 1), (1, 4, 1), (3, 4, -1)]),
+    }
+    assert {name.replace("-", " ") for name in graphs} == {name.replace("-", " ") for name in BEHAVIOURS}
+    follows = {
+        "stability": {"stability"},
+        "consensus": {
+            "consensus",
+            "signed-average-consensus",  # the ring is regular
+            "containment",
+            "bipartite-consensus",
+            "interval-bipartite-consensus",
+            "bipartite-containment",
+        },
+        "signed-average-consensus": {
+            "signed-average-consensus",
+            "bipartite-consensus",
+            "interval-bipartite-consensus",
+            "bipartite-containment",
+        },
+        "bipartite-consensus": {"bipartite-consensus", "interval-bipartite-consensus", "bipartite-containment"},
+        "interval-bipartite-consensus": {"interval-bipartite-consensus", "bipartite-containment"},
+        "containment": {"containment", "bipartite-containment"},
+        "bipartite-containment": {"bipartite-containment"},
+    }
+    for kind, name in graphs.items():
+        for wanted in graphs:
+            assert ptcc("classify", name, "--expect", wanted).code == (0 if wanted in follows[kind] else 3), kind
+    assert ptcc("certify", graphs["interval-bipartite-consensus"], "--expect", "bipartite-containment").code == 0
+
+
+def test_of_a_disconnected_graph_the_worst_component_counts():
+    name = save("apart.csv", [(1, 2, 1), (2, 1, 1), (3, 4, -1), (4, 3, -1)])
+    assert ptcc("classify", name, "--expect", "bipartite-consensus").code == 0
+    assert ptcc("classify", name, "--expect", "consensus").code == 3
+
+
+# ---------------------------------------------------------------------- JSON
+
+
+def odd_graphs() -> dict[str, str]:
+    return {
+        "apart": save("apart.csv", [(1, 2, 1), (2, 1, -1), (3, 4, -1), (4, 3, -1)], [5]),
+        "one": save("one.csv", [], ["alone"]),
+        "isolated": save("isolated.csv", [], ["a", "b", "c"]),
+    }
+
+
+@pytest.mark.parametrize("command", ["classify", "certify"])
+@pytest.mark.parametrize("name", [*GRAPHS, "apart", "one", "isolated"])
+def test_json_is_exactly_one_object(command: str, name: str):
+    graph = odd_graphs().get(name, name)
+    run = ptcc(command, graph, "--json")
+    assert run.code == 0
+    assert run.err == ""
+    data = one_object(run.out)
+    assert run.out.count("\n") == 1 and run.out.isascii()
+    assert {"graph", "structure", "claim"} <= set(data)
+    assert (data["claim"] is None) == (name in ("apart", "isolated")) == ("components" in data)
+    if command == "certify":
+        assert data["verdict"] == "certified"
+        assert data == one_object(json.dumps(data))
+
+
+def test_json_goes_out_also_when_an_expectation_is_refuted():
+    run = ptcc("certify", "fig1a", "--json", "--expect", "consensus", "-o", "c.json")
+    assert run.code == 3 and run.err == "verdict    refuted: consensus (it is stability); certified\n"
+    assert one_object(run.out) == read("c.json")
+
+
+# ---------------------------------------------------------------------- files in and out
+
+
+def test_the_certificate_is_written_whole(folder: Path):
+    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json", "--json")
+    data = one_object(run.out)
+    assert one_object(Path("c.json").read_text(encoding="utf-8")) == data == read("c.json")
+    assert listing(folder) == ["c.json"]
+    run = ptcc("certify", "fig1b", "--x0", X0, "-o", "c.json")
+    assert run.out.splitlines()[-1] == "written    c.json"
+    Path("c.json").write_text("an older file")
+    assert ptcc("certify", "fig1b", "--x0", "1,2", "-o", "c.json").code == 2
+    assert Path("c.json").read_text() == "an older file"
+
+
+def test_a_graph_from_standard_input():
+    text = b"a,b,-1\nb,a,-1\n"
+    for run in (ptcc("certify", "-", "--json", stdin=text), process("certify", "-", "--json", stdin=text)):
+        data = one_object(run.out)
+        assert data["graph"]["edges"] == [["b", "a", "-1"], ["a", "b", "-1"]]
+        assert data["claim"]["behaviour"] == "bipartite consensus"
+
+
+def test_a_local_file_wins_over_a_packaged_graph():
+    def claim(name: str) -> str:
+        return one_object(ptcc("classify", name, "--json").out)["claim"]["behaviour"]
+
+    assert claim("fig1a") == "stability"
+    Path("fig1a").mkdir()
+    assert claim("fig1a") == "stability"
+    Path("fig1b").write_text("a,b,1\nb,a,-1\n")
+    assert claim("fig1b") == "stability"
+
+
+@pytest.mark.parametrize("form", ["plain", "labelled", "file"])
+def test_starts_in_every_form(form: str):
+    Path("x0.csv").write_text("node,value\n6,1\n" + "".join(f"{k + 1},{v}\n" for k, v in enumerate(X0.split(",")[:5])))
+    labelled = "6=1," + ",".join(f"{k + 1}={v}" for k, v in enumerate(X0.split(",")[:5]))
+    data = one_object(
+        ptcc("certify", "fig1b", "--json", "--x0", {"plain": X0, "labelled": labelled, "file": "x0.csv"}[form]).out
+    )
+    assert data["initial_state"] == dict(zip("123456", X0.split(","), strict=True))
+
+
+def test_a_random_start_depends_on_the_seed_alone():
+    starts = [
+        one_object(ptcc("certify", "fig1b", "--json", "--seed", seed).out)["initial_state"] for seed in ("0", "0", "7")
+    ]
+    assert starts[0] == starts[1] != starts[2]
+    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in starts[2].values())
+
+
+def test_edges_are_read_the_way_that_is_asked_and_it_is_said():
+    Path("g.csv").write_text("a,b,1\n")
+    for edges, leader, words in ((None, "a", "flows a -> b"), ("listens", "b", "a listens to b")):
+        options = [] if edges is None else ["--edges", edges]
+        assert one_object(ptcc("classify", "g.csv", "--json", *options).out)["structure"]["leaders"] == [leader]
+        assert words in ptcc("classify", "g.csv", *options).out
+        assert words in ptcc("certify", "g.csv", *options).out
+
+
+def test_what_was_merged_dropped_or_mirrored_is_said():
+    Path("g.csv").write_text("a,b,1\na,b,2\nb,b,5\n")
+    run = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected", "--json")
+    data = one_object(run.out)
+    assert data["graph"]["edges"] == [["b", "a", "3"], ["a", "b", "3"]]
+    read = {"orientation": "information", "duplicates": "sum", "self_loops": "dropped 1", "undirected": True}
+    assert data["graph"]["read"] == read
+    screen = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected").out
+    assert "duplicates sum" in screen and "self-loops dropped 1" in screen and "undirected" in screen
+
+
+LABELS = ["two words", "a,b", 'say "no"', "ünï ☃ 中", "line\nbreak", "\x1b[31mred", "\x9b2J", "\u202egnihton", "=1"]
+
+
+def test_labels_of_any_kind_are_printed_safely_and_kept():
+    edges = [(a, b, 1) for a, b in zip(LABELS, LABELS[1:] + LABELS[:1], strict=True)]
+    name = save("labels.csv", edges, LABELS)
+    for command in ("classify", "certify"):
+        run = ptcc(command, name)
+        assert run.code == 0
+        assert all(line.isprintable() for line in run.out.splitlines())
+        data = one_object(ptcc(command, name, "--json").out)
+        assert data["graph"]["nodes"] == LABELS
+    assert len(ptcc("certify", name).out.splitlines()) <= 24
+    run = ptcc("simulate", name, "--samples", "2")
+    assert next(csv.reader(io.StringIO(run.out))) == ["t", "remaining", *LABELS]
+    items = [f"{label}={k}".replace('"', '""') for k, label in enumerate(LABELS)]
+    run = ptcc("certify", name, "--json", "--x0", ",".join(f'"{item}"' for item in items))
+    assert one_object(run.out)["initial_state"] == {label: str(k) for k, label in enumerate(LABELS)}
+    run = ptcc("certify", name, "--x0", ",".join(f'"{item}"' for item in items[:-3]))
+    assert_refused(run)
+    assert "\u202e" not in run.err
+    np.savez("surrogate.npz", A=[[0.0, 1.0], [1.0, 0.0]], labels=["\ud800", "b"])
+    run = ptcc("certify", "surrogate.npz", "-o", "c.json", "--json")
+    assert run.code == 0
+    assert read("c.json")["graph"]["nodes"] == one_object(run.out)["graph"]["nodes"] == ["\ud800", "b"]
+    assert ptcc("simulate", "surrogate.npz").code == 0
+
+
+def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
+    name = save("labels.csv", [("中", "b", -1), ("b", "中", -1)])
+    for encoding in ("cp1252", "latin-1"):
+        env = {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+        assert process("certify", name, env=env).code == 0
+        assert one_object(process("certify", name, "--json", env=env).out)["graph"]["nodes"] == ["中", "b"]
+        assert process("classify", "中.csv", env=env).code == 2
+
+
+def test_a_reader_that_stops_early_is_no_error():
+    with subprocess.Popen(
+        [sys.executable, "-m", "ptcc_certify.cli", "simulate", "fig1a", "--samples", "20000"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as child:
+        assert child.stdout is not None and child.stderr is not None
+        assert child.stdout.readline().startswith(b"t,remaining")
+        child.stdout.close()
+        assert child.stderr.read() == b""
+    assert child.returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_told():
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "ptcc_certify.cli", "classify", "fig1a"], stdout=full, stderr=subprocess.PIPE
+        )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    run = ptcc("classify", "fig1a")
+    assert run.code == 0
+
+
+# ---------------------------------------------------------------------- the screens
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_the_screen_of_certify_fits_24_lines(name: str):
+    (example, _, _) = select(name)[0]
+    parameters = [text for key, value in example.parameters.items() for text in (f"--{key}", value)]
+    for options in ([], [*parameters, "--x0", example.x0]):
+        run = ptcc("certify", name, *options)
+        assert run.code == 0
+        lines = run.out.splitlines()
+        assert len(lines) <= 24
+        heads = {line.split(maxsplit=1)[0] for line in lines}
+        expected = {"graph", "read", "structure", "claim", "protocol", "start", "ends", "rate", "left", "proof"}
+        assert expected | {"simulated", "verdict"} <= heads
+        assert "Theorem" in run.out
+
+
+def test_the_screen_of_classify_names_camps_and_cycles():
+    out = ptcc("classify", "fig1b").out
+    assert "camps {1, 2, 5, 6} against {3, 4}" in out
+    structure = analyse(load_graph("fig1a"))
+    cycle = structure.closed_components[0].negative_cycle
+    assert cycle is not None
+    labels = structure.graph.labels
+    assert "negative cycle " + " ".join(f"{labels[s]}->{labels[t]}" for s, t in cycle) in ptcc("classify", "fig1a").out
+
+
+def test_help_is_printed():
+    for args in (["--help"], ["certify", "-h"], ["simulate", "--help"]):
+        run = ptcc(*args)
+        assert run.code == 0
+        assert "Usage: ptcc" in run.out
+    run = ptcc()
+    assert run.code in (0, 2)
+    assert "certify" in run.out + run.err
+    assert re.fullmatch(r"ptcc, version \d+\.\d+.*\n", ptcc("--version").out)
+
+
+# ---------------------------------------------------------------------- simulate
+
+
+def table(text: str) -> tuple[list[str], np.ndarray]:
+    header, *rows = csv.reader(io.StringIO(text))
+    return header, np.array(rows, dtype=float)
+
+
+def test_simulate_prints_csv_up_to_the_deadline_and_past_it():
+    run = ptcc("simulate", "fig1b", "--T", "0.6", "--x0", X0, "--samples", "50")
+    assert run.code == 0 and run.err == ""
+    header, rows = table(run.out)
+    assert header == ["t", "remaining", *"123456"]
+    t, remaining, states = rows[:, 0], rows[:, 1], rows[:, 2:]
+    assert (np.diff(t) >= 0).all() and t[0] == 0 and t[-1] > 0.6
+    assert (np.diff(remaining) <= 0).all() and remaining[0] == 1 and remaining[-1] == 0
+    assert remaining[remaining > 0].min() == pytest.approx(1e-8)
+    assert len(rows) >= 50
+    assert states[0].tolist() == [float(x) for x in X0.split(",")]
+    final = one_object(ptcc("certify", "fig1b", "--T", "0.6", "--x0", X0, "--json").out)["outcome"]["final_state"]
+    settled = states[remaining == 0]
+    assert np.abs(settled - [float(Fraction(final[k])) for k in "123456"]).max() < 1e-8
+
+
+def test_simulate_without_a_deadline_is_the_plain_exponential():
+    run = ptcc("simulate", "fig1b", "--rho1", "0.7", "--rho2", "0", "--x0", X0)
+    assert run.code == 0
+    assert run.err == ""  # nobody promised that it settles
+    _, rows = table(run.out)
+    L = load_graph("fig1b").laplacian().toarray()
+    start = np.array([float(x) for x in X0.split(",")])
+    for row in rows[::20]:
+        assert row[2:] == pytest.approx(expm(-0.7 * row[0] * L) @ start, abs=1e-8)
+
+
+def test_simulate_agents_of_two_dimensions():
+    """The components of a vector-valued agent do not see each other."""
+    both = ptcc("simulate", "fig1a", "--dimension", "2", "--x0", "5,1,2,2,-4,3,3,4,-2,5,1,6")
+    first, second = (ptcc("simulate", "fig1a", "--x0", x0) for x0 in (X0, "1,2,3,4,5,6"))
+    header, rows = table(both.out)
+    assert header == ["t", "remaining", *(f"{k}[{c}]" for k in range(1, 7) for c in (1, 2))]
+    for component, alone in enumerate((first, second)):
+        assert rows[:, 2 + component :: 2] == pytest.approx(table(alone.out)[1][:, 2:], abs=1e-7)
+    assert ptcc("simulate", "fig1a", "--dimension", "3").code == 0
+
+
+def test_simulate_says_when_the_run_has_not_settled():
+    run = ptcc("simulate", save("slow.csv", [(1, 2, "1e-300"), (2, 1, "1e-300")]))
+    assert run.code == 0
+    assert run.err.startswith("note: ")
+    assert "note" not in run.out
+
+
+@pytest.mark.parametrize(
+    ("name", "magic"), [("a.png", b"\x89PNG\r\n\x1a\n"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF"), ("A.PNG", b"\x89PNG")]
+)
+def test_simulate_draws_figures(name: str, magic: bytes, folder: Path):
+    run = ptcc("simulate", "fig5a", "-o", name)
+    assert (run.code, run.out, run.err) == (0, "", "")
+    data = Path(name).read_bytes()
+    assert data.startswith(magic) and len(data) > 5000
+    assert listing(folder) == [name]
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.txt", "run"])
+def test_simulate_writes_tables(name: str):
+    assert ptcc("simulate", "fig1a", "-o", name).out == ""
+    assert Path(name).read_text(encoding="utf-8") == ptcc("simulate", "fig1a").out
+
+
+# ---------------------------------------------------------------------- the input, design
+
+
+@pytest.mark.parametrize(
+    ("most", "code", "says"),
+    [
+        ("1000", 0, "met: |u_k| <= 1000"),
+        ("100", 3, "refuted: |u_k| <= 100 (it is up to "),
+        ("652", 4, "left open: |u_k| <= 652 (proved: "),
+    ],
+)
+def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
+    run = ptcc("certify", "fig1a", "--no-simulation", "--max-input", most)
+    assert run.code == code and says in run.out.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("given", "most", "code", "says"),
+    [
+        # |u(0)| is 8, the gain reaches 30, and b and c hear 1 and 2: noise alone moves c by 30 * 4 * 10
+        (
+            ("--gain-cap", "30", "--noise", "10"),
+            "400",
+            3,
+            "(it is up to 1200 by noise alone, proved)",
+        ),
+        (("--gain-cap", "30", "--noise", "10"), "4000", 4, "left open: |u_k| <= 4000"),
+        (("--gain-cap", "30", "--noise", "10"), "7000", 0, ""),
+        (("--noise", "1"), "1e9", 3, "(it is without limit by noise alone, proved)"),
+        (("--delta", "5"), "20", 4, "left open: |u_k| <= 20"),
+        (("--delta", "5"), "400", 0, ""),
+        (("--delta", "5", "--gain-cap", "30"), "20", 4, "left open: |u_k| <= 20"),
+        (("--delta", "5", "--gain-cap", "30", "--noise", "0.1"), "400", 0, ""),
+        (("--gain-cap", "30"), "20", 0, ""),
+        (("--gain-cap", "30"), "5", 3, "at the start, proved"),
+    ],
+)
+def test_max_input_is_judged_under_the_noise_and_the_disturbances_of_the_command(
+    folder: Path, given: tuple[str, ...], most: str, code: int, says: str
+):
+    (folder / "g.csv").write_text("a,b,1\nb,a,-1\nb,c,2\n")
+    run = ptcc("certify", "g.csv", "--x0", "1,2,3", "--no-simulation", *given, "--max-input", most)
+    assert run.code == code and (says or "met: |u_k|") in run.out.splitlines()[-1], (run.code, run.out)
+
+
+def test_max_input_under_a_limit_is_about_what_the_limit_leaves(folder: Path):
+    Path("pair.csv").write_text("a,b,1\nb,a,-1\n")
+    words = ("certify", "pair.csv", "--initial-bound", "1", "--no-simulation")
+    assert ptcc(*words, "--gain-cap", "1", "--max-input", "3").code == 0
+    weak = ptcc(*words, "--gain-cap", "20", "--rho2", "0.1", "--kappa", "1", "--max-input", "50")
+    assert weak.code == 0 and "NOT BOUNDED" in weak.out
+    assert ptcc(*words, "--gain-cap", "2", "--max-input", "3").code == 3
+    assert ptcc(*words, "--gain-cap", "1", "--sample-period", "0.01", "--max-input", "3").code == 4
+
+
+def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
+    words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
+    run = ptcc(*words)
+    assert run.code == 0 and "INPUT      NOT BOUNDED" in run.out and "raise rho2 * kappa to 0.38337" in run.out
+    refuted = ptcc(*words, "--initial-bound", "1", "--max-input", "1e9")
+    assert refuted.code == 3 and "without limit, proved" in refuted.out.splitlines()[-1]
+
+
+def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
+    run = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "1/1000", "--delta", "0.1")
+    assert run.code == 0 and "held for 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
+    coarse = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "0.5")
+    assert "not certified with this period; with 0.00" in coarse.out and coarse.code == 4
+    assert "verdict    left open: limits (certified with a period of 0.00" in coarse.out
+    rows = ptcc("simulate", "fig1a", "--gain-cap", "20", "--samples", "11").out.splitlines()
+    assert (
+        rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines() and rows[0] == "t,remaining,1,2,3,4,5,6"
+    )
+
+
+def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
+    asked = ("design", "fig1a", "--max-input", "10", "--initial-bound", "1")
+    met = ptcc(*asked, "--deadline", "2", "-o", "d.json", "--curve", "d.csv")
+    assert met.code == 0 and "verdict               met" in met.out
+    assert ptcc("check", "d.json", "fig1a").code == 0
+    lines = Path("d.csv").read_text().splitlines()
+    assert lines[0] == "deadline,certified_peak,no_gains_below" and len(lines) == 62
+    assert ptcc(*asked, "--deadline", "0.7").code == 3
+    assert ptcc(*asked, "--deadline", "0.9", "-o", "none.json").code == 4
+    assert not Path("none.json").exists()
+    assert ptcc(*asked, "--shortest-deadline", "--curve", "d.png").code == 0 and Path("d.png").stat().st_size > 5000
+    data = json.loads(ptcc(*asked, "--shortest-deadline", "--input-norm", "2", "--json").out)
+    assert data["verdict"] == "met" and data["input_norm"] == 2 and Fraction(data["peak"]) <= 10
+
+
+def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
+    rng, capped = np.random.default_rng(1), 0
+    graphs = [*GRAPHS]
+    for seed in range(0, 45, 9):
+        _, kwargs = all_classes()[seed]
+        write_graph(random_graph(rng, n=8, **{k: v for k, v in kwargs.items() if k != "n"}).graph, f"r{seed}.csv")
+        graphs.append(f"r{seed}.csv")
+    tasks = [("--shortest-deadline",), ("--shortest-deadline", "--input-norm", "2"), ("--deadline", "20/3")]
+    tasks += [("--shortest-deadline", "--residual", "4"), ("--deadline", "4.1", "--residual", "0.01")]
+    for graph, task in zip(graphs, tasks * 3, strict=False):
+        asked = ("design", graph, "--max-input", "50", "--initial-bound", "2.3", *task)
+        found = one_object(ptcc(*asked, "--json").out)
+        word, *command = shlex.split(found["command"])
+        assert word == "ptcc" and command[:2] == ["certify", graph]
+        again = ptcc(*command, "--json", "--no-simulation")
+        assert again.code == 0, (asked, command, again.err)
+        proved = one_object(again.out)
+        assert proved["protocol"] == {k: found["protocol"][k] for k in proved["protocol"]}
+        effort = proved["effort"]
+        if found["gain_cap"] is None:
+            agents = max(map(Fraction, effort["peak"]["agents"].values()))
+            peak = Fraction(effort["peak"]["norm"]) if found["input_norm"] else agents
+            assert peak == Fraction(found["peak"]) <= 50
+        else:
+            (entry,) = effort["residual"]
+            assert max(map(Fraction, entry["agents"].values())) == Fraction(found["residual"])
+            assert Fraction(found["residual"]) <= Fraction(found["asked"]["residual"])
+            assert Fraction(entry["largest"]) == Fraction(found["peak"]) <= 50
+            capped += 1
+    assert capped
+    run = ptcc(*asked)
+    assert run.out.splitlines()[-2:] == ["to prove it again:", found["command"]]
+
+
+def test_the_command_that_design_prints_is_one_for_a_shell(folder: Path):
+    name = "it's a $graph; -rf.csv"
+    Path(name).write_text("a,b,-1\nb,a,-1\nb,b,2\na,b,-1\n")
+    reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
+    task = ("--max-input", "10", "--initial-bound", "1", "--shortest-deadline")
+    command = ptcc("design", name, *reading, *task).out.splitlines()[-1]
+    program = f"{shlex.quote(sys.executable)} -m ptcc_certify.cli"
+    shown = subprocess.run(["sh", "-c", command.replace("ptcc", program, 1)], capture_output=True, text=True)
+    assert shown.returncode == 0 and "certified" in shown.stdout, shown
+    assert all(flag in command for flag in reading)
+    Path("-g.csv").write_text("a,b,1\nb,a,-1\n")
+    assert ptcc(*shlex.split(ptcc("design", *task, "--", "-g.csv").out.splitlines()[-1])[1:]).code == 0
+    edges = b"a,b,1\nb,a,1\n"
+    run = ptcc("design", "-", "--undirected", *task, stdin=b"a,b,1\n")
+    assert "to prove it again (give it the graph again, on standard input):" in run.out
+    assert ptcc(*shlex.split(run.out.splitlines()[-1])[1:], stdin=b"a,b,1\n").code == 0
+    assert ptcc("design", "-", *task, stdin=edges).out.splitlines()[-1].startswith("ptcc certify - --T ")
+
+
+# ---------------------------------------------------------------------- examples, cite, imports
+
+
+def test_all_examples_behave_as_the_paper_reports(folder: Path):
+    run = ptcc("examples", "all", "-o", "new/results")
+    assert run.code == 0, run
+    header, *rows = run.out.splitlines()
+    assert header.split() == [
+        *("example", "theorem", "behaviour", "rate", "optimality", "worst", "reached", "proved", "by", "T_r"),
+        *("final", "state", "verdict"),
+    ]
+    reported = [
+        (str(example.number), graph, behaviour)
+        for example in EXAMPLES.values()
+        for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
+    ]
+    assert len(rows) == len(reported) == 12
+    for row, (number, graph, behaviour) in zip(rows, reported, strict=True):
+        columns = [r"(\d) (\w+)", r"([\d.]+)", r"(\D+?)", *[r"([\d.]+)"] * 3, *[r"(\S+)"] * 3]
+        match = re.fullmatch(f"{' +'.join(columns)}  (\\S.*?) +(\\w+)(?:, says little by T)?", row)
+        assert match is not None, row
+        assert match.group(1, 2, 4, 12) == (number, graph, behaviour, "certified")
+        assert (match[11] == "0") == (behaviour == "stability")
+        assert match[11].startswith("+-") == (behaviour == "bipartite consensus")
+        if number in "456":
+            assert 0 < float(match[8]) < float(match[9]) < float(match[10])
+            graph += "_sliding"
+        else:
+            assert match.group(8, 9, 10) == ("-", "-", "-")
+        rate, ratio, worst = (float(x) for x in match.group(5, 6, 7))
+        assert rate > 0 and 0 < ratio <= 1 and 0 < worst <= 1
+        data = read(f"new/results/{graph}.json")
+        assert data["claim"]["theorem"] == match[3]
+        assert data["claim"]["behaviour"] == behaviour
+        assert rate <= Fraction(data["rates"]["certified"]) < rate + 1e-4
+    table = list(csv.DictReader(Path("new/results/examples.csv").read_text().splitlines()))
+    assert [(row["example"], row["graph"], row["claim"]) for row in table] == reported
+    assert {row["verdict"] for row in table} == {"certified"}
+    assert [bool(row["reached_by"]) for row in table] == [bool(row["simulated_reached"]) for row in table]
+    assert [bool(row["reached_by"]) for row in table] == [row["example"] in "456" for row in table]
+    figures = {path.name for path in (folder / "new" / "results").glob("*.png")}
+    drawn = {1: "graphs", 3: "graphs", 5: "graphs", 7: "sliding_variables", 9: "sliding_variables"}
+    drawn |= {11: "sliding_variables"} | dict.fromkeys((2, 4, 6, 8, 10, 12), "states")
+    assert figures == {f"figure_{number:02d}_{what}.png" for number, what in drawn.items()} | {
+        f"example_{number}_{what}.png" for number in range(1, 7) for what in ("decay", "input")
+    }
+    for name in figures:
+        assert Path(f"new/results/{name}").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+    assert len(listing(folder / "new" / "results")) == 12 + 24 + 1
+
+
+def test_examples_are_drawn_as_vectors_too_and_the_same_again(folder: Path):
+    for again in ("one", "two"):
+        assert ptcc("examples", "fig1b", "-o", again, "--format", "svg").code == 0
+    first, second = ({p.name: p.read_bytes() for p in (folder / name).glob("*.svg")} for name in ("one", "two"))
+    assert len(first) == 2 + 2 + 4 and first == second
+    assert all(b"<svg" in content for content in first.values())
+
+
+def test_examples_can_be_chosen():
+    assert [row.split()[1] for row in ptcc("examples", "2").out.splitlines()[1:]] == ["fig3a", "fig3b"]
+    assert [row.split()[1] for row in ptcc("examples", "fig1b").out.splitlines()[1:]] == ["fig1b", "fig1b"]
+
+
+@pytest.mark.parametrize("theorem", [None, "1.1", "1.2", "2.1", "2.2", "3.1", "3.2", "4.1", "6.2"])
+def test_cite_is_bibtex_and_invents_nothing(theorem: str | None):
+    run = ptcc("cite", *([] if theorem is None else [theorem]))
+    assert run.code == 0 and run.err == ""
+    match = re.fullmatch(r"@(\w+)\{(\w+),\n((?:  \w+ *= \{.*\},?\n)+)\}\n", run.out)
+    assert match is not None
+    fields = dict(re.findall(r"^  (\w+) *= \{(.*)\},?$", match[3], flags=re.MULTILINE))
+    assert set(fields) == {"author", "title", "note"}
+    assert "Zhu" in fields["author"] and fields["author"].count(" and ") == 5
+    assert fields["title"].startswith("Robust prescribed-time coordination control")
+    assert not re.search(r"doi|\b(19|20)\d\d\b|http", run.out)
+    assert all(text.count("{") == text.count("}") for text in fields.values())
+    if theorem:
+        assert f"Theorem {theorem}: " in fields["note"]
+
+
+def test_classify_loads_nothing_heavy():
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "ptcc_certify.cli", "classify", "fig1a"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0
+    loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines() if "|" in line}
+    assert {"ptcc_certify", "numpy", "scipy", "click"} <= loaded
+    assert not loaded & {"casadi", "cvxpy", "clarabel", "matplotlib", "networkx", "flint", "lmi", "rich"}
+
+
+# ---------------------------------------------------------------------- progress
+
+
+def test_a_terminal_sees_which_step_is_at_work_and_standard_output_does_not(tmp_path: Path):
+    """Standard error is a pseudo-terminal: a bar comes and goes; without one there is nothing."""
+    pty = pytest.importorskip("pty")
+    words = [sys.executable, "-c", "from ptcc_certify.cli import main; main()", "certify", "fig1a", "--json"]
+    own, other = pty.openpty()
+    run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=other, cwd=tmp_path)
+    os.close(other)
+    seen = b""
+    try:
+        while part := os.read(own, 4096):
+            seen += part
+    except OSError:  # the other end is closed
+        pass
+    assert run.stdout is not None
+    assert one_object(run.stdout.read().decode())["verdict"] == "certified" and run.wait() == 0
+    assert b"independent check" in seen  # the last step stands until the end
+    assert b"\x1b[2K" in seen  # the line is erased
+    plain = subprocess.run(words, capture_output=True, cwd=tmp_path, check=True)
+    assert plain.stderr == b""

@@ -1,0 +1,234 @@
+"""What is printed for a proved bound is a bound too: on the screen, by the check, on the page, in LaTeX, in reprs."""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lmi.exact.rounding import down, float_down, float_up, near, up
+from ptcc_certify import Actuator, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.examples import load_graph
+from ptcc_certify.gain_design import design
+from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.report import report_html, report_latex
+from ptcc_certify.report.screen import certificate_lines
+
+CLASSES = dict(all_classes())
+NUMBER = r"(-?[0-9.]+(?:e[-+]?[0-9]+)?)"
+rationals = st.builds(
+    lambda p, q, e: Fraction(p, q) * Fraction(10) ** e,
+    st.integers(-(10**30), 10**30),
+    st.integers(1, 10**30),
+    st.integers(-320, 320),
+)
+
+
+# ---------------------------------------------------------------------- the two directions
+
+
+@given(rationals, st.integers(1, 20))
+def test_a_number_lies_between_what_is_printed_below_and_above_it(x: Fraction, digits: int):
+    """By less than two units of the last digit."""
+    low, high = Fraction(down(x, digits)), Fraction(up(x, digits))
+    assert low <= x <= high
+    assert high - low <= abs(x) * Fraction(10) ** (1 - digits)
+    assert (low == high) == (low == x)
+
+
+@given(st.integers(-(10**6) + 1, 10**6 - 1), st.integers(-20, 20))
+def test_a_number_that_fits_is_printed_exactly(whole: int, exponent: int):
+    x = whole * Fraction(10) ** exponent
+    assert Fraction(down(x)) == Fraction(up(x)) == Fraction(near(x)) == x
+
+
+@given(rationals)
+def test_what_is_given_is_printed_exactly_or_marked(x: Fraction):
+    text = near(x)
+    assert Fraction(text) == x if text[0] != "~" else abs(Fraction(text[1:]) - x) <= abs(x) / 10**5
+
+
+@given(rationals)
+def test_floats_are_next_to_a_rational_on_the_side_that_is_asked(x: Fraction):
+    low, high = float_down(x), float_up(x)
+    assert low <= x <= high and high in (low, math.nextafter(low, math.inf))
+
+
+# ---------------------------------------------------------------------- everything that is printed
+
+
+@cache
+def made(k: int) -> Certificate:
+    """A certificate of a random graph, with limits and a set of initial states, or of the sliding mode."""
+    rng = np.random.default_rng(k)
+    graph = random_graph(rng, **{**list(CLASSES.values())[k % len(CLASSES)], "weights": "ratios"}).graph
+    n = graph.n_nodes
+    x0 = [Fraction(int(p), int(q)) for p, q in zip(rng.integers(-99, 99, n), rng.integers(1, 9, n), strict=True)]
+    if k % 4 == 3:
+        robust = SlidingModeProtocol(T_r=1, T_s=1, rho1="1/3", rho2="5/7", kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+        return certify(graph, robust, x0, sigma0=[x / 3 for x in x0], simulation=False)
+    protocol = NominalProtocol(T="7/3", rho1="1/3", rho2=["1/7", "3/2", 9][k % 3], kappa=1)
+    more: dict[str, Any] = {"starts": "1/3"} if k % 5 == 1 else {}
+    limits = [Actuator(gain_cap="100/3"), Actuator(stop_before="1/7")]
+    return certify(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
+
+
+GRAPHS = range(0, 28)
+
+
+def above(texts: list[str], exact: Any) -> None:
+    assert texts and all(Fraction(text) >= exact for text in texts), (texts, float(exact))
+
+
+def below(texts: list[str], exact: Any) -> None:
+    assert texts and all(Fraction(text) <= exact for text in texts), (texts, float(exact))
+
+
+@pytest.mark.parametrize("k", GRAPHS)
+def test_the_screen_rounds_to_the_safe_side(k: int):
+    cert = made(k)
+    text = "\n".join(certificate_lines(cert, "graph"))
+    if cert.rate is None:
+        return
+    assert cert.upper_bound is not None and cert.effort is not None
+    below(re.findall(rf"^rate +{NUMBER} per unit", text, re.M), cert.rate)
+    below(re.findall(rf"rate {NUMBER}, ", repr(cert)), cert.rate)
+    above(re.findall(rf"none exceeds {NUMBER}, proved", text), cert.upper_bound)
+    below(
+        re.findall(rf"optimality ratio at least {NUMBER}$", text.replace(" (", "\n("), re.M),
+        cert.rate / cert.upper_bound,
+    )
+    if cert.proof.rate is not None and cert.lyapunov is not None:
+        below(re.findall(rf"paper {NUMBER} =", text), cert.proof.rate)
+        above(re.findall(rf"\^2 prefactor {NUMBER}", text), cert.lyapunov.prefactor)
+    taken = re.findall(rf"(?:full|lmi|perron) {NUMBER} \(prefactor {NUMBER}\)", text)
+    assert len(taken) == len(cert.sharpening.members)
+    for (rate, factor), member in zip(taken, cert.sharpening.members, strict=True):
+        below([rate], member.rate)
+        above([factor], member.prefactor)
+    effort = cert.effort
+    lower = re.findall(rf"min Re lambda >= {NUMBER}", text)
+    assert not lower or effort.threshold[0] is None or Fraction(lower[0]) <= effort.threshold[0]
+    for pattern, bound in (
+        (rf"^effort.*\|u_k\| <= {NUMBER}", None if effort.peak is None else effort.peak.largest),
+        (rf"^effort.*\|\|u\|\| <= {NUMBER}", None if effort.peak is None else effort.peak.norm),
+        (rf"\^2 dt <= {NUMBER}", None if effort.energy is None else effort.energy.value),
+        (rf"\|\|u\|\| dt <= {NUMBER}", None if effort.path_length is None else effort.path_length.value),
+        (rf"adds at most {NUMBER}", None if effort.disturbed is None else max(effort.disturbed.inputs)),
+    ):
+        if bound is not None:
+            above(re.findall(pattern, text, re.M), bound)
+    for line, entry in zip(re.findall(r"^limited .*$", text, re.M), effort.residual, strict=False):
+        above(re.findall(rf"\|\|E\|\| <= {NUMBER}", line), entry.norm)
+        assert entry.largest is None or Fraction(re.findall(rf"\|u_k\| <= {NUMBER}", line)[0]) >= entry.largest
+    if cert.direct:
+        left = re.findall(rf"{NUMBER} at (?:0\.|T\()", re.findall(r"^left .*$", text, re.M)[0])
+        for said, q in zip(left, (0.5, 0.1, 0.01, 1e-6, 1e-9), strict=True):
+            assert Fraction(said) >= Fraction(cert.envelope.residual(q))
+    for r, said in zip(cert.reaching or (), map(repr, cert.reaching or ()), strict=True):
+        if r.z is not None:
+            time, remaining = re.findall(NUMBER, said)
+            assert Fraction(time) >= Fraction(r.time) and Fraction(remaining) <= Fraction(r.remaining)
+
+
+@pytest.mark.parametrize("k", GRAPHS)
+@pytest.mark.parametrize("stdlib", [True, False])
+def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
+    """Rates, margins and ends down; prefactors, constants and bounds of the input up."""
+    data = made(k).to_dict()
+    report = check(data, stdlib=stdlib)
+    assert report.accepted
+    members, effort, rates = data["lyapunov"]["members"], data["effort"], data["rates"]
+    for step, told in zip(report.steps, data["proof"], strict=True):
+        said, numbers = step.detail, {key: Fraction(x) for key, x in told["numbers"].items()}
+        which = re.search(r"members\[(\d+)\]", step.of)
+        member = members[int(which[1])] if which else None
+        if "b" in numbers:
+            below(re.findall(rf"^b = {NUMBER}", said), numbers["b"])
+        if "m" in numbers:
+            below(re.findall(rf"^m = {NUMBER}", said), numbers["m"])
+        if step.kind == "margin":
+            below(re.findall(rf", rate {NUMBER}", said), Fraction(rates["paper"]))
+        if step.kind == "rho-interval":
+            for name in ("printed", "exact"):
+                below(re.findall(rf"{name} end {NUMBER}", said), numbers[name])
+        if step.kind == "prefactor" and member is not None:
+            above(re.findall(NUMBER, said), Fraction(member["prefactor"]))
+        if step.kind == "distance" and member is not None:
+            above(re.findall(NUMBER, said), Fraction(member["distance"]["norm"]))
+        if step.kind in ("rate-limit", "rate-mean"):
+            above(re.findall(NUMBER, said), Fraction(rates["limit"]))
+        for kind, key in (("input-energy", "energy"), ("input-length", "path_length")):
+            if step.kind == kind:
+                above(re.findall(NUMBER, said), Fraction(effort[key]))
+        if step.kind == "input-peak":
+            above(re.findall(rf"at most {NUMBER},", said), Fraction(effort["peak"]["largest"]))
+            above(re.findall(rf"norm {NUMBER}", said), Fraction(effort["peak"]["norm"]))
+        if step.kind == "limited-gain":
+            above(re.findall(rf"at most {NUMBER} at", said), Fraction(effort["residual"][int(step.of[-2])]["norm"]))
+
+
+@pytest.mark.parametrize("k", GRAPHS)
+def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
+    cert = made(k)
+    cert.save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    if saved.rate is None or saved.effort is None or saved.upper_bound is None or saved.prefactor is None:
+        return
+    below(re.findall(rf"rate {NUMBER}, ", repr(saved)), saved.rate)
+    page = re.sub(r" \u00d7 10<sup>(.*?)</sup>", r"e\1", report_html(saved)).replace("\u2212", "-")
+    text = re.sub(r" \\cdot 10\^\{(.*?)\}", r"e\1", report_latex(saved))
+    text = re.sub(r"\s*\\cdot\s*10\^\{(.*?)\}", r"e\1", text)
+
+    def row(head: str) -> list[str]:
+        return re.findall(rf"{head}[^<]*</th><td[^>]*>[^0-9]*{NUMBER}", page)
+
+    below(row("Proved rate"), saved.rate)
+    above(row("No rate exceeds"), saved.upper_bound)
+    below(row("Optimality ratio"), saved.rate / saved.upper_bound)
+    above(row("Prefactor"), saved.prefactor)
+    above(re.findall(rf"Lyapunov function exceeds \${NUMBER}\$", text), saved.upper_bound)
+    below(re.findall(rf"e\}}\^\{{-{NUMBER}\\,", text), saved.rate)
+    above(re.findall(rf"\^2 \\le {NUMBER}\\,", text), saved.prefactor)
+    if saved.effort.energy is not None:
+        above(re.findall(rf"dt \u2264 {NUMBER}", page)[:1], saved.effort.energy.value)
+    if saved.effort.peak is not None:
+        above(re.findall(rf"<td[^>]*>\|u<sub>k</sub>\| \u2264 {NUMBER} \(agent", page), saved.effort.peak.largest)
+
+
+def test_the_rate_of_the_readme_is_not_rounded_up():
+    """13.9985999972 is proved, where 13.9986 was printed."""
+    cert = certify(load_graph("fig3a"), NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1), simulation=False)
+    assert cert.rate is not None and cert.checked is not None and cert.rate < Fraction("13.9986")
+    best = [step.detail for step in cert.checked.steps if step.detail.startswith("b = 13.9")]
+    assert best and all(detail.startswith("b = 13.9985") for detail in best)
+
+
+def test_a_reaching_time_is_rounded_up():
+    z = Fraction(1, 3)  # t = 1 - e^(-1/3) = 0.28346868942...
+    assert repr(ReachingTime(Fraction(1), z)) == "ReachingTime(0.283469, 0.716 before T_r)"
+    assert repr(ReachingTime(Fraction(1, 3), None)) == "ReachingTime(T_r = 1/3)"
+
+
+def test_a_design_is_rounded_to_the_safe_side():
+    """Peaks and certified deadlines up, what no gains can undercut down; the curve likewise."""
+    found = design(load_graph("fig1a"), max_input="31/3", initial_bound="7/9")
+    text = "\n".join(found.lines())
+    assert found.peak is not None and found.shortest_certified is not None and found.shortest_possible is not None
+    above(re.findall(rf"^peak input +{NUMBER} at most", text, re.M), found.peak)
+    above(re.findall(rf"^shortest deadline +{NUMBER} certified", text, re.M), found.shortest_certified)
+    below(re.findall(rf"^ +{NUMBER} at least", text, re.M), found.shortest_possible)
+    assert found.product is not None and found.lower_product is not None
+    for T, peak, low in zip(*found.trade_off([0.1, 1 / 3, 7.7]), strict=True):
+        assert Fraction(float(peak)) * Fraction(float(T)) >= found.product
+        assert Fraction(float(low)) * Fraction(float(T)) <= found.lower_product

@@ -1,0 +1,661 @@
+"""A report says what its certificate proves, no more, and is safe to open whatever the certificate holds."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import unicodedata
+from fractions import Fraction
+from functools import cache
+from html.parser import HTMLParser
+from importlib import resources
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+from generators import sparse_digraph
+
+import ptcc_certify
+from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
+from ptcc_certify.certificate.saved import RejectedCertificate, read_certificate
+from ptcc_certify.checker import digest
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.examples import EXAMPLES, load_graph
+from ptcc_certify.graphs.io import read_graph
+from ptcc_certify.report import report_html, report_latex, write_report
+from ptcc_certify.report.page import ROWS
+from ptcc_certify.report.statement import _tex
+from ptcc_certify.report.texts import LISTED
+
+NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
+SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+#: What a page needs, and nothing that loads, runs or leaves it.
+TAGS = frozenset(
+    re.findall(
+        "[a-z0-9]+",
+        "html head meta title style body main h1 h2 h3 div strong span p nav ul li a section table caption thead tbody "
+        "tr th td code pre q cite details summary figure figcaption bdi sub sup svg g defs clippath path rect use "
+        "math mrow mi mo mn mfrac msub msup msubsup munder mover munderover mspace mtable mtr mtd",
+    )
+)
+HOSTILE = [
+    "<script>alert(1)</script>",
+    "javascript:alert(1)",
+    '" onload="alert(1)',
+    "' onmouseover='alert(1)",
+    "\u202eright to left\u202c",
+    "\x1b[31m\x00\x85",
+    "http://evil.example/x.png",
+    "]]><!-- --> <img src=x>",
+    "$x^2$ \\input{x} _%#&{}~^|<>--``''\"",
+    "</title></style></svg></math>",
+    "&lt;b&gt; &amp;",
+    "\u4e2d\u6587 \u00e9\u00d0",
+    "x" * 3000,
+]
+
+
+class Page(HTMLParser):
+    """What a browser would find: tags with their attributes, text, and whether every tag is closed in order."""
+
+    def __init__(self, source: str):
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.open: list[str] = []
+        self.pieces: list[tuple[str, str]] = []
+        self.comments: list[str] = []
+        self.feed(source)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        names = [name for name, _ in attrs]
+        assert len(set(names)) == len(names)
+        self.tags.append((tag, {name: value or "" for name, value in attrs}))
+        if tag not in {"meta", "br", "hr"}:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, {name: value or "" for name, value in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag, tag
+
+    def handle_data(self, data: str) -> None:
+        self.pieces.append((self.open[-1] if self.open else "", data))
+
+    def handle_comment(self, data: str) -> None:
+        self.comments.append(data)
+
+    @property
+    def text(self) -> str:
+        return "".join(data for tag, data in self.pieces if tag != "style")
+
+    def named(self, tag: str) -> list[dict[str, str]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+def sound(source: str) -> Page:
+    """Nothing loads, nothing runs, everything is closed; a reader without sight finds the way."""
+    page = Page(source)
+    assert page.open == [] and page.comments == []
+    assert {tag for tag, _ in page.tags} <= TAGS
+    for tag, attributes in page.tags:
+        for name, value in attributes.items():
+            assert not name.startswith("on") and name not in ("src", "srcset", "action", "background", "data", "xmlns")
+            if not name.startswith(("aria-", "alttext")):
+                assert "://" not in value and "javascript:" not in value.lower() and "data:" not in value, (tag, name)
+            if name.endswith("href"):
+                assert value.startswith("#")
+        if tag == "meta" and attributes.get("http-equiv"):
+            assert attributes["http-equiv"] == "Content-Security-Policy"
+    style = "".join(data for tag, data in page.pieces if tag == "style")
+    assert not re.search(r"url\(|@import|http|expression", style)
+    assert not [c for c in source if unicodedata.category(c) in ("Cc", "Cf", "Cs") and c != "\n"]
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(set(ids)) == len(ids)
+    referred = [attributes["href"][1:] for _, attributes in page.tags if "href" in attributes]
+    referred += re.findall(r"url\(#([^)]*)\)", source)
+    referred += [attributes["aria-labelledby"] for _, attributes in page.tags if "aria-labelledby" in attributes]
+    assert set(referred) <= set(ids)
+    assert page.named("html") == [{"lang": "en"}] and len(page.named("title")) == 1
+    assert "width=device-width" in next(m["content"] for m in page.named("meta") if m.get("name") == "viewport")
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1 and levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert all(attributes.get("scope") in ("row", "col") for attributes in page.named("th"))
+    assert len(page.named("table")) == len(page.named("caption"))
+    assert len(page.named("figure")) == len(page.named("svg")) == len(page.named("figcaption"))
+    for svg in page.named("svg"):
+        assert svg["role"] == "img" and re.search("[0-9]", svg["aria-label"]) and "<" not in svg["aria-label"]
+    return page
+
+
+def rows(source: str, caption: str) -> list[list[str]]:
+    """Return the cells of a table by its caption, as text."""
+    tables = re.findall(r"<table.*?</table>", source, flags=re.DOTALL)
+    (table,) = [t for t in tables if plain(re.findall("<caption>(.*?)</caption>", t)[0]).startswith(caption)]
+    body = table[table.index("<tbody") :]
+    return [[plain(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)] for row in body.split("<tr")[1:]]
+
+
+def plain(text: str) -> str:
+    text = re.sub(r" \u00d7 10<sup>(.*?)</sup>", r"e\1", text)
+    return html.unescape(re.sub("<[^>]*>", "", text)).replace("\u2212", "-")
+
+
+def number(text: str) -> Fraction:
+    """Return the first number of a text."""
+    found = re.search(r"-?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?", text)
+    assert found is not None, text
+    return Fraction(found[0])
+
+
+def reported(certificate: Certificate, folder: Path, **options: Any) -> str:
+    certificate.save(folder / "c.json")
+    assert write_report(folder / "c.json", folder / "c.html", **options) == certificate.verdict
+    return (folder / "c.html").read_text(encoding="utf-8")
+
+
+def forged(folder: Path, **changes: Any) -> Path:
+    """Change a saved certificate; its digest is made anew."""
+    data = json.loads((folder / "c.json").read_text(encoding="utf-8"))
+    for key, value in changes.items():
+        data[key] = {**data[key], **value} if isinstance(value, dict) else value
+    data["digest"] = digest(data)
+    (folder / "c.json").write_text(json.dumps(data), encoding="utf-8")
+    return folder / "c.json"
+
+
+def undecided(folder: Path) -> Path:
+    """Take the outcome out of a certificate: the decay is proved, where it ends is not stated."""
+    certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(folder / "c.json")
+    data = json.loads((folder / "c.json").read_text())
+    members = [{**m, "distance": None} for m in data["lyapunov"]["members"]]
+    proof = [s for s in data["proof"] if s["kind"] not in ("outcome", "distance")]
+    unverified = {"notes": ["<i>no outcome</i>", 7]}
+    return forged(
+        folder, outcome=None, verdict="undecided", proof=proof, lyapunov={"members": members}, unverified=unverified
+    )
+
+
+def sliding_mode() -> Certificate:
+    example = EXAMPLES[4]
+    start, sigma0 = example.x0.split(","), (example.sigma0 or "").split(",")
+    return certify(
+        load_graph("fig1b"), example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance, simulation=False
+    )
+
+
+def nominal(**options: Any) -> Certificate:
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    return certify(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
+
+
+def disconnected() -> Certificate:
+    edges = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2), ("x", "y", -1), ("y", "x", 3)]
+    return certify(SignedDigraph.from_edges(edges, ["z"]), NOMINAL, [1, 2, 3, 4, -5, 6], simulation=False)
+
+
+def hostile() -> Certificate:
+    return certify(
+        SignedDigraph.from_edges([(HOSTILE[i - 1], HOSTILE[i], -1) for i in range(len(HOSTILE))]),
+        NominalProtocol(T="1/3", rho1=Fraction(10**20 + 1, 7**30), rho2=1, kappa=1),
+        [Fraction(k, 7) for k in range(len(HOSTILE))],
+        simulation=False,
+    )
+
+
+MADE = {
+    "nominal": nominal,
+    "limits": lambda: nominal(limits=[Actuator(gain_cap=50)], noise="1/100", delta="1/3"),
+    "starts": lambda: nominal(starts=5, limits=[Actuator(sample_period="1/1000", gain_cap=20)]),
+    "not bounded": lambda: certify(load_graph("fig5b"), NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1), [1] * 16),
+    "no start": lambda: certify(load_graph("fig1a"), NOMINAL),
+    "sliding": sliding_mode,
+    "disconnected": disconnected,
+    "single": lambda: certify(SignedDigraph.from_edges([], ["alone"]), NOMINAL, [3], simulation=False),
+    "hostile": hostile,
+}
+
+
+@cache
+def example(name: str) -> Certificate:
+    return MADE[name]()
+
+
+# ---------------------------------------------------------------------- the page
+
+
+def test_the_commands_of_a_page_work(tmp_path: Path):
+    """As they stand, in the folder of the certificate; with the graph added to the first."""
+    (tmp_path / "g.csv").write_text("a,b,1\nb,a,-2\nb,c,1\n")
+    graph = read_graph(tmp_path / "g.csv", orientation="listens")
+    certify(graph, NOMINAL, simulation=False).save(tmp_path / "my c.json")
+    write_report(tmp_path / "my c.json", tmp_path / "c.html", simulation=False)
+    source = (tmp_path / "c.html").read_text()
+    page = sound(source).text
+    commands = html.unescape(re.findall("<pre>(ptcc check .*?)</pre>", source, re.DOTALL)[0]).splitlines()
+    assert commands == ["ptcc check 'my c.json'", "python -m ptcc_certify.checker 'my c.json'"]
+    assert "--edges listens" in page
+    environment = {**os.environ, "PYTHONPATH": str(Path(ptcc_certify.__file__).parents[1])}
+    for command in (*commands, f"{commands[0]} g.csv"):
+        words = shlex.split(command.replace("ptcc check", "python -m ptcc_certify.cli check"))
+        done = subprocess.run([sys.executable, *words[1:]], cwd=tmp_path, env=environment, capture_output=True)
+        assert done.returncode == 0, done
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
+    made = example(name)
+    source = reported(made, tmp_path)
+    page = sound(source)
+    assert page.text.index("CERTIFIED") < page.text.index("What was asked")
+    assert made.graph.sha256 in page.text and made.to_dict()["digest"] in page.text
+    assert "ptcc check c.json" in page.text and "python -m ptcc_certify.checker c.json" in page.text
+    order = ["asked", "proved", "graph", "bound", "effort", "obligations", "check", "limits", "cite"]
+    assert [a["id"] for tag, a in page.tags if tag == "h2"] == order
+    for claim in made.claims:
+        assert f"Theorem {claim.theorem}" in page.text and claim.behaviour in page.text.lower()
+    report = made.checked
+    assert report is not None
+    said = rows(source, "Verified by the independent check")
+    assert [row[4] for row in said] == [s.detail for s in report.steps]
+    assert [row[2] for row in said] == [s.statement for s in report.steps]
+    figures = {a["id"] for a in page.named("figure")}
+    assert ("figure-decay" in figures) == (name not in ("no start", "single"))
+    assert ("figure-input" in figures) == (name not in ("no start", "single"))
+    assert ("figure-sliding" in figures) == (name == "sliding")
+
+
+def test_numbers_are_rounded_to_the_safe_side(tmp_path: Path):
+    for made in (example("nominal"), example("sliding")):
+        source = reported(made, tmp_path, simulation=False)
+        assert made.rate is not None and made.limit is not None and made.effort is not None
+        said = {row[0]: row[1] for row in rows(source, "Rates")}
+        assert made.rate * Fraction(99999, 100000) <= number(said["Proved rate"]) <= made.rate
+        assert made.limit.value <= number(said["No rate exceeds"]) <= made.limit.value * Fraction(100001, 100000)
+        assert number(said["Optimality ratio"].removeprefix("at least ")) <= made.rate / made.limit.value
+        bounds = {row[0]: row[1] for row in rows(source, "Proved bounds")}
+        assert made.effort.peak is not None and made.effort.energy is not None
+        peak = next(value for key, value in bounds.items() if key.endswith("from this start")).partition("\u2264")[2]
+        assert made.effort.peak.largest <= number(peak) <= made.effort.peak.largest * Fraction(1001, 1000)
+        energy = next(value for key, value in bounds.items() if key.startswith("Energy")).partition("\u2264")[2]
+        assert made.effort.energy.value <= number(energy)
+        for instant, left, distance in rows(source, "Bounds, rounded up"):
+            if instant == "Tr":
+                continue
+            q = float(1 - number(instant))
+            bound = made.envelope.residual(q) if made.direct else float(made.norm_bound([q])[0])
+            assert Fraction(bound) <= number(left) <= Fraction(bound) * Fraction(12, 10)
+            assert float(made.outcome_distance([q]).max()) <= float(number(distance))
+
+
+def test_final_states_are_the_proved_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    made = example("nominal")
+    assert made.outcome is not None
+    said = rows(reported(made, tmp_path, simulation=False), "Where the agents end, proved exactly")
+    assert [Fraction(row[3]) for row in said] == list(made.outcome.final_state)
+    assert [row[0] for row in said] == list(made.graph.labels)
+    graph = sparse_digraph(np.random.default_rng(7), 150, 2.5)
+    reported(certify(graph, NOMINAL, list(range(150)), simulation=False), tmp_path, simulation=False)
+    saved = read_certificate(tmp_path / "c.json")
+    said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals")
+    assert saved.final_state is not None and len(said) == 150
+    for row, (middle, radius) in zip(said, saved.final_state, strict=True):
+        shown, _, wide = row[3].partition(" \u00b1 ")
+        assert abs(Fraction(shown) - middle) + radius <= (number(wide) if wide else 0)
+
+
+@pytest.mark.parametrize("name", ["nominal", "disconnected", "hostile"])
+def test_every_agent_is_in_its_part(name: str, tmp_path: Path):
+    made = example(name)
+    parts = [row[1] for row in rows(reported(made, tmp_path, simulation=False), "Where the agents end")]
+    assert [p == "follower" for p in parts] == [v in made.structure.followers for v in range(made.graph.n_nodes)]
+    for component in made.structure.closed_components:
+        own = [parts[v] for v in component.nodes]
+        camps = {1: "camp 1", -1: "camp 2"}
+        assert [p.partition(", ")[2] for p in own] == (
+            ["unbalanced"] * len(own) if component.gauge is None else [camps[g] for g in component.gauge]
+        )
+        assert len({p.partition(",")[0] for p in own}) == 1
+
+
+def test_reaching_times_are_no_earlier_than_proved(tmp_path: Path):
+    made = example("sliding")
+    source = reported(made, tmp_path, simulation=False)
+    assert made.reaching is not None and any(r.z for r in made.reaching)
+    for (_, _, when, before), r in zip(rows(source, "Whatever the disturbance"), made.reaching, strict=True):
+        if r.z is None:
+            assert "only" in when
+        else:
+            assert float(number(when)) >= r.time and float(number(before)) <= r.remaining
+    assert "whatever the disturbances within \u03b4" in Page(source).text
+
+
+def test_a_page_is_the_same_every_time(tmp_path: Path):
+    made = example("sliding")
+    assert reported(made, tmp_path) == reported(made, tmp_path)
+
+
+def test_without_a_run_the_page_says_why(tmp_path: Path):
+    page = sound(reported(example("nominal"), tmp_path, simulation=False))
+    assert "it was left out (--no-simulation)" in page.text
+    assert {a["id"] for a in page.named("figure")} == {"figure-graph"}
+    page = sound(reported(certify(load_graph("fig1a"), NOMINAL), tmp_path))
+    assert "the certificate names no start" in page.text
+
+
+def test_what_a_certificate_does_not_say_is_said(tmp_path: Path):
+    def caveats(name: str) -> str:
+        source = reported(example(name), tmp_path, simulation=False)
+        return plain(source[source.index('id="limits"') : source.index('id="cite"')])
+
+    nominal, limited, unbounded = caveats("nominal"), caveats("limits"), caveats("not bounded")
+    assert "gain is infinite at the deadline" in nominal and "single integrators" in nominal
+    assert "no disturbances in the model" in nominal and "without noise" in nominal
+    assert "no disturbances in the model" not in limited and "without noise" not in limited
+    assert "The input is not bounded" in unbounded and "The input is not bounded" not in nominal
+    assert "sampled and held" in nominal and "Sampling is certified with the periods" in caveats("starts")
+    assert "\u03b4 must be known" in caveats("sliding") and "No start was given" in caveats("no start")
+    assert "article leaves disconnected graphs out" in caveats("disconnected")
+
+
+def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
+    ring = [(HOSTILE[i], HOSTILE[(i + 1) % len(HOSTILE)], (-1) ** i) for i in range(len(HOSTILE))]
+    certify(SignedDigraph.from_edges(ring), SLIDING, list(range(len(HOSTILE))), simulation=False).save(
+        tmp_path / "c.json"
+    )
+    evil = '<svg onload="alert(1)">\u202e\x1b http://evil.example'
+    path = forged(tmp_path, producer=evil, protocol={"disturbance": evil}, unverified={"notes": [evil], "x": evil})
+    odd = path.with_name("c '<b>\".json")
+    path.rename(odd)
+    assert write_report(odd, tmp_path / "c.html") == "certified"
+    source = (tmp_path / "c.html").read_text(encoding="utf-8")
+    page = sound(source)
+    for label in HOSTILE[:4]:
+        assert label in page.text
+    assert "\\u{202e}right to left\\u{202c}" in page.text and "\\u{1b}[31m\\u{0}\\u{85}" in page.text
+    assert "x" * 100 not in page.text
+
+
+def test_a_rejected_certificate_is_called_rejected_and_nothing_else(tmp_path: Path):
+    made = example("nominal")
+    made.save(tmp_path / "c.json")
+    assert made.rate is not None and made.claim is not None
+    path = forged(tmp_path, rates={"certified": str(2 * made.rate)}, producer="<script>")
+    done = ptcc("report", str(path), "-o", str(tmp_path / "c.html"))
+    assert done.code == 1 and done.out.split() == ["rejected", str(tmp_path / "c.html")]
+    page = sound_rejection((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert page.text.index("REJECTED") < 100 and "rates" in page.text
+    for word in (made.claim.behaviour, "Theorem", "certified at", "CERTIFIED", "bounded"):
+        assert word.lower() not in page.text.lower().replace("the rate certified is not the proved one", "")
+    done = ptcc("report", str(path), "-o", str(tmp_path / "c.tex"))
+    assert done.code == 1 and not (tmp_path / "c.tex").exists() and len(done.err.splitlines()) == 1
+    with pytest.raises(RejectedCertificate):
+        write_report(path, tmp_path / "c.tex")
+
+
+def sound_rejection(source: str) -> Page:
+    assert "<table" not in source and "<figure" not in source
+    return sound(source)
+
+
+def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
+    done = ptcc("report", str(undecided(tmp_path)), "-o", str(tmp_path / "c.html"))
+    assert done.code == 4, done.err
+    page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert "UNDECIDED" in page.text and "CERTIFIED" not in page.text
+    assert "no final state was proved" in page.text and "<i>no outcome</i>" in page.text
+    assert "not certified: Interval bipartite consensus" in page.text
+    assert "".join(data for tag, data in page.pieces if tag == "h1").startswith("Undecided: ")
+    text = report_latex(read_certificate(tmp_path / "c.json"))
+    assert "Proposition" not in text and "certificate undecided" in text and "occurs at" not in text
+
+
+def test_without_a_proved_rate_little_is_said(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    data = json.loads((tmp_path / "c.json").read_text())
+    nothing = dict.fromkeys(("paper", "diagonal", "certified", "limit"))
+    proof = [s for s in data["proof"] if s["kind"] in ("structure", "claim", "outcome")]
+    less = {"paper": None, "prefactor": None, "effort": None, "verdict": "undecided", "proof": proof}
+    path = forged(tmp_path, lyapunov={"members": []}, rates=nothing, **less)
+    assert write_report(path, tmp_path / "c.html") == write_report(path, tmp_path / "c.tex") == "undecided"
+    page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert "no decay was proved" in page.text and "No rate of decay was proved" in page.text
+    assert "Where the agents end if they settle (exact)" in page.text and "proved exactly" not in page.text
+    assert "limit, if it settles" in (tmp_path / "c.tex").read_text() and "Limit, if it settles" in page.text
+    assert "e^" not in (tmp_path / "c.tex").read_text()
+
+
+def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Path):
+    graph = SignedDigraph.from_edges([], ["a", "b"])
+    page = sound(reported(certify(graph, SLIDING, [1, 2], sigma0=[3, 0], simulation=False), tmp_path))
+    assert "Every agent keeps x \u2212 \u03c3" in page.text and "keeps its state" not in page.text
+    assert [row[4] for row in rows((tmp_path / "c.html").read_text(), "Where the agents end")] == ["-2", "2"]
+
+
+def test_a_long_deadline_is_plain_in_the_title(tmp_path: Path):
+    protocol = NominalProtocol(T=Fraction(10**30 + 1, 10**22 + 7), rho1=1, rho2=1, kappa=1)
+    source = reported(certify(load_graph("fig1a"), protocol), tmp_path)
+    assert (
+        "".join(data for tag, data in sound(source).pieces if tag == "title") == "Stability at T \u2248 1 \u00d7 10^8"
+    )
+    assert "1 \u00d7 10<sup>8</sup></h1>" in source
+
+
+def test_numbers_beyond_floats_are_shown(tmp_path: Path):
+    example("single").save(tmp_path / "c.json")
+    huge, influence = {"alone": "-1e350"}, json.loads((tmp_path / "c.json").read_text())["outcome"]["influence"]
+    path = forged(tmp_path, initial_state=huge, outcome={"final_state": huge, "influence": influence})
+    assert write_report(path, tmp_path / "c.html") == "certified"
+    page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert "beyond \u221210300" in page.text and "beyond the range of float64" in page.text
+
+
+def test_the_page_of_a_large_graph_stays_small(tmp_path: Path):
+    n = 10_000
+    graph = sparse_digraph(np.random.default_rng(2), n, 1.2)
+    made = certify(graph, NOMINAL, list(range(n)), simulation=False, method="perron")
+    source = reported(made, tmp_path)
+    page = sound(source)
+    assert len(source.encode()) < 2_000_000
+    assert len(rows(source, "Where the agents end")) == ROWS
+    assert f"The first {ROWS} of 10,000 agents" in page.text and page.named("figure") == []
+    assert "repeated only where that is asked for" in page.text
+
+
+# ---------------------------------------------------------------------- equations and colours
+
+
+@pytest.mark.parametrize("protocol", [NOMINAL, SLIDING], ids=["nominal", "sliding-mode"])
+def test_the_equations_are_those_of_the_protocol(protocol: Any, tmp_path: Path):
+    """The MathML holds the letters and numbers of the LaTeX, in order, in as many fractions and rows."""
+    certify(load_graph("fig1b"), protocol).save(tmp_path / "c.json")
+    (found,) = re.findall("<math.*?</math>", report_html(read_certificate(tmp_path / "c.json")), flags=re.DOTALL)
+    tree = ElementTree.fromstring(found)
+    latex = protocol.latex()
+    assert " ".join(latex.split()) == tree.attrib["alttext"]
+    names = {"\u03c1": "rho", "\u03ba": "kappa", "\u03bc": "mu", "\u03c3": "sigma", "\u03c2": "varsigma"}
+    shown = [names.get(x.text or "", x.text or "") for x in tree.iter() if x.tag in ("mi", "mn")]
+    bare = re.sub(
+        r"\\(begin|end)\{\w+\}|\\(left|right|frac|sum|quad|dot|ge|le|operatorname|mathrm)(?![A-Za-z])", " ", latex
+    )
+    assert shown == re.findall(r"sign|nom|rho|kappa|mu|varsigma|sigma|[A-Za-z]|[0-9]+", bare)
+    assert len(list(tree.iter("mfrac"))) == latex.count(r"\frac")
+    assert len(list(tree.iter("mtr"))) == latex.count(r"\\") + latex.count(r"\begin")
+    assert len(list(tree.iter("munderover"))) == latex.count(r"\sum")
+
+
+def test_colours_have_enough_contrast():
+    """WCAG 2: text of 4.5 to 1 on its ground, in the light, in the dark and on paper."""
+    style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
+    palettes = [dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", part)) for part in style.split(":root {")[1:]]
+    assert len(palettes) == 3
+    pairs = [("text", "page"), ("text", "card"), ("muted", "page"), ("muted", "card")]
+    pairs += [pair for kind in ("good", "doubt", "bad") for pair in ((kind, f"{kind}-card"), ("text", f"{kind}-card"))]
+    for palette in palettes:
+        for front, ground in pairs:
+            light, dark = sorted((luminance(palette[front]), luminance(palette[ground])), reverse=True)
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, (front, ground, palette)
+    assert "color:" not in re.sub(r"color: (var\(--[a-z-]+\)|inherit)", "", style.partition("* {")[2])
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
+    return math.fsum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def test_letters_are_large_enough_and_details_open_on_paper():
+    style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
+    screen, _, paper = style.partition("@media print")
+    assert "font: 1rem/" in screen
+    assert all(float(size) >= 1 for size in re.findall(r"font-size: ([0-9.]+)rem", screen))
+    assert "details::details-content" in paper and "@page" in paper and "break-inside: avoid" in paper
+
+
+# ---------------------------------------------------------------------- LaTeX
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
+@pytest.mark.parametrize("name", ["limits", "sliding", "disconnected", "single", "hostile"])
+def test_a_statement_compiles(name: str, tmp_path: Path):
+    example(name).save(tmp_path / "c.json")
+    assert write_report(tmp_path / "c.json", tmp_path / "state_ment.tex") == "certified"
+    source = r"\documentclass{article}\usepackage{amsmath,graphicx}\begin{document}\input{state_ment}\end{document}"
+    (tmp_path / "main.tex").write_text(source)
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "main.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert b"Missing character" not in done.stdout
+    assert (tmp_path / "state_ment_graph.pdf").exists()
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
+def test_a_label_in_brackets_is_no_argument_of_latex(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "[br]", -1), ("[br]", "*", 1)])
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3, 4], simulation=False).save(
+        tmp_path / "c.json"
+    )
+    write_report(tmp_path / "c.json", tmp_path / "s.tex", simulation=False)
+    source = r"\documentclass{article}\usepackage{amsmath,graphicx}\begin{document}\input{s}\end{document}"
+    (tmp_path / "main.tex").write_text(source)
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "-no-shell-escape", "main.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "*", -1)])
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3], simulation=False).save(tmp_path / "c.json")
+    text = report_latex(read_certificate(tmp_path / "c.json"))
+    after = re.findall(r"\\\\\n(?:\\hline\n)?(.)", text)
+    assert after and not set(after) & set("[*")
+
+
+@pytest.mark.parametrize("size", ["1e300", "1e160", "1e-250", "0"])
+def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    start = [Fraction(size), -Fraction(size)]
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), start).save(tmp_path / "c.json")
+    for name in ("c.html", "c.tex"):
+        assert write_report(tmp_path / "c.json", tmp_path / name) == "certified"
+    assert (tmp_path / "c_decay.pdf").exists() == (size != "0")
+
+
+def test_a_statement_whose_figure_has_no_place_writes_nothing(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    (tmp_path / "s_decay.pdf").mkdir()
+    with pytest.raises(ParameterError, match="is a folder, where a figure of the statement would go"):
+        write_report(tmp_path / "c.json", tmp_path / "s.tex")
+    assert {path.name for path in tmp_path.iterdir()} == {"c.json", "s_decay.pdf"}
+
+
+def test_the_file_does_not_say_who_checked_it(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    path = forged(tmp_path, producer="Theorem. Everything is proved")
+    write_report(path, tmp_path / "c.html", simulation=False)
+    write_report(path, tmp_path / "c.tex", simulation=False)
+    assert "Everything is proved" not in (tmp_path / "c.tex").read_text()
+    page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+    assert page.text.count("Everything is proved") == 1 and "as the file says" in page.text
+
+
+def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
+    made = example("limits")
+    made.save(tmp_path / "c.json")
+    text = report_latex(read_certificate(tmp_path / "c.json"), {"graph": "g.pdf", "decay": "d.pdf"})
+    assert "Proposition (certified)" in text and "Interval bipartite consensus occurs at $T$, by Theorem~2.1" in text
+    assert NOMINAL.latex() in text and made.graph.sha256 in text and "$\\kappa = 1$" in text
+    found = re.search(r"\\le ([0-9.]+)\\, \\mathrm\{e\}\^\{-([0-9.]+)\\, s\(t\)\}", text)
+    assert found is not None and made.rate is not None and made.prefactor is not None
+    assert Fraction(found[1]) >= made.prefactor and Fraction(found[2]) <= made.rate
+    assert r"\includegraphics[width=0.75\linewidth]{g.pdf}" in text and "{d.pdf}" in text
+    assert text.count("\\begin{") == text.count("\\end{")
+    assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text
+
+
+def test_long_tables_are_cut(tmp_path: Path):
+    graph = SignedDigraph.from_edges([(k, k + 1, 1) for k in range(LISTED + 9)])
+    certify(graph, NOMINAL, [1] * (LISTED + 10), simulation=False, method="paper").save(tmp_path / "c.json")
+    text = report_latex(read_certificate(tmp_path / "c.json"))
+    assert text.count(r" \\") < LISTED + 10 and "leaves out $10$ more agents" in text
+
+
+def test_every_special_character_of_latex_is_escaped():
+    special = "\\{}$&#%_^~"
+    for c in map(chr, range(32, 127)):
+        left = _tex(c)
+        for known in (r"$\backslash$", "$<$", "$>$", "$|$", r"\^{}", r"\~{}", *(rf"\{s}" for s in "{}$&#%_")):
+            if left == known:
+                left = ""
+        if left.startswith(r"{\char"):
+            assert left == rf"{{\char{ord(c)}}}"
+            continue
+        assert left in ("", c) and (left == "" or c not in special), c
+    assert _tex("---") == "-{}-{}-" and _tex("\u4e2d\u00e9\u00d0") == "U+4E2D\u00e9U+00D0"
+
+
+# ---------------------------------------------------------------------- the command
+
+
+@pytest.mark.parametrize("output", ["c.pdf", "c", "c.json", "none/c.html", "a b.tex"])
+def test_what_cannot_be_written_is_refused_before_the_work(output: str, tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    before = (tmp_path / "c.json").read_bytes()
+    done = ptcc("report", str(tmp_path / "c.json"), "-o", str(tmp_path / output))
+    assert done.code == 2 and len(done.err.splitlines()) == 1 and done.out == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["c.json"] and (tmp_path / "c.json").read_bytes() == before
+
+
+def test_a_page_does_not_replace_its_certificate(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.html")
+    with pytest.raises(ParameterError, match="is the certificate itself"):
+        write_report(tmp_path / "c.html", tmp_path / "c.html")
+
+
+@pytest.mark.parametrize("content", [None, "", "{}", "\x00"])
+def test_what_is_no_certificate_is_refused_in_one_line(content: str | None, tmp_path: Path):
+    if content is not None:
+        (tmp_path / "c.json").write_text(content)
+    done = ptcc("report", str(tmp_path / "c.json"), "-o", str(tmp_path / "c.html"))
+    assert done.code == 2 and len(done.err.splitlines()) == 1
+    assert not (tmp_path / "c.html").exists()
+
+
+def test_the_command_writes_a_page(tmp_path: Path):
+    example("nominal").save(tmp_path / "c.json")
+    done = ptcc("report", str(tmp_path / "c.json"), "-o", str(tmp_path / "c.html"), "--no-simulation")
+    assert (done.code, done.err) == (0, "") and done.out.split() == ["certified", str(tmp_path / "c.html")]
+    sound((tmp_path / "c.html").read_text(encoding="utf-8"))
