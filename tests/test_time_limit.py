@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -162,6 +161,8 @@ def test_the_death_of_a_process_is_told():
 
 @linux
 def test_work_apart_takes_many_open_files_and_large_values():
+    import resource
+
     if resource.getrlimit(resource.RLIMIT_NOFILE)[0] < 1200:
         pytest.skip("a process may not open more than 1,023 files here")
     files = [os.dup(1) for _ in range(1100)]  # descriptors above 1023, which select() does not know
@@ -172,6 +173,7 @@ def test_work_apart_takes_many_open_files_and_large_values():
             os.close(file)
 
 
+@linux
 def test_an_interrupt_while_a_process_is_made_is_not_lost():
     fork = os.fork
 
@@ -186,6 +188,7 @@ def test_an_interrupt_while_a_process_is_made_is_not_lost():
         os.waitpid(-1, os.WNOHANG)
 
 
+@linux
 def test_work_apart_is_done_where_children_are_not_waited_for():
     before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     try:
