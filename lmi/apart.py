@@ -60,19 +60,22 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         return
     here, there = os.pipe()
     parent = os.getpid()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # until either process is ready for it
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a solver keeps: the child uses none
             child = os.fork()
     except OSError:  # no more processes
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         os.close(here)
         os.close(there)
         yield from work()
         return
     if child == 0:
         _work(work, here, there, parent)
-    os.close(there)
     try:
+        os.close(there)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while True:
             kind, value = _received(here)
             if kind == _END:
@@ -94,6 +97,7 @@ def _work(work: Callable[[], Iterable[Any]], here: int, there: int, parent: int)
         if os.getppid() != parent:
             os._exit(0)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told, and ends the child
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         os.close(here)
         try:
             for value in work():
@@ -125,13 +129,13 @@ def _received(here: int) -> tuple[int, Any]:
     return pickle.loads(_bytes(here, size))  # noqa: S301  from the process that was started above
 
 
-def _bytes(here: int, count: int) -> bytes:
+def _bytes(here: int, count: int) -> bytearray:
     """Read so many bytes before the time limit."""
-    content = b""
+    content, ready = bytearray(), select.poll()  # select() knows no descriptors above 1023
+    ready.register(here, select.POLLIN)
     while len(content) < count:
         checkpoint()
-        left = seconds_left()
-        if select.select([here], [], [], min(left, 3600.0))[0]:
+        if ready.poll(1000 * min(seconds_left(), 3600.0)):
             part = os.read(here, min(count - len(content), 1 << 20))
             if not part:
                 raise LMIError("its process ended without an answer")

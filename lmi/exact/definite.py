@@ -29,6 +29,8 @@ FLINT_ROWS = 24
 FLINT_BITS = 40_000
 #: Above this many rows NumPy, where it is installed, forms factor and remainder, or solves.
 NUMPY_ROWS = 24
+#: Matrices with entries of more bits whose mean is shorter by this factor are not multiplied by python-flint.
+PADDED_BITS, PADDED = 4000, 8
 #: Bits of all entries up to which python-flint multiplies large matrices.
 LONGEST = 200_000_000
 #: Bits of an inverse factor in floats, and how near it takes a matrix to the identity: ``2^-CONGRUENCE``.
@@ -232,8 +234,9 @@ class Flint(Standard):
         return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
-        """Return ``A B`` by python-flint."""
-        if not A or not B:
+        """Return ``A B``, by python-flint unless some entries are much longer than others, which it pads all to."""
+        long, short = sorted((longest(A), longest(B)), reverse=True)
+        if not A or not B or _padded(A) or _padded(B) or long > max(PADDED_BITS, PADDED**2 * short):
             return super().product(A, B)
         left, right = (self.flint.fmpz_mat([list(row) for row in M]) for M in (A, B))
         return [[int(x) for x in row] for row in (left * right).tolist()]
@@ -294,6 +297,12 @@ def longest(rows: Rows) -> int:
     3
     """
     return max(map(abs, chain.from_iterable(rows)), default=0).bit_length()
+
+
+def _padded(rows: Rows) -> bool:
+    """Tell whether all entries are much shorter than the longest one, on average."""
+    most, count = longest(rows), sum(map(len, rows))
+    return most > PADDED_BITS and sum(map(int.bit_length, chain.from_iterable(rows))) < most * count // PADDED
 
 
 def floats(rows: Rows) -> tuple[Any, int]:

@@ -25,7 +25,7 @@ import numpy as np
 
 from lmi.exact.rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.checker.input_bounds import PrescribedGain, Starts
+from ptcc_certify.checker.input_bounds import PrescribedGain, Starts, root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
@@ -237,6 +237,7 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
     else:
         limited = certificate.effort is not None and certificate.effort.residual
         useful, said, advice = (_limited_usefulness if limited else _usefulness)(certificate)
+        said += "" if certificate.delta is None else ", without disturbances"
     violated = seen is not None and seen.violated
     return Assessment(certificate.verdict, violated, useful, said, advice, tuple(answers))
 
@@ -275,7 +276,8 @@ def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> 
         first = effort is not None and effort.first is not None and effort.first >= least
         size = f"up to {down(least)}" if least < math.inf else "without limit"
         return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by noise alone'}, proved")
-    if effort is not None and effort.bounded is False and effort.starts is not None and not certificate.limits:
+    solid = effort is not None and effort.starts is not None and all(r > 0 for r in effort.starts.radius or (0,))
+    if effort is not None and effort.bounded is False and solid and not certificate.limits:
         return Answer(REFUTED, what, "from some of these starts it grows without limit, proved")
     return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
 
@@ -317,8 +319,8 @@ def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
         period = None if effort is None else effort.longest_period
         why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
         found.append(Answer(OPEN, "limits", why))
-    silent = len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
-    if certificate.noise is not None and (silent or not residual):
+    silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
+    if certificate.noise is not None and silent and not certificate.constant:
         found.append(Answer(OPEN, "noise", "not certified"))
     if certificate.delta is not None and (effort is None or effort.disturbed is None):
         found.append(Answer(OPEN, "delta", "not certified"))
@@ -341,7 +343,8 @@ def _usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str,
     said = f"||{z}|| <= {up(left, 2)} ||{begin}|| at {instant}"
     if left <= USEFUL:
         return True, said, ""
-    if direct and (way := certificate.longest_way) is not None:
+    of_set = certificate.effort is not None and certificate.effort.starts is not None
+    if direct and not of_set and (way := certificate.longest_way) is not None:
         worst = float(certificate.outcome_distance([float(LAST)]).max(initial=0.0))
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
@@ -355,19 +358,22 @@ def _limited_usefulness(certificate: Certificate | SavedCertificate) -> tuple[bo
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
     effort, start, way = certificate.effort, certificate.start, certificate.longest_way
     residual = () if effort is None else effort.residual
+    region = None if effort is None else effort.starts
     noisy = any(entry.noise is not None for entry in residual)
-    if way is not None and not noisy and all(entry.agents is not None for entry in residual):
+    if region is None and way is not None and not noisy and all(entry.agents is not None for entry in residual):
         worst = max(x for entry in residual for x in entry.agents or ())
-        said = f"under the limits every agent within {up(worst, 2)} of its final state at T"
-        if worst <= USEFUL * way:
-            return True, said, ""
+        if worst <= Fraction(USEFUL) * Fraction(way):
+            return True, f"under the limits every agent within {up(worst, 2)} of its final state at T", ""
     norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
-    region = (None if effort is None else effort.starts) or (None if start is None else Starts(start))
-    if region is None:
-        return False, f"under the limits ||E|| <= {up(norm, 2)} at T", ""
+    said = f"under the limits ||E|| <= {up(norm, 2)} at T"
     rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
-    first = math.sqrt(sum(float(region.largest(row)) ** 2 for row in rows))
-    left = float(norm) / first if first else 0.0
+    if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
+        largest = max(region.largest(row) for row in rows)
+        return norm <= Fraction(USEFUL) * largest, f"{said} from all these starts", ""
+    first = Fraction(0) if start is None else sum((Starts(start).largest(row) ** 2 for row in rows), Fraction(0))
+    if not first:
+        return norm == 0, said, ""
+    left = root_above(norm**2 / first)
     return left <= USEFUL, f"under the limits ||E|| <= {up(left, 2)} ||E(0)|| at T", ""
 
 

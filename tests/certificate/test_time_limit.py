@@ -162,6 +162,35 @@ def test_the_death_of_a_process_is_told():
 
 
 @linux
+def test_work_apart_takes_many_open_files_and_large_values():
+    import resource
+
+    if resource.getrlimit(resource.RLIMIT_NOFILE)[0] < 1200:
+        pytest.skip("a process may not open more than 1,023 files here")
+    files = [os.dup(1) for _ in range(1100)]  # descriptors above 1023, which select() does not know
+    try:
+        assert [len(x) for x in apart(lambda: iter([bytes(10_000_000)]))] == [10_000_000]
+    finally:
+        for file in files:
+            os.close(file)
+
+
+@linux
+def test_an_interrupt_while_a_process_is_made_is_not_lost():
+    fork = os.fork
+
+    def interrupted() -> int:
+        signal.raise_signal(signal.SIGINT)  # comes once both processes are ready
+        return fork()
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(os, "fork", interrupted)
+        list(apart(lambda: iter(range(3))))
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@linux
 def test_work_apart_is_done_where_children_are_not_waited_for():
     before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     try:

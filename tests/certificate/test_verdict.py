@@ -16,14 +16,19 @@ from bad_inputs import ptcc
 from generators import all_classes, random_graph
 
 from ptcc_certify import (
+    Actuator,
     Expectations,
     NominalProtocol,
     SignedDigraph,
     SlidingModeProtocol,
+    analyse,
+    box,
     certify,
+    ellipsoid,
     read_certificate,
     report_html,
     report_latex,
+    starts_within,
 )
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
@@ -231,3 +236,60 @@ def test_what_a_file_says_was_asked_need_not_be_sound(asked: Any, tmp_path: Path
 def test_lines_are_short(sliding: bool):
     assert all(len(weak(k, sliding).assessment.text) <= 150 for k in range(12))
     assert len(certificate_lines(strong(), "fig1a")[-1]) <= 80
+
+
+# ---------------------------------------------------------------------- what is left under limits of the gain
+
+PAIR = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+GAINS = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+
+
+def limited(x0: Any = None, graph: SignedDigraph = PAIR, protocol: NominalProtocol = GAINS, **more: Any) -> Any:
+    return certify(graph, protocol, x0, simulation=False, **more).assessment
+
+
+def test_what_is_left_of_states_beyond_the_squares_of_floats_is_right():
+    shares = [
+        limited(x0, limits=[Actuator(gain_cap="0.01")]) for x0 in ([1, 3], ["1e-200", "3e-200"], ["1e200", "3e200"])
+    ]
+    assert len({found.said for found in shares}) == 1
+    assert shares[0].useful is False and "||E|| <= 0.99 ||E(0)|| at T" in shares[0].said
+
+
+def test_noise_from_the_final_state_is_not_a_share_of_nothing():
+    found = limited([1, 1], limits=[Actuator(gain_cap=10)], noise="0.1")
+    assert found.useful is False and "||E|| <= 0.29 at T" in found.said
+
+
+def test_of_a_set_no_share_is_stated_that_single_states_exceed():
+    hub = SignedDigraph.from_edges([(1, 2, 1), *((2, k, 10) for k in range(3, 103))])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa="3.3")
+    found = limited(None, hub, protocol, starts=starts_within(analyse(hub), 1), limits=[Actuator(gain_cap="4.5")])
+    assert "||E(0)||" not in found.said and "from all these starts" in found.said
+
+
+@pytest.mark.parametrize("size", ["0.01", "1000", "1e200"])
+def test_the_verdict_on_a_set_does_not_hang_on_another_start(size: str):
+    sets = starts_within(analyse(PAIR), size)
+    assert limited([7, 3], starts=sets, limits=[Actuator(gain_cap="0.01")]).useful is False
+    assert limited([7, 3], starts=sets, limits=[Actuator(gain_cap="100")]).useful is True
+
+
+@pytest.mark.parametrize("region", [box([1, 1], [1, 1]), ellipsoid([1, 1], [[1, 1]])])
+def test_an_unbounded_input_from_a_thin_set_is_not_called_proved(region: Any):
+    weak_gains = NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1)
+    asked = Expectations(max_input=Fraction(100))
+    found = limited(None, protocol=weak_gains, starts=region, expectations=asked)
+    assert found.exit_code == 4 and "refuted" not in found.text
+    solid = limited(None, protocol=weak_gains, starts=box([0, 0], [2, 1]), expectations=asked)
+    assert solid.exit_code == 3 and "without limit, proved" in solid.text
+
+
+def test_disturbances_are_not_counted_and_it_says_so():
+    for limits in ([], [Actuator(gain_cap=20)]):
+        assert limited([1, 3], limits=limits, delta=1).said.endswith(", without disturbances")
+
+
+def test_noise_that_nobody_hears_is_no_open_question():
+    alone = SignedDigraph.from_edges([], nodes=["a", "b"])
+    assert limited([1, 2], alone, limits=[Actuator(gain_cap=5)], noise="0.1").exit_code == 0
