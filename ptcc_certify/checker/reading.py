@@ -11,10 +11,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from lmi.exact.work import fits, keeps, spend
-from ptcc_certify.errors import FormatError
 
 SCHEMA = "ptcc-certificate/1"
 #: Limits of a file, of the text of a number, and of its decimal and binary exponents.
@@ -25,10 +24,8 @@ MAX_SCALE_BITS, MAX_TOTAL_BITS = 100_000, 400_000_000
 MAX_LOADED = 800_000_000
 #: Texts of numbers up to this length are kept once they are read.
 CACHED = 64
-#: Entries of an array that are hashed at a time.
-PIECE = 10_000
-INTEGER, SIGNED = re.compile(r"[0-9]+", re.ASCII), re.compile(r"[+-]?[0-9]+", re.ASCII)
-DECIMAL = re.compile(r"([+-]?[0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
+QUOTIENT = re.compile(r"([+-]?[0-9]+)(?:/([0-9]+))?", re.ASCII)
+DECIMAL = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
 HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,5})", re.ASCII)
 
 Interval = tuple[Fraction, Fraction]
@@ -38,12 +35,16 @@ class RejectedError(Exception):
     """A claim does not follow."""
 
 
+class UnreadableError(ValueError):
+    """A file cannot be read as a certificate; one line."""
+
+
 def read(path: str | Path) -> dict[str, Any]:
     """Read the JSON of a certificate strictly: bounded size, no duplicate keys, no number that is not finite.
 
     Raises
     ------
-    FormatError
+    UnreadableError
         Names the file and what is wrong.
     """
 
@@ -61,7 +62,7 @@ def read(path: str | Path) -> dict[str, Any]:
     name = short(str(path), 200)
     try:
         with Path(path).open("rb") as file:
-            content = _content(file)
+            content = file.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
         text = content.decode("utf-8")
@@ -79,21 +80,13 @@ def read(path: str | Path) -> dict[str, Any]:
         )
     except (OSError, ValueError, RecursionError) as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FormatError(f"{name}: not a readable certificate ({short(said, 160)})") from None
+        raise UnreadableError(f"{name}: not a readable certificate ({short(said, 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise FormatError(f'{name}: not a certificate of schema "{SCHEMA}"')
+        raise UnreadableError(f'{name}: not a certificate of schema "{SCHEMA}"')
     return data
 
 
-def _content(file: BinaryIO) -> bytearray:
-    """Read a file up to one byte more than is taken."""
-    found = bytearray()
-    while len(found) <= MAX_BYTES and (part := file.read(2**20)):
-        found += part
-    return found
-
-
-def loaded_bytes(content: bytes | bytearray, text: str) -> int:
+def loaded_bytes(content: bytes, text: str) -> int:
     """Bound the memory of a JSON text and of what it becomes, from its brackets, commas, colons and quotes.
 
     Examples
@@ -109,34 +102,23 @@ def loaded_bytes(content: bytes | bytearray, text: str) -> int:
 
 def digest(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of everything but ``digest`` and ``unverified``, as JSON with sorted keys and no blanks."""
-    said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
     hashed = hashlib.sha256()
-    for part in _canonical(said):
+    for part in _canonical({key: value for key, value in data.items() if key not in ("digest", "unverified")}):
         hashed.update(part.encode("ascii"))
     return hashed.hexdigest()
 
 
 def _canonical(value: Any) -> Iterator[str]:
     """Yield JSON with sorted keys and no blanks in pieces, lest the whole stand in memory once more."""
-    plain: dict[str, Any] = {"sort_keys": True, "separators": (",", ":")}
-    items = sorted(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    if len(items) <= PIECE and not any(isinstance(value[k], dict | list) for k in items):
-        yield json.dumps(value, **plain)
-        return
-    yield "{" if isinstance(value, dict) else "["
-    part: Any
-    for first in range(0, len(items), PIECE):
-        piece = items[first : first + PIECE]
-        mark = "," if first else ""
-        if any(isinstance(value[k], dict | list) for k in piece):
-            for k in piece:
-                yield mark + f"{json.dumps(k)}:" if isinstance(value, dict) else mark
-                yield from _canonical(value[k])
-                mark = ","
-        else:
-            part = {k: value[k] for k in piece} if isinstance(value, dict) else value[piece[0] : piece[-1] + 1]
-            yield mark + json.dumps(part, **plain)[1:-1]
-    yield "}" if isinstance(value, dict) else "]"
+    items = sorted(value.items()) if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    if any(isinstance(x, dict | list) for _, x in items):
+        yield "{" if isinstance(value, dict) else "["
+        for k, (key, x) in enumerate(sorted(value.items()) if isinstance(value, dict) else enumerate(value)):
+            yield ("," if k else "") + (f"{json.dumps(key)}:" if isinstance(value, dict) else "")
+            yield from _canonical(x)
+        yield "}" if isinstance(value, dict) else "]"
+    else:
+        yield json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
 def exact(text: Any) -> Fraction:
@@ -170,19 +152,14 @@ def _short_number(text: str) -> Fraction | None:
 
 
 def _parsed(text: str) -> Fraction | None:
-    top, slash, bottom = text.partition("/")
-    if SIGNED.fullmatch(top) and (not slash or (INTEGER.fullmatch(bottom) and int(bottom))):
-        return Fraction(int(top), int(bottom or 1))
-    if match := HEXADECIMAL.fullmatch(text):
-        part, exponent = match[3] or "", int(match[4])
-        value = Fraction(int(match[1] + match[2] + part, 16))
-        if abs(exponent) <= MAX_BINARY_EXPONENT:
-            return value * Fraction(2) ** (exponent - 4 * len(part))
-    match = DECIMAL.fullmatch(text)
-    if match and (match[1].strip("+-") or match[2]) and abs(int(match[3] or 0)) <= MAX_EXPONENT:
-        part = match[2] or ""
-        digits, shift = int(match[1] + part), int(match[3] or 0) - len(part)
-        return Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
+    if match := QUOTIENT.fullmatch(text):
+        bottom = int(match[2] or 1)
+        return Fraction(int(match[1]), bottom) if bottom else None
+    kinds = (DECIMAL, 10, 10, 1, MAX_EXPONENT), (HEXADECIMAL, 16, 2, 4, MAX_BINARY_EXPONENT)
+    for pattern, base, radix, each, most in kinds:  # a digit of the fraction counts `each` in the exponent
+        if (match := pattern.fullmatch(text)) and abs(exponent := int(match[4] or 0)) <= most:
+            sign, whole, part = match[1], match[2], match[3] or ""
+            return int(sign + whole + part, base) * Fraction(radix) ** (exponent - each * len(part))
     return None
 
 
@@ -203,12 +180,8 @@ def fields(value: Any, keys: Sequence[str], what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise RejectedError(f"{what} is not an object")
     known = set(keys)
-    for key in keys:
-        if key not in value:
-            raise RejectedError(f'the key "{short(key)}" is missing')
-    for key in value:
-        if key not in known:
-            raise RejectedError(f'the key "{short(str(key))}" is not known')
+    for key in [*(k for k in keys if k not in value), *(k for k in value if k not in known)]:
+        raise RejectedError(f'the key "{short(str(key))}" is {"missing" if key in known else "not known"}')
     return value
 
 
@@ -284,3 +257,8 @@ def longest(values: Iterable[int]) -> int:
     4
     """
     return max((x.bit_length() for x in values), default=0)
+
+
+def length(values: Iterable[Fraction]) -> int:
+    """Return the bits of the longest numerator or denominator."""
+    return longest(n for x in values for n in x.as_integer_ratio())
