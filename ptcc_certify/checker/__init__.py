@@ -110,7 +110,7 @@ def read_and_check(
         else:
             data, folder = read(source), Path(source).parent
         report = _check(data, SideFiles(folder, files), stdlib)
-        return data, replace(report, memory=account.needed)
+        return data, replace(report, memory=float(account.needed))
 
 
 def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:

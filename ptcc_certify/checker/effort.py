@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.rounding import down, up
-from lmi.exact.spectral_line import nonzero_spectrum_beyond, tractable
+from lmi.exact.spectrum import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker.input_bounds import (
     Form,

@@ -11,8 +11,8 @@ from itertools import pairwise
 from operator import mul
 from typing import Any
 
+from lmi.exact.definite import SparseFactor
 from lmi.exact.rounding import down, up
-from lmi.exact.sparse import residual_definite
 from lmi.exact.work import fits, spend
 from ptcc_certify.checker.input_bounds import Form
 from ptcc_certify.checker.outcome import OutcomeCheck
@@ -458,9 +458,8 @@ class LyapunovCheck(OutcomeCheck):
         if gauge is not None and said["parents"] is None:
             scale *= self.digraph.unit**2
         scale *= times.denominator
-        told: dict[str, Any] = {"power": said["power"], "weights": vector, "scale": scale, "numpy": self.exact.numpy}
-        told["fits"] = fits
-        proved = residual_definite(n, lower, order, columns, exponents, said["bits"], **told)
+        factor = SparseFactor(order, *columns, exponents, said["bits"], vector)
+        proved = self.exact.residual_definite(n, lower, factor, said["power"], scale)
         need(proved, "a leader group is not proved by its factor")
 
     def _sparse_block(self, group: Sequence[int]) -> Sparse:

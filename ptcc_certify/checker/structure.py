@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from lmi.exact.definite import arithmetic
+from lmi.exact import arithmetic
 from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import digraph
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
