@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lmi.exact.definite import arithmetic
+from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import check_final_state
@@ -130,7 +130,7 @@ def read_and_check(
         else:
             data, folder = read(source), Path(source).parent
         report = _check(data, SideFiles(folder, files), stdlib)
-        return data, replace(report, memory=account.needed)
+        return data, replace(report, memory=float(account.needed))
 
 
 def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:

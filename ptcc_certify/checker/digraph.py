@@ -16,8 +16,9 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
+from lmi.exact.numbers import common_denominator, longest, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.reading import common_denominator, longest, need, sized
+from ptcc_certify.checker.reading import need
 
 #: Lines hashed, and edges taken from arrays, at a time.
 CHUNK = 65_536

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from lmi.exact.definite import Standard
+from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
 from ptcc_certify.checker.reading import exact, fields, need
 from ptcc_certify.checker.vectors import SideFiles
@@ -19,7 +19,7 @@ class Document:
     data : dict
         The JSON.
     files : SideFiles
-    exact : Standard
+    exact : Arithmetic
         Decides definiteness.
     steps : list of Step
         The obligations that were verified.
@@ -29,7 +29,7 @@ class Document:
         Of the graph.
     """
 
-    def __init__(self, data: dict[str, Any], files: SideFiles, arithmetic: Standard):
+    def __init__(self, data: dict[str, Any], files: SideFiles, arithmetic: Arithmetic):
         self.data, self.files, self.exact = data, files, arithmetic
         self.steps: list[Step] = []
         self.at, self.sha256 = "format", ""

@@ -10,13 +10,14 @@ from itertools import pairwise
 from operator import mul
 from typing import Any
 
+from lmi.exact.definite import SparseFactor
+from lmi.exact.numbers import longest
 from lmi.exact.rounding import down
-from lmi.exact.sparse import residual_definite
 from lmi.exact.work import fits, spend
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.matrices import Sparse, block
 from ptcc_certify.checker.paper import group_decrease
-from ptcc_certify.checker.reading import entries, exact, fields, longest, need
+from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.vectors import Numbers
 
@@ -108,7 +109,7 @@ def _factor(
     need(few, "the factor has too many entries")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
-    columns = indptr, *(read(said[key], key, indptr[-1]) for key in ("indices", "data"))
+    indices, data = (read(said[key], key, indptr[-1]) for key in ("indices", "data"))
     A, basis, unit = block(structure.graph, group), None, structure.graph.unit
     if said["parents"] is not None:
         need(gauge is not None, "parents of a group that is not balanced")
@@ -118,19 +119,8 @@ def _factor(
     lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
     if gauge is not None and said["parents"] is None:
         scale *= unit**2
-    proved = residual_definite(
-        n,
-        lower,
-        order,
-        columns,
-        exponents,
-        said["bits"],
-        power=said["power"],
-        weights=vector,
-        scale=scale * times.denominator,
-        numpy=arithmetic.numpy,
-        fits=fits,
-    )
+    factor = SparseFactor(order, indptr, indices, data, exponents, said["bits"], vector)
+    proved = arithmetic.residual_definite(n, lower, factor, said["power"], scale * times.denominator)
     need(proved, "a leader group is not proved by its factor")
 
 

@@ -1,7 +1,7 @@
 """The array twin of the graph: the same answers by NumPy, for graphs of many edges. Every sum is exact.
 
-Nothing here decides anything that :class:`~ptcc_certify.checker.digraph.Digraph` does not decide by the standard library
-alone; ``tests/checker/test_digraph.py`` compares the two method by method.
+Nothing here decides what :class:`~ptcc_certify.checker.digraph.Digraph` does not decide by the standard library alone;
+``tests/checker/test_digraph.py`` compares the two method by method.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from functools import cached_property
 from operator import mul
 from typing import Any
 
+from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.rounding import up
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
@@ -17,20 +18,7 @@ from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import by_agent, ordered, positions
 from ptcc_certify.checker.matrices import Matrix, need_rows
 from ptcc_certify.checker.protocol import Begin
-from ptcc_certify.checker.reading import (
-    Interval,
-    RejectedError,
-    entries,
-    fields,
-    integers,
-    interval,
-    length,
-    longest,
-    need,
-    same,
-    short,
-    sized,
-)
+from ptcc_certify.checker.reading import Interval, RejectedError, entries, fields, interval, length, need, same
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 from ptcc_certify.checker.vectors import Numbers, beside
 
@@ -205,7 +193,7 @@ def _weights(structure: Structure, said: Any, u: Numbers | None) -> list[list[In
         left = {v: sum(x * known.get(j, 0) for j, x in row.items()) for v, row in rows.items()}
         astray = next((v for v in F if left[v]), None)
         if astray is not None:
-            need(u is not None, f"agent {short(graph.labels[astray])} is not where its neighbours pull it")
+            need(u is not None, f"agent {shorten(graph.labels[astray])} is not where its neighbours pull it")
             worst, least = _worst(F, left, pushed)
             error = Fraction(worst, least * scale)
             within = all(error * each[v] <= row[column][1] for v, row in zip(F, weights, strict=True))
@@ -246,9 +234,9 @@ def _final(
     for v, (x, r) in proved.items():
         mid, radius = claimed[0][v], claimed[1][v]
         if x != mid or r != radius:
-            need(abs(x - mid) + r <= radius, f"agent {short(graph.labels[v])} ends elsewhere")
+            need(abs(x - mid) + r <= radius, f"agent {shorten(graph.labels[v])} ends elsewhere")
             narrow = r == radius or radius <= 2 * r + spare
-            need(narrow, f"the interval of agent {short(graph.labels[v])} is wider than what is proved")
+            need(narrow, f"the interval of agent {shorten(graph.labels[v])} is wider than what is proved")
     widest = max(r for _, r in proved.values())
     if weights is None and structure.followers:
         widest = max(widest, _followers(structure, values, claimed, spare, u))
@@ -305,7 +293,7 @@ def _followers(
     for v, told, weight in zip(F, radii, U, strict=True):
         proved, radius = worst * fine * weight, share * told
         if proved > radius or (proved != radius and radius > 2 * proved + room):
-            name = short(graph.labels[v])
+            name = shorten(graph.labels[v])
             need(proved <= radius, f"agent {name} ends elsewhere")
             need(False, f"the interval of agent {name} is wider than what is proved")
     return Fraction(worst * max(U), share)

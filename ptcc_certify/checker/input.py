@@ -9,8 +9,9 @@ from functools import cached_property
 from itertools import chain
 from typing import Any
 
+from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.rounding import down, up
-from lmi.exact.spectral_line import nonzero_spectrum_beyond, tractable
+from lmi.exact.spectrum import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import FinalState
@@ -31,19 +32,7 @@ from ptcc_certify.checker.input_bounds import (
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
 from ptcc_certify.checker.protocol import Begin, Protocol
-from ptcc_certify.checker.reading import (
-    RejectedError,
-    entries,
-    exact,
-    fields,
-    integers,
-    length,
-    longest,
-    need,
-    short,
-    sized,
-    triangle,
-)
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.vectors import Numbers
 
@@ -141,7 +130,7 @@ def _above(document: Document, known: Verified, said: Any, what: str, least: Seq
     told, labels = _each(document, known, said, what), known.structure.graph.labels
     for label, x, y in zip(labels, told, least, strict=True):
         if x < y:
-            raise RejectedError(f"the bound of agent {short(label)} is not proved: {what}")
+            raise RejectedError(f"the bound of agent {shorten(label)} is not proved: {what}")
     return told
 
 
@@ -211,7 +200,7 @@ def _constants(document: Document, known: Verified, said: Sequence[Any]) -> list
             forms.append(([q * (place.get(v) == i) for i in range(len(P))], q * p))
         failed = document.exact.bounded(P, forms)
         label = known.structure.graph.labels[failed or 0]
-        need(failed is None, f"the constant of agent {short(label)} is not proved")
+        need(failed is None, f"the constant of agent {shorten(label)} is not proved")
         document.done(f"at most {up(max(constants))}")
         found.append(constants)
     return found

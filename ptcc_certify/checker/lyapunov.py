@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.rounding import down, up
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
@@ -16,19 +17,7 @@ from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_bounds import Form
 from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
 from ptcc_certify.checker.paper import Paper, deviation_form
-from ptcc_certify.checker.reading import (
-    RejectedError,
-    entries,
-    exact,
-    fields,
-    integers,
-    longest,
-    need,
-    same,
-    short,
-    sized,
-    triangle,
-)
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.vectors import beside
 
@@ -182,7 +171,7 @@ def _distance(document: Document, final: FinalState, said: Any, state_form: tupl
         spend(len(row), longest((q,)), longest(row), "distances")
         forms.append(([q * x for x in row], q * p))
     failed = document.exact.bounded(S, forms)  # proves V > 0 besides
-    need(failed is None, f"the constant of agent {short(labels[failed or 0])} is not proved")
+    need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
     p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
     bits, ratio = max(longest(x for row in part for x in row) for part in (S, gram)), longest((p, q))
     sized(len(S) ** 2, bits + ratio, "the distance of the norm")

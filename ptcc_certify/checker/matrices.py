@@ -11,10 +11,11 @@ from fractions import Fraction
 from itertools import chain
 from operator import mul
 
-from lmi.exact.definite import Standard
+from lmi.exact.definite import Arithmetic
+from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.reading import longest, need, sized
+from ptcc_certify.checker.reading import need
 
 Matrix = list[list[int]]
 Sparse = list[dict[int, int]]
@@ -45,7 +46,7 @@ def transposed(A: Matrix) -> Matrix:
     return [list(column) for column in zip(*A, strict=True)]
 
 
-def times(exact: Standard, A: Matrix, B: Sparse, width: int) -> Matrix:
+def times(exact: Arithmetic, A: Matrix, B: Sparse, width: int) -> Matrix:
     """Return ``A B``; ``B`` has so many columns."""
     need_rows(max(len(A), len(B), width))
     bits, own = longest(chain.from_iterable(A)), longest(x for row in B for x in row.values())
@@ -66,13 +67,13 @@ def times(exact: Standard, A: Matrix, B: Sparse, width: int) -> Matrix:
     return result
 
 
-def congruence(exact: Standard, P: Matrix, A: Sparse, width: int) -> Matrix:
+def congruence(exact: Arithmetic, P: Matrix, A: Sparse, width: int) -> Matrix:
     """Return ``A'P A`` for a symmetric ``P``; ``A`` has so many columns."""
     left = transposed(times(exact, P, A, width)) if P else [[] for _ in range(width)]
     return times(exact, left, A, width)
 
 
-def decrease(exact: Standard, F: Matrix, A: Sparse, b: Fraction, unit: int) -> tuple[Matrix, int]:
+def decrease(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int) -> tuple[Matrix, int]:
     """Return ``F A + A'F - b F`` times a positive integer, and that; ``F`` is symmetric, ``A`` over ``unit``."""
     FA = times(exact, F, A, len(A))
     p, q = (b * unit).as_integer_ratio()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from lmi.exact.numbers import integers, sized
 from lmi.exact.rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
@@ -21,7 +22,7 @@ from ptcc_certify.checker.matrices import (
     need_rows,
     only,
 )
-from ptcc_certify.checker.reading import entries, exact, fields, integers, length, need, sized
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
 from ptcc_certify.checker.structure import Claim, Structure
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import by_agent, ordered
-from ptcc_certify.checker.reading import exact, fields, need, short
+from ptcc_certify.checker.reading import exact, fields, need
 from ptcc_certify.checker.vectors import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -85,7 +86,7 @@ def check_sliding(document: Document, graph: Digraph, protocol: Protocol, begin:
     known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)
     for label, size, end in zip(graph.labels, map(abs, sigma0), z, strict=True):
         if size and end is not None:
-            need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {short(label)} need not be there by then")
+            need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {shorten(label)} need not be there by then")
         else:
-            need(not end, f"agent {short(label)} starts at 0")
+            need(not end, f"agent {shorten(label)} starts at 0")
     document.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from lmi.exact.numbers import integers, longest
 from lmi.exact.rounding import up
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
@@ -13,7 +14,7 @@ from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrices import block, decrease, need_rows, product, transposed
 from ptcc_certify.checker.paper import Paper
-from ptcc_certify.checker.reading import entries, exact, fields, integers, longest, need, triangle
+from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
 
 
