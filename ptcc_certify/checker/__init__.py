@@ -134,49 +134,49 @@ def read_and_check(
 
 
 def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
-    document, verdict, reason = Document(data, files, arithmetic(stdlib)), "", None
+    doc, verdict, reason = Document(data, files, arithmetic(stdlib)), "", None
     try:
-        verdict = _verdict(document)
+        verdict = _verdict(doc)
     except (RejectedError, WorkError) as error:
         reason = str(error)
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         reason = f"malformed ({type(error).__name__})"
-    at, steps = None if reason is None else document.at, tuple(document.steps)
-    return CheckReport(reason is None, verdict, steps, at, reason, document.exact.name, document.sha256)
+    at, steps = None if reason is None else doc.at, tuple(doc.steps)
+    return CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256)
 
 
-def _verdict(document: Document) -> str:
+def _verdict(doc: Document) -> str:
     """Verify a whole certificate, part after part, each from those before; return its verdict.
 
     Raises
     ------
     RejectedError
-        Something does not follow; ``document.at`` tells where.
+        Something does not follow; ``doc.at`` tells where.
     """
-    data = document.data
+    data = doc.data
     fields(data, [key for key in KEYS if key != "components" or key in data], "the certificate")
     need(data["schema"] == SCHEMA, "an unknown schema")
     need(isinstance(data["producer"], str), "producer is not a text")
     need(isinstance(data["unverified"], dict), "unverified is not an object")
     entries(data["proof"], "proof")
-    protocol = check_protocol(document)
-    graph = check_graph(document)
-    structure = check_structure(document, graph)
-    claim = check_claim(document, structure, protocol.sliding)
-    begin = check_begin(document, graph, protocol)
-    final = check_final_state(document, structure, claim, begin)
-    paper = check_paper(document, structure, claim)
-    functions = check_functions(document, structure, final, paper)
-    rate = check_rates(document, paper, functions)
-    bound = check_rate_bound(document, structure)
-    check_sliding(document, graph, protocol, begin)
-    check_input(document, Verified(structure, protocol, begin, final, functions, rate, bound))
-    document.at = "proof"
-    need(len(document.steps) == len(data["proof"]), "an obligation that nothing asks for")
+    protocol = check_protocol(doc)
+    graph = check_graph(doc)
+    structure = check_structure(doc, graph)
+    claim = check_claim(doc, structure, protocol.sliding)
+    begin = check_begin(doc, graph, protocol)
+    final = check_final_state(doc, structure, claim, begin)
+    paper = check_paper(doc, structure, claim)
+    functions = check_functions(doc, structure, final, paper)
+    rate = check_rates(doc, paper, functions)
+    bound = check_rate_bound(doc, structure)
+    check_sliding(doc, graph, protocol, begin)
+    check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
+    doc.at = "proof"
+    need(len(doc.steps) == len(data["proof"]), "an obligation that nothing asks for")
     proved = data["outcome"] is not None and (rate is not None or not graph.listening)
     verdict = "certified" if proved else "undecided"
-    need(document.section("verdict") == verdict, f"what was proved makes it {verdict}")
-    need(document.section("digest") == digest(data), "the certificate was changed after it was made")
+    need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")
+    need(doc.section("digest") == digest(data), "the certificate was changed after it was made")
     return verdict
 
 

@@ -30,7 +30,7 @@ Proved = set[tuple[int, Fraction, tuple[int, ...]]]
 
 
 def check_dominance(
-    document: Document,
+    doc: Document,
     structure: Structure,
     nodes: Sequence[int],
     weights: Numbers,
@@ -40,10 +40,10 @@ def check_dominance(
 ) -> None:
     """Verify ``S_ii d_i > sum_j |S_ij| d_j`` for all rows, after each leader group by itself."""
     graph, number = structure.graph, structure.number
-    step = document.open("dominance", of, ["b"], witness=True)
+    step = doc.open("dominance", of, ["b"], witness=True)
     need(step["b"] == rate, "b is not the rate")
     said = fields(step["witness"], ("vector", "groups"), "the witness")
-    vector = document.files.numbers(said["vector"], "vector", len(nodes))
+    vector = doc.files.numbers(said["vector"], "vector", len(nodes))
     need(vector.positive(), "the vector is not positive")
     (own, scale), (each, _) = (numbers.over(range(len(nodes))) for numbers in (weights, vector))
     W, D = [0] * graph.n, [0] * graph.n
@@ -51,7 +51,7 @@ def check_dominance(
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
     known = {  # g_k of leader groups
-        k: _group(document, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
+        k: _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
         for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True)
     }
     # w_i d_i times rate, less what the others push, times q and unit
@@ -70,11 +70,11 @@ def check_dominance(
             top, bottom = spare[number[v]]
             left = top * W[v] * D[v] - bottom * pushed[v]
         need(left > 0, "a row is not dominated by its diagonal")
-    document.done(f"b = {down(rate)}, {len(nodes)} rows")
+    doc.done(f"b = {down(rate)}, {len(nodes)} rows")
 
 
 def _group(
-    document: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, said: Any, proved: Proved
+    doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, said: Any, proved: Proved
 ) -> Fraction:
     """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
     has_factor = isinstance(said, dict)
@@ -85,19 +85,19 @@ def _group(
     if key in proved:
         need(not has_factor, "a factor of a leader group that is proved already")
     elif has_factor:
-        _factor(document, structure, k, Fraction(common, scale), key[2], g, said["factor"])
+        _factor(doc, structure, k, Fraction(common, scale), key[2], g, said["factor"])
     else:
-        need(group_decrease(document, structure, k, key[2], g), "a leader group is not proved")
+        need(group_decrease(doc, structure, k, key[2], g), "a leader group is not proved")
     proved.add(key)
     return g
 
 
 def _factor(
-    document: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, said: Any
+    doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, said: Any
 ) -> None:
     """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
     keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
-    said, read, arithmetic = fields(said, keys, "factor"), document.files.integers, document.exact
+    said, read, arithmetic = fields(said, keys, "factor"), doc.files.integers, doc.exact
     group, gauge = structure.closed[k], structure.gauges[k]
     n = len(group) - (gauge is not None)
     need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")

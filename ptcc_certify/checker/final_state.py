@@ -82,29 +82,29 @@ class FinalState:
         return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
 
 
-def check_final_state(document: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
+def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
     """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
-    said, graph = document.section("outcome"), structure.graph
+    said, graph = doc.section("outcome"), structure.graph
     if said is None or begin.state is None:
         need(all(state is None for _, state in claim.components), "an outcome of a component without one of all")
     if said is None:
         return FinalState(structure)
-    witness = document.open("outcome", "graph", witness=True)["witness"]
+    witness = doc.open("outcome", "graph", witness=True)["witness"]
     said = fields(said, ("final_state", "degenerate", "influence"), "outcome")
     parts = fields(said["influence"], ("components", "followers"), "influence")
-    u = None if witness is None else by_agent(document, graph, fields(witness, ("u",), "the witness")["u"], "u")
+    u = None if witness is None else by_agent(doc, graph, fields(witness, ("u",), "the witness")["u"], "u")
     need(u is None or u.positive(), "u is not positive")
     large = parts["followers"] is None  # no weights of followers: voices of groups alone, and one final state
-    voices = _voices(document, structure, parts["components"], large, u)
+    voices = _voices(doc, structure, parts["components"], large, u)
     weights = [] if large else _weights(structure, parts["followers"], u)
     exact = not large and not any(r for row in (*voices.values(), *weights) for _, r in row)
     widest = None
     if begin.state is None:
         need(said["final_state"] is None and said["degenerate"] is None, "a final state without a start")
     else:
-        widest = _final(document, structure, said, begin, voices, None if large else weights, u)
+        widest = _final(doc, structure, said, begin, voices, None if large else weights, u)
         _components(graph, claim, said["final_state"])
-    document.done(
+    doc.done(
         "exact"
         if exact
         else "influence of leader groups"
@@ -137,13 +137,13 @@ def _worst(nodes: Sequence[int], residuals: Indexed, pushed: Indexed) -> tuple[i
 
 
 def _voices(
-    document: Document, structure: Structure, said: Any, large: bool, u: Numbers | None
+    doc: Document, structure: Structure, said: Any, large: bool, u: Numbers | None
 ) -> dict[int, list[Interval]]:
     """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1`` for every group: exactly, or within the radii."""
     listed, found = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
     for entry, (k, group, gauge) in zip(entries(said, "components", len(listed)), listed, strict=True):
         fields(entry, ("nodes", "voices"), "a component")
-        need(positions(document, structure.graph, entry["nodes"], "a component") == group, "another component")
+        need(positions(doc, structure.graph, entry["nodes"], "a component") == group, "another component")
         found[k] = [interval(x) for x in entries(entry["voices"], "voices", len(group))]
         _voices_of(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, found[k], strict=True)], u)
     return found
@@ -205,7 +205,7 @@ def _weights(structure: Structure, said: Any, u: Numbers | None) -> list[list[In
 
 
 def _final(
-    document: Document,
+    doc: Document,
     structure: Structure,
     said: Any,
     begin: Begin,
@@ -223,7 +223,7 @@ def _final(
     }
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
     need(same(said["degenerate"], [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    claimed, spare = _claimed(document, graph, said["final_state"]), WIDEST * moved.largest()
+    claimed, spare = _claimed(doc, graph, said["final_state"]), WIDEST * moved.largest()
     proved: dict[int, Interval] = {}
     for k, (group, gauge) in enumerate(zip(structure.closed, structure.gauges, strict=True), start=1):
         x, r = values.get(k, ZERO)
@@ -243,12 +243,12 @@ def _final(
     return widest
 
 
-def _claimed(document: Document, graph: Digraph, said: Any) -> tuple[Numbers, Numbers]:
+def _claimed(doc: Document, graph: Digraph, said: Any) -> tuple[Numbers, Numbers]:
     """Read middles and radii of the final state: two side vectors, or intervals by agent."""
     if isinstance(said, dict) and beside(said.get("mid")):
         fields(said, ("mid", "radius"), "final_state")
         need(beside(said["radius"]), "radius is not a side vector")
-        mid, radius = (document.files.numbers(said[key], key, graph.n) for key in ("mid", "radius"))
+        mid, radius = (doc.files.numbers(said[key], key, graph.n) for key in ("mid", "radius"))
         need(all(r >= 0 for r in radius.values), "a radius is negative")
         return mid, radius
     intervals = [interval(x) for x in ordered(graph.labels, said, "final_state").values()]

@@ -18,9 +18,9 @@ MANY_EDGES = 10_000
 NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 
 
-def check_graph(document: Document) -> Digraph:
+def check_graph(doc: Document) -> Digraph:
     """Read nodes and edges; verify their order and their hash."""
-    said = fields(document.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
+    said = fields(doc.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
     how = fields(said["read"], ("orientation", "duplicates", "self_loops", "undirected"), "read")
     need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
     need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
@@ -32,15 +32,15 @@ def check_graph(document: Document) -> Digraph:
     index = {label: v for v, label in enumerate(labels)}
     need(len(index) == len(labels), "a node occurs twice")
     _fit(NODE_BYTES * len(labels))
-    columns = _edges(document, said["edges"], index)
+    columns = _edges(doc, said["edges"], index)
     kind: type[Digraph] = Digraph
-    if document.exact.numpy and len(columns[0]) >= MANY_EDGES:
+    if doc.exact.numpy and len(columns[0]) >= MANY_EDGES:
         from ptcc_certify.checker.fast import ArrayDigraph
 
         kind = ArrayDigraph
     graph = kind(labels, *columns)
-    document.sha256 = graph.sha256()
-    need(said["sha256"] == document.sha256, "the SHA-256 of the edge list is another")
+    doc.sha256 = graph.sha256()
+    need(said["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
     return graph
 
 
@@ -49,7 +49,7 @@ def _fit(size: int) -> None:
     need(keeps(size), "a graph that may take more memory than is allowed; allow more by --memory")
 
 
-def _edges(document: Document, said: Any, index: dict[str, int]) -> tuple[Any, Any, Any, int]:
+def _edges(doc: Document, said: Any, index: dict[str, int]) -> tuple[Any, Any, Any, int]:
     """Return sources, targets, weights and what divides the weights."""
     if isinstance(said, dict):
         said = fields(said, ("count", "source", "target", "weight", "scale"), "edges")
@@ -57,7 +57,7 @@ def _edges(document: Document, said: Any, index: dict[str, int]) -> tuple[Any, A
         need(type(count) is int and 0 < count <= len(index) ** 2, "edges: count is no number of edges")
         need(scale > 0 and scale.denominator == 1, "scale is not a positive integer")
         _fit(EDGE_BYTES[0] * count)
-        source, target, weight = (document.files.column(said[key], count) for key in ("source", "target", "weight"))
+        source, target, weight = (doc.files.column(said[key], count) for key in ("source", "target", "weight"))
         need(source.typecode == target.typecode == "q", "ends of edges are not integers")
         return source, target, weight, int(scale)
     _fit(EDGE_BYTES[1] * len(entries(said, "edges")))
@@ -66,10 +66,10 @@ def _edges(document: Document, said: Any, index: dict[str, int]) -> tuple[Any, A
     return [index[r[0]] for r in rows], [index[r[1]] for r in rows], [exact(r[2]) for r in rows], 1
 
 
-def positions(document: Document, graph: Digraph, said: Any, what: str, count: int | None = None) -> list[int]:
+def positions(doc: Document, graph: Digraph, said: Any, what: str, count: int | None = None) -> list[int]:
     """Return the positions of a list of labels, or, where their number is known, of nodes in a side vector."""
     if count is not None and beside(said):
-        nodes = document.files.integers(said, what, count)
+        nodes = doc.files.integers(said, what, count)
         need(all(0 <= v < graph.n for v in nodes), f"{what}: an unknown node")
         return nodes
     labels = entries(said, what, count)
@@ -83,9 +83,9 @@ def ordered(labels: Sequence[str], said: Any, what: str) -> dict[str, Any]:
     return said
 
 
-def by_agent(document: Document, graph: Digraph, said: Any, what: str, files: bool = True) -> Numbers:
+def by_agent(doc: Document, graph: Digraph, said: Any, what: str, files: bool = True) -> Numbers:
     """Read a number for every agent: an object in their order, or a side vector where ``files`` may be named."""
     if beside(said):
         need(files, f"{what} in a side file")
-        return document.files.numbers(said, what, graph.n)
+        return doc.files.numbers(said, what, graph.n)
     return Numbers([exact(x) for x in ordered(graph.labels, said, what).values()])

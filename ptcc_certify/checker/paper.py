@@ -55,9 +55,9 @@ class Paper:
         }
 
 
-def check_paper(document: Document, structure: Structure, claim: Claim) -> Paper | None:
+def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | None:
     """Verify the certificate of the theorem's row; None if there is none."""
-    said, graph = document.section("paper"), structure.graph
+    said, graph = doc.section("paper"), structure.graph
     if said is None:
         return None
     keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "prefactor")
@@ -70,7 +70,7 @@ def check_paper(document: Document, structure: Structure, claim: Claim) -> Paper
     for entry, (name, nodes, times_rho) in zip(entries(said["blocks"], "blocks", len(expected)), expected, strict=True):
         fields(entry, ("name", "nodes", "diagonal", "times_rho"), "a block")
         need(entry["name"] == name and entry["times_rho"] is times_rho, "another block")
-        need(positions(document, graph, entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
+        need(positions(doc, graph, entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
         weights = [exact(w) for w in entries(entry["diagonal"], "diagonal", len(nodes))]
         need(all(w > 0 for w in weights), "a weight is not positive")
         blocks.append(Block(name, nodes, weights, times_rho))
@@ -88,11 +88,11 @@ def check_paper(document: Document, structure: Structure, claim: Claim) -> Paper
     if rate is None or coordinates == "eps":
         need(said["rho_interval"] is None, "an interval without a proof, or without rho")
     if rate is not None and coordinates == "eps":
-        _deviation_decrease(document, paper, rate)
+        _deviation_decrease(doc, paper, rate)
     elif rate is not None:
-        gamma = _leaders(document, paper, claim.theorem)
-        _margin(document, paper, gamma, rate)
-        _interval(document, paper, gamma)
+        gamma = _leaders(doc, paper, claim.theorem)
+        _margin(doc, paper, gamma, rate)
+        _interval(doc, paper, gamma)
     return paper
 
 
@@ -140,26 +140,26 @@ def deviation_form(paper: Paper) -> tuple[Matrix, Fraction]:
     return Z, Fraction(total * scale)
 
 
-def _deviation_decrease(document: Document, paper: Paper, rate: Fraction) -> None:
+def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
     """Verify ``Z L + L'Z - b Z > 0`` modulo ``G 1``."""
     graph, one = paper.structure.graph, paper.blocks[0]
-    b = document.open("deviation-decrease", "paper", ["b"])["b"]
+    b = doc.open("deviation-decrease", "paper", ["b"])["b"]
     need(b == rate, "b is not the rate")
     _near_null_vector(paper.structure, one.nodes, one.weights)
-    S, _ = decrease(document.exact, deviation_form(paper)[0], block(graph, range(graph.n)), b, graph.unit)
-    need(document.exact.definite(only(S, paper.structure.kept)), "not proved definite")
-    document.done(f"b = {down(b)}")
+    S, _ = decrease(doc.exact, deviation_form(paper)[0], block(graph, range(graph.n)), b, graph.unit)
+    need(doc.exact.definite(only(S, paper.structure.kept)), "not proved definite")
+    doc.done(f"b = {down(b)}")
 
 
-def group_decrease(document: Document, structure: Structure, k: int, weights: Sequence[int], b: Fraction) -> bool:
+def group_decrease(doc: Document, structure: Structure, k: int, weights: Sequence[int], b: Fraction) -> bool:
     """Tell whether ``F L_k + L_k'F - b F > 0``, ``F = L_k'W L_k``, is proved, modulo ``G_k 1`` if that is balanced."""
     A = block(structure.graph, structure.closed[k])
-    F = congruence(document.exact, diagonal(weights), A, len(A))
-    S, _ = decrease(document.exact, F, A, b, structure.graph.unit)
-    return document.exact.definite(only(S, range(structure.gauges[k] is not None, len(A))))
+    F = congruence(doc.exact, diagonal(weights), A, len(A))
+    S, _ = decrease(doc.exact, F, A, b, structure.graph.unit)
+    return doc.exact.definite(only(S, range(structure.gauges[k] is not None, len(A))))
 
 
-def _leaders(document: Document, paper: Paper, theorem: str) -> dict[int, Fraction] | None:
+def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction] | None:
     """Verify the decrease of each leader block; return the diagonal of Gamma, None where the row has no Gamma."""
     structure, gamma = paper.structure, dict[int, Fraction]()
     if theorem not in ("2.1", "3.1", "5.1", "6.1"):
@@ -169,53 +169,51 @@ def _leaders(document: Document, paper: Paper, theorem: str) -> dict[int, Fracti
             continue
         k, ((scaled,), scale) = structure.closed.index(nodes), integers([weights])
         if structure.gauges[k] is None:
-            m = document.open("leader-margin", f"paper.{name}", ["m"])["m"]
+            m = doc.open("leader-margin", f"paper.{name}", ["m"])["m"]
             S, unit = decrease(
-                document.exact, diagonal(scaled), block(structure.graph, nodes), Fraction(0), structure.graph.unit
+                doc.exact, diagonal(scaled), block(structure.graph, nodes), Fraction(0), structure.graph.unit
             )
-            need(m > 0 and document.exact.definite(less(S, m * unit * scale)), "not proved definite")
+            need(m > 0 and doc.exact.definite(less(S, m * unit * scale)), "not proved definite")
             gamma |= dict.fromkeys(nodes, m)
-            document.done(f"m = {down(m)}")
+            doc.done(f"m = {down(m)}")
         else:
-            b = document.open("leader-decrease", f"paper.{name}", ["b"])["b"]
+            b = doc.open("leader-decrease", f"paper.{name}", ["b"])["b"]
             _near_null_vector(structure, nodes, weights)
-            need(b > 0 and group_decrease(document, structure, k, scaled, b), "not proved definite")
+            need(b > 0 and group_decrease(doc, structure, k, scaled, b), "not proved definite")
             least = min(weights)
             gamma |= {v: b * (w if theorem in ("2.1", "5.1") else least) for v, w in zip(nodes, weights, strict=True)}
-            document.done(f"b = {down(b)}")
+            doc.done(f"b = {down(b)}")
     return gamma
 
 
-def _margin(document: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rate: Fraction) -> None:
+def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rate: Fraction) -> None:
     """Verify ``S - m I > 0``, and that the rate is ``m`` over the largest weight."""
-    has_rho = document.data["paper"]["rho"] is not None
-    numbers = document.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
+    has_rho = doc.data["paper"]["rho"] is not None
+    numbers = doc.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
     need(numbers.get("rho", paper.rho) == paper.rho, "another rho")
-    need(_coupled(document, paper, gamma, paper.rho, numbers["m"]), "not proved definite")
+    need(_coupled(doc, paper, gamma, paper.rho, numbers["m"]), "not proved definite")
     need(rate == numbers["m"] / max(paper.weights(paper.rho).values()), "the rate is not m / largest weight")
-    document.done(f"m = {down(numbers['m'])}, rate {down(rate)}")
+    doc.done(f"m = {down(numbers['m'])}, rate {down(rate)}")
 
 
-def _coupled(
-    document: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rho: Fraction, m: Fraction
-) -> bool:
+def _coupled(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rho: Fraction, m: Fraction) -> bool:
     """Tell whether ``S > m I`` is proved: ``S = W A + A'W`` at some rho, with Gamma in place of the leaders' block."""
     graph, weights, gamma = paper.structure.graph, paper.weights(rho), gamma or {}
     nodes, ((own,), scale) = list(weights), integers([list(weights.values())])
-    S, unit = decrease(document.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
+    S, unit = decrease(doc.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
     (tops,), other = integers([[*(gamma[v] * scale * unit for v in nodes if v in gamma)]])
     S = [[x * other for x in row] for row in S]
     leading = [i for i, v in enumerate(nodes) if v in gamma]
     for i, top in zip(leading, tops, strict=True):
         for j in leading:
             S[i][j] = top * (i == j)
-    return document.exact.definite(less(S, m * scale * unit * other))
+    return doc.exact.definite(less(S, m * scale * unit * other))
 
 
-def _interval(document: Document, paper: Paper, gamma: Mapping[int, Fraction] | None) -> None:
+def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None) -> None:
     """Verify that both ends of the interval of ``rho`` are admissible."""
-    said, rho = document.data["paper"]["rho_interval"], document.data["paper"]["rho"]
-    document.at = "rho-interval of paper"
+    said, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
+    doc.at = "rho-interval of paper"
     if rho is None:
         need(said is None, "an interval without rho")
         return
@@ -226,10 +224,10 @@ def _interval(document: Document, paper: Paper, gamma: Mapping[int, Fraction] | 
         free = all(j not in leading for v in paper.structure.followers for j in paper.structure.graph.row(v))
         need(free, "rho is bounded, since followers listen to these leaders")
         return
-    numbers: dict[str, Any] = document.open("rho-interval", "paper", list(ends))
+    numbers: dict[str, Any] = doc.open("rho-interval", "paper", list(ends))
     need(numbers == {**ends, "witness": None}, "other ends")
     need(ends["printed"] <= ends["exact"], "the ends are in the wrong order")
     for end in ends.values():
-        need(end > 0 and _coupled(document, paper, gamma, end, Fraction(0)), "an end is not proved admissible")
+        need(end > 0 and _coupled(doc, paper, gamma, end, Fraction(0)), "an end is not proved admissible")
     need(paper.rho <= ends["exact"], "rho lies beyond the interval")
-    document.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))
+    doc.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))

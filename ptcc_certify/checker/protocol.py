@@ -40,9 +40,9 @@ class Begin:
     sigma: Numbers | None
 
 
-def check_protocol(document: Document) -> Protocol:
+def check_protocol(doc: Document) -> Protocol:
     """Read the parameters, which are positive; mu1 is above delta."""
-    said = document.section("protocol")
+    said = doc.section("protocol")
     sliding = isinstance(said, dict) and said.get("kind") == "sliding-mode"
     names = SLIDING if sliding else NOMINAL
     said = fields(said, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
@@ -55,31 +55,32 @@ def check_protocol(document: Document) -> Protocol:
     return Protocol(sliding, gains)
 
 
-def check_begin(document: Document, graph: Digraph, protocol: Protocol) -> Begin:
+def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
     """Read ``X(0)`` and ``sigma(0)``."""
     state, sigma = (
-        None if (said := document.section(key)) is None else by_agent(document, graph, said, key)
+        None if (said := doc.section(key)) is None else by_agent(doc, graph, said, key)
         for key in ("initial_state", "sigma0")
     )
     need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
     return Begin(state, sigma)
 
 
-def check_sliding(document: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
+def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
-    said, sigma0, g = document.section("reaching_time"), begin.sigma, protocol.gains
+    said, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
     if sigma0 is None:
         need(said is None, "reaching times without sliding variables")
         return
     fields(said, ("bound", "clock", "z"), "reaching_time")
     need(said["bound"] == SLIDING_BOUND and said["clock"] == SLIDING_CLOCK, "another bound or clock")
-    document.open("sliding-bound", "protocol")
-    document.done("for every disturbance within delta")
-    z = [None if x is None else exact(x) for x in ordered(graph.labels, said["z"], "z").values()]
+    told = ordered(graph.labels, said["z"], "z").values()
+    doc.open("sliding-bound", "protocol")
+    doc.done("for every disturbance within delta")
+    z = [None if x is None else exact(x) for x in told]
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
         need(not any(z), "a reaching time of a variable that is 0 from the start")
         return
-    document.open("reaching-time", "reaching_time")
+    doc.open("reaching-time", "reaching_time")
     need(all(end is None or end >= 0 for end in z), "a reaching time before the start")
     asked = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
     spend(len(asked) * EACH_INSTANT, what="the reaching times of many agents")
@@ -89,4 +90,4 @@ def check_sliding(document: Document, graph: Digraph, protocol: Protocol, begin:
             need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {shorten(label)} need not be there by then")
         else:
             need(not end, f"agent {shorten(label)} starts at 0")
-    document.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")
+    doc.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")

@@ -18,9 +18,9 @@ from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
 
 
-def check_rates(document: Document, paper: Paper | None, functions: Sequence[Function]) -> Fraction | None:
+def check_rates(doc: Document, paper: Paper | None, functions: Sequence[Function]) -> Fraction | None:
     """Verify that the rates and the prefactor are those of the functions; return the largest rate."""
-    said = fields(document.section("rates"), ("paper", "diagonal", "certified", "limit"), "rates")
+    said = fields(doc.section("rates"), ("paper", "diagonal", "certified", "limit"), "rates")
     decaying = [f for f in functions if f.rate > 0]
     best = max(decaying, key=lambda f: (f.rate, -f.prefactor), default=None)
     proved = {
@@ -30,7 +30,7 @@ def check_rates(document: Document, paper: Paper | None, functions: Sequence[Fun
     }
     for key, value in proved.items():
         need((None if said[key] is None else exact(said[key])) == value, f"the rate {key} is not the proved one")
-    said = document.section("prefactor")
+    said = doc.section("prefactor")
     if best is None:
         need(said is None, "a prefactor without a rate")
         return None
@@ -40,44 +40,44 @@ def check_rates(document: Document, paper: Paper | None, functions: Sequence[Fun
     return best.rate
 
 
-def check_rate_bound(document: Document, structure: Structure) -> Fraction | None:
+def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
     """Verify the upper bound on every rate: by the mean nonzero eigenvalue of a strong component, or by inertia."""
-    said = document.data["rates"]["limit"]
+    said = doc.data["rates"]["limit"]
     if said is None:
         return None
-    mean = document.following.get("kind") == "rate-mean"
-    step = document.open("rate-mean" if mean else "rate-limit", "rates", ["limit"], witness=True)
+    mean = doc.following.get("kind") == "rate-mean"
+    step = doc.open("rate-mean" if mean else "rate-limit", "rates", ["limit"], witness=True)
     need(exact(said) == step["limit"], "the limit is another")
-    (_mean if mean else _inertia)(document, structure, step["limit"], step["witness"])
-    document.done(f"no rate exceeds {up(step['limit'])}")
+    (_mean if mean else _inertia)(doc, structure, step["limit"], step["witness"])
+    doc.done(f"no rate exceeds {up(step['limit'])}")
     return step["limit"]
 
 
-def _mean(document: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
+def _mean(doc: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
     """Verify that the limit is twice the mean of the nonzero eigenvalues, whose sum is the trace."""
     graph = structure.graph
-    (v,) = positions(document, graph, [fields(witness, ("node",), "the witness")["node"]], "node")
+    (v,) = positions(doc, graph, [fields(witness, ("node",), "the witness")["node"]], "node")
     own, still = structure.strong_component(v)
     trace = Fraction(sum(graph.diagonal[u] for u in own), graph.unit)
     need(v == own[0], "not the first node of a strong component")
     need(len(own) > still and limit * (len(own) - still) == 2 * trace, "not twice the mean nonzero eigenvalue")
 
 
-def _inertia(document: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
+def _inertia(doc: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
     """Verify ``H B + B'H > 0``, which gives ``H`` and ``B = A - (limit/2) I`` the same inertia."""
     said, graph = fields(witness, ("nodes", "lower_triangle", "vectors"), "the witness"), structure.graph
-    nodes = positions(document, graph, said["nodes"], "nodes")
+    nodes = positions(doc, graph, said["nodes"], "nodes")
     need(bool(nodes), "no nodes")
     own, still = structure.strong_component(nodes[0])
     need(nodes == own, "the nodes are not a strong component")
     need_rows(len(nodes))
     H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
-    S, _ = decrease(document.exact, H, block(graph, nodes), limit, graph.unit)
-    need(document.exact.definite(S), "not proved definite")
+    S, _ = decrease(doc.exact, H, block(graph, nodes), limit, graph.unit)
+    need(doc.exact.definite(S), "not proved definite")
     # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
     rows = entries(said["vectors"], "vectors", 2 if still else 1)
     X, _ = integers([[exact(x) for x in entries(row, "a vector", len(nodes))] for row in rows])
     bits = longest(x for row in H for x in row)
     spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
     below = product(X, product(H, transposed(X)))
-    need(document.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
+    need(doc.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")

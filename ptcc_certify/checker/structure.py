@@ -81,9 +81,9 @@ class Claim:
     components: list[tuple[list[int], Any]]
 
 
-def check_structure(document: Document, graph: Digraph) -> Structure:
+def check_structure(doc: Document, graph: Digraph) -> Structure:
     """Verify closed components, camps, leaders and followers, and every witness."""
-    said = document.open("structure", "graph") and document.data["structure"]
+    said = doc.open("structure", "graph") and doc.data["structure"]
     keys = ("connectivity", "closed_components", "leaders", "followers", "balanced", "sign_symmetric")
     closed: list[list[int]] = []
     gauges: list[list[int] | None] = []
@@ -91,7 +91,7 @@ def check_structure(document: Document, graph: Digraph) -> Structure:
         balanced = isinstance(entry, dict) and entry.get("balanced") is True
         fields(entry, ("nodes", "balanced", "gauge" if balanced else "negative_cycle"), "a closed component")
         need(type(entry["balanced"]) is bool, "balance of a closed component")
-        nodes = positions(document, graph, entry["nodes"], "a closed component")
+        nodes = positions(doc, graph, entry["nodes"], "a closed component")
         need(bool(nodes) and all(a < b for a, b in pairwise(nodes)), "nodes of a closed component are not in order")
         gauge = entries(entry["gauge"], "gauge", len(nodes)) if balanced else None
         signs = gauge is None or (all(type(g) is int and g in (1, -1) for g in gauge) and gauge[0] == 1)
@@ -102,15 +102,15 @@ def check_structure(document: Document, graph: Digraph) -> Structure:
     signs_of = [0] * graph.n
     for entry, nodes, gauge in zip(said["closed_components"], closed, gauges, strict=True):
         if gauge is None:
-            _negative_cycle(document, graph, entry["negative_cycle"], set(nodes))
+            _negative_cycle(doc, graph, entry["negative_cycle"], set(nodes))
         for v, sign in zip(nodes, gauge or [0] * len(nodes), strict=True):
             signs_of[v] = sign
     need(graph.fits(signs_of), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):
-        need(positions(document, graph, said[key], key, len(expected)) == expected, f"other {key}")
+        need(positions(doc, graph, said[key], key, len(expected)) == expected, f"other {key}")
     need(said["balanced"] is (not graph.pieces[1]), "balance of the graph")
     need(said["sign_symmetric"] is graph.mutual[0], "sign symmetry")
-    document.done(f"{graph.n} nodes, {graph.n_edges} edges, {len(closed)} closed component(s)")
+    doc.done(f"{graph.n} nodes, {graph.n_edges} edges, {len(closed)} closed component(s)")
     return structure
 
 
@@ -135,9 +135,9 @@ def _closed_components(graph: Digraph, closed: Sequence[Sequence[int]]) -> list[
     return number
 
 
-def _negative_cycle(document: Document, graph: Digraph, said: Any, group: set[int]) -> None:
+def _negative_cycle(doc: Document, graph: Digraph, said: Any, group: set[int]) -> None:
     """Check a closed walk of the undirected graph inside a component whose signs multiply to -1."""
-    steps = [positions(document, graph, entries(x, "a step", 2), "a step") for x in entries(said, "negative_cycle")]
+    steps = [positions(doc, graph, entries(x, "a step", 2), "a step") for x in entries(said, "negative_cycle")]
     inside = all(s in group and t in group and graph.sign(s, t) for s, t in steps)
     need(bool(steps) and inside, "not a walk along edges of the component")
     need(math.prod(graph.sign(s, t) for s, t in steps) == -1, "the cycle is not negative")
@@ -150,10 +150,10 @@ def _negative_cycle(document: Document, graph: Digraph, said: Any, group: set[in
     raise RejectedError("the walk is not closed")
 
 
-def check_claim(document: Document, structure: Structure, sliding: bool) -> Claim:
+def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     """Verify theorem, behaviour and corollaries of every weak component."""
-    document.open("claim", "graph")
-    data, expected = document.data, _expected(structure, sliding)
+    doc.open("claim", "graph")
+    data, expected = doc.data, _expected(structure, sliding)
     said, connectivity = data["claim"], data["structure"]["connectivity"]
     if len(expected) == 1:
         ((_, kind, claim),) = expected
@@ -164,8 +164,8 @@ def check_claim(document: Document, structure: Structure, sliding: bool) -> Clai
     else:
         need(connectivity == "disconnected" and said is None, "the graph is disconnected")
         theorem = f"{6 if sliding else 3}.{1 if structure.balanced else 2}"
-        verified = Claim(theorem, _components(document, structure.graph, expected))
-    document.done(f"{len(expected)} components" if verified.components else f"Theorem {verified.theorem}")
+        verified = Claim(theorem, _components(doc, structure.graph, expected))
+    doc.done(f"{len(expected)} components" if verified.components else f"Theorem {verified.theorem}")
     return verified
 
 
@@ -199,25 +199,25 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
     return expected
 
 
-def _components(document: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
+def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
     """Check what is said of each weak component; return its nodes and the outcome that is claimed."""
-    said, keys = document.data.get("components"), ("theorem", "behaviour", "corollaries")
+    said, keys = doc.data.get("components"), ("theorem", "behaviour", "corollaries")
     groups, kinds, claims = zip(*expected, strict=True)
     if len(expected) <= MANY_COMPONENTS:
         for entry, nodes, kind, claim in zip(
             entries(said, "components", len(expected)), groups, kinds, claims, strict=True
         ):
             fields(entry, ("nodes", "connectivity", "claim", "outcome"), "a component")
-            need(positions(document, graph, entry["nodes"], "a component") == nodes, "another component")
+            need(positions(doc, graph, entry["nodes"], "a component") == nodes, "another component")
             need(entry["connectivity"] == kind and same(entry["claim"], claim), "the claim of a component")
         return [(nodes, entry["outcome"]) for nodes, entry in zip(groups, said or [], strict=True)]
     said = fields(said, ("nodes", "connectivity", *keys), "components")
     if beside(said["nodes"]):
         number = {v: k for k, nodes in enumerate(groups) for v in nodes}
-        listed = document.files.integers(said["nodes"], "nodes", graph.n)
+        listed = doc.files.integers(said["nodes"], "nodes", graph.n)
         need(listed == [number[v] for v in range(graph.n)], "other components")
     else:
-        told = [positions(document, graph, x, "a component") for x in entries(said["nodes"], "nodes")]
+        told = [positions(doc, graph, x, "a component") for x in entries(said["nodes"], "nodes")]
         need(told == list(groups), "other components")
     need(same(said["connectivity"], list(kinds)), "connectivity of the components")
     need(all(same(said[key], [claim[key] for claim in claims]) for key in keys), "claims of the components")
