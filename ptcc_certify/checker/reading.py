@@ -60,7 +60,8 @@ def read(path: str | Path) -> dict[str, Any]:
         text = content.decode("utf-8")
         loaded = loaded_bytes(content, text)
         if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
-            raise ValueError(f"it may take {loaded / 1e9:.1f} GB in memory; allow more by --memory")
+            tenths = -(-loaded // 10**8)
+            raise ValueError(f"it may take {tenths // 10}.{tenths % 10} GB in memory; allow more by --memory")
         del content
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(

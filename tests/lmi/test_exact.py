@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lmi.exact.sparse import dense_definite, dominates, residual_definite
 from scipy import sparse
 
 import lmi
 import ptcc_certify
 from lmi.exact import proofs as exact
 from lmi.exact import sparse as sparse_definite
-from lmi.exact.sparse import dense_definite, dominates, residual_definite
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = settings(max_examples=30, deadline=None)

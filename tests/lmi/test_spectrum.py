@@ -12,9 +12,9 @@ import flint
 import networkx as nx
 import numpy as np
 import pytest
+from lmi.exact.spectral_line import characteristic, nonzero_spectrum_beyond, rank
 
 from lmi.exact import spectral_line
-from lmi.exact.spectral_line import characteristic, nonzero_spectrum_beyond, rank
 
 #: Weights of the edges from j to i, by (j, i).
 Edges = dict[tuple[int, int], Fraction]
