@@ -66,9 +66,9 @@ def _parsed(text: str) -> Fraction:
             raise NumberError(f'"{shorten(text)}" divides by zero')
         return Fraction(int(match[1]), bottom)
     if match := _HEXADECIMAL.fullmatch(text):
-        base, radix, limit = 16, Fraction(2), MAX_BINARY_EXPONENT
+        base, radix, limit = 16, 2, MAX_BINARY_EXPONENT
     elif (match := _DECIMAL.fullmatch(text)) and (match[2] or match[3]):
-        base, radix, limit = 10, Fraction(10), MAX_EXPONENT
+        base, radix, limit = 10, 10, MAX_EXPONENT
     elif text.lower().lstrip("+-") in {"nan", "inf", "infinity"}:
         raise NumberError(f'"{text}" is not a finite number')
     else:
@@ -76,8 +76,8 @@ def _parsed(text: str) -> Fraction:
     sign, whole, part, digits = match[1], match[2] or "", match[3] or "", match[4] or "0"
     if len(digits.lstrip("+-")) > 5 or abs(int(digits)) > limit:
         raise NumberError(f'the exponent of "{shorten(text)}" is beyond {limit}')
-    value = int(whole + part, base) * radix ** (int(digits) - len(part) * (4 if base == 16 else 1))
-    return -value if sign == "-" else value
+    value, power = int(sign + whole + part, base), int(digits) - len(part) * (4 if base == 16 else 1)
+    return Fraction(value * radix**power) if power >= 0 else Fraction(value, radix**-power)
 
 
 @lru_cache(maxsize=10_000)

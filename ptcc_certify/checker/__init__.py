@@ -1,10 +1,12 @@
 """The independent check of a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
 Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from its edges, and checks every claim
-outside ``unverified``, step by step as the proof lists them. Imports the standard library and three modules on exact
-arithmetic, nothing that makes certificates; python-flint and NumPy are used where they are installed. ``FORMAT.md``
-specifies the file. The modules, in the order of the proof: ``reading``, ``vectors``, ``digraph``, ``structure``,
-``outcome``, ``lyapunov``, ``effort``.
+outside ``unverified``, obligation by obligation as the proof lists them; ``_verdict`` is the list. ``FORMAT.md``
+specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
+``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
+
+What makes certificates asks the same kernel, and takes the bounds of the input from ``input_bounds``; graph, structure,
+final state, Lyapunov functions and upper bounds on rates are verified by code that nothing else uses.
 
     python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]
 """
