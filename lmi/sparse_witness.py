@@ -277,8 +277,8 @@ def _judged(
 def _weights(E: fast.Remainder) -> np.ndarray | None:
     """Look for weights with which the remainder dominates: a few Jacobi steps towards ``M(E) d = 1``."""
     m, on = E.n - len(E.block), E.i == E.j
-    top = max((abs(x).bit_length() for part in (E.value, E.block.ravel()) for x in part), default=0)
-    value, block = ((x >> max(top - 1000, 0)).astype(float) for x in (E.value, E.block))
+    cut = max(int(np.abs(x).max(initial=0)).bit_length() - 1000 for x in (E.value, E.block))
+    value, block = ((x >> cut if cut > 0 else x).astype(float) for x in (E.value, E.block))
     diagonal = np.zeros(E.n)
     diagonal[E.i[on]] = value[on]
     diagonal[m:] += np.diag(block)

@@ -201,7 +201,7 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
             raise MatrixError("the matrix is not square")
         if S.dtype.kind == "f" and not np.isfinite(S).all():
             raise MatrixError("the matrix has an entry that is not a finite real number")
-        if len(S) > ELIMINATION_ROWS:
+        if len(S) > RESIDUAL_ROWS:
             return _array_integers(S)
         S = S.tolist()
     rows = _rationals(S)
@@ -223,19 +223,11 @@ def _array_integers(S: np.ndarray) -> tuple[np.ndarray, list[int], int]:
     """Return what :func:`_integers` does, of an array."""
     if not (S == S.T).all():
         raise MatrixError("the matrix is not symmetric")
-    whole, power = _mantissas(S)
-    half = (np.frexp(np.abs(np.diag(S)).astype(float))[1].astype(np.int64) - 1) // 2
+    whole, power = _odd(S)
+    half = (np.frexp(np.abs(np.diag(S).astype(float)))[1].astype(np.int64) - 1) // 2
     places = np.where(whole != 0, power - half[:, None] - half[None, :], 0)
     up = max(0, -int(places.min(initial=0)))
     return whole.astype(object) << (places + up).astype(object), (-half).tolist(), 1 << up
-
-
-def _mantissas(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``values = whole 2^power`` in int64."""
-    if values.dtype.kind != "f":
-        return values.astype(np.int64), np.zeros(values.shape, dtype=np.int64)
-    mantissa, exponent = np.frexp(values.astype(float))
-    return np.ldexp(mantissa, 53).astype(np.int64), exponent.astype(np.int64) - 53
 
 
 def dyadic_array(values: np.ndarray) -> tuple[np.ndarray, int]:
@@ -243,20 +235,27 @@ def dyadic_array(values: np.ndarray) -> tuple[np.ndarray, int]:
 
     Examples
     --------
-    >>> whole, power = dyadic_array(np.array([0.75, -2.0, 0.0]))
-    >>> [Fraction(x) * Fraction(2) ** power for x in whole.tolist()]
-    [Fraction(3, 4), Fraction(-2, 1), Fraction(0, 1)]
+    >>> dyadic_array(np.array([0.75, -2.0, 0.0]))
+    (array([ 3, -8,  0]), -2)
     """
-    whole, power = _mantissas(values)
-    if values.dtype.kind == "f":  # without the zeros at the end
-        low = np.where(whole != 0, whole & -whole, 1)
-        zeros = np.frexp(low.astype(float))[1] - 1
-        whole, power = whole >> zeros, np.where(whole != 0, power + zeros, 0)
-    least = int(power[whole != 0].min()) if whole.any() else 0
-    up = np.where(whole != 0, power - least, 0)
-    longest = np.frexp(np.abs(whole).astype(float))[1] + up
-    short = values.dtype.kind != "f" or int(longest.max(initial=0)) < 62
-    return whole << up if short else whole.astype(object) << up.astype(object), least
+    whole, power = _odd(values)
+    some = whole != 0
+    least = int(power[some].min(initial=2**20)) if some.any() else 0
+    up = np.where(some, power - least, 0)
+    if int((np.frexp(whole.astype(float))[1] + up).max(initial=0)) < 62:
+        return whole << up, least
+    return whole.astype(object) << up.astype(object), least
+
+
+def _odd(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``values = whole 2^power`` in int64, ``whole`` odd or 0."""
+    whole, power = values, np.zeros(values.shape, dtype=np.int64)
+    if values.dtype.kind == "f":
+        mantissa, exponent = np.frexp(values.astype(float))
+        whole, power = np.ldexp(mantissa, 53), exponent.astype(np.int64) - 53
+    whole = whole.astype(np.int64)
+    zeros = np.frexp(np.abs((whole & -whole).astype(float)))[1].astype(np.int64) - 1
+    return np.where(whole != 0, whole >> np.maximum(zeros, 0), 0), np.where(whole != 0, power + zeros, 0)
 
 
 def _rationals(S: Rows) -> list[list[Fraction]]:

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from itertools import chain
+from operator import add
 from typing import Any, NamedTuple
 
 import flint
@@ -32,7 +34,7 @@ LONGEST = 200_000_000
 #: Bits of an inverse factor in floats, and how near it takes a matrix to the identity: ``2^-CONGRUENCE``.
 FLOAT_BITS, CONGRUENCE = 53, 30
 #: Bits of a slice at most, and of a dense factor: a sum of three slices.
-SLICE, FACTOR_BITS = 20, 57
+SLICE, FACTOR_BITS = 21, 57
 #: Longest column of a sparse factor that is multiplied pair by pair, entries of the largest dense block at the end,
 #: pairs in all, and at a time.
 LONGEST_COLUMN, LARGEST_BLOCK, LARGEST_PAIRS, CHUNK = 4000, 2_000_000, 400_000_000, 2_000_000
@@ -226,7 +228,7 @@ def _joined(limbs: list[np.ndarray], width: int) -> np.ndarray:
             pieces[-1] = (top << width) + limbs[m], bound << width, m
         else:
             pieces.append((limbs[m], 1 << width, m))
-    return sum(piece.astype(object) << (width * m) for piece, _, m in pieces)  # type: ignore[return-value]
+    return reduce(add, (piece.astype(object) << width * m if m else piece.astype(object) for piece, _, m in pieces))
 
 
 def _largest(x: np.ndarray) -> int:
@@ -269,7 +271,7 @@ def factor(S: Any) -> tuple[np.ndarray, np.ndarray] | None:
         unit = (T >> (one - 60)).astype(np.int64).astype(np.float64) * 2.0**-60
     except OverflowError:
         return None
-    shift = n * 2.0**-52
+    shift = n * 2.0**-54
     for _ in range(4):
         try:
             whole = np.rint(np.ldexp(np.linalg.cholesky(unit - shift * np.eye(n)), FACTOR_BITS))

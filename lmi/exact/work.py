@@ -163,7 +163,7 @@ def keeps(size: int) -> bool:
 
 
 @contextmanager
-def limited(memory: float = 1.0) -> Iterator[Account]:
+def limited(memory: float = 1) -> Iterator[Account]:
     """Limit what is spent inside.
 
     Parameters

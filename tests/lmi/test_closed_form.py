@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lmi.exact.proofs import prove_positive_definite
 from scipy import sparse
 from test_lmi import random_h_matrix, random_m_matrix
 
@@ -17,6 +16,7 @@ from lmi import closed_form
 from lmi.certificate import DiagonalCertificate, diagonal_rate
 from lmi.closed_form import h_matrix_certificate, m_matrix_certificate, perron_certificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
+from lmi.witness import prove_positive_definite
 
 SEEDS = st.integers(0, 2**32 - 1)
 
