@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 from generators import all_classes, random_graph
-from lmi.exact.sparse import residual_definite
 from mutations import Json, changed, resealed
 from scipy.linalg import expm
 from scipy.sparse.linalg import eigs
 
 from lmi.errors import NoCertificate
+from lmi.exact.sparse import residual_definite
 from lmi.iterative import SparseHMatrix
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.final_state import outcome
