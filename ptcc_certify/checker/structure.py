@@ -83,11 +83,12 @@ class Claim:
 
 def check_structure(doc: Document, graph: Digraph) -> Structure:
     """Verify closed components, camps, leaders and followers, and every witness."""
-    said = doc.open("structure", "graph") and doc.data["structure"]
+    doc.open("structure", "graph")
     keys = ("connectivity", "closed_components", "leaders", "followers", "balanced", "sign_symmetric")
     closed: list[list[int]] = []
     gauges: list[list[int] | None] = []
-    for entry in entries(fields(said, keys, "structure")["closed_components"], "closed_components"):
+    said = fields(doc.data["structure"], keys, "structure")
+    for entry in entries(said["closed_components"], "closed_components"):
         balanced = isinstance(entry, dict) and entry.get("balanced") is True
         fields(entry, ("nodes", "balanced", "gauge" if balanced else "negative_cycle"), "a closed component")
         need(type(entry["balanced"]) is bool, "balance of a closed component")
