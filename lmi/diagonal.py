@@ -1,7 +1,7 @@
 """The search for diagonal Lyapunov matrices, with cvxpy and Clarabel or, for larger ones, :mod:`lmi.interior_point`.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
-certificate is proved elsewhere (:mod:`lmi.exact.proofs`).
+certificate is proved elsewhere (:mod:`lmi.witness`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.coupling import couple_blocks
 from lmi.deadline import checkpoint, seconds_left
 from lmi.errors import LMIError, MatrixError, NoCertificate
-from lmi.exact.proofs import no_diagonal_rate_above, round_to_bits
+from lmi.exact.numbers import round_to_bits
 from lmi.interior_point import maximise_margin
 from lmi.matrices import block_columns, irreducible_blocks, square
+from lmi.witness import no_diagonal_rate_above
 
 if TYPE_CHECKING:
     import cvxpy as cp

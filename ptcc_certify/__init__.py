@@ -85,7 +85,7 @@ _EXPORTS = {
     "worst_start": "bounds.input",
     "Design": "gain_design",
     "design": "gain_design",
-    "check": "checker",
+    "check": "certificate.checking",
     "CheckReport": "checker",
     "SymbolicLyapunov": "theorems.symbolic",
     "symbolic_lyapunov": "theorems.symbolic",

@@ -269,7 +269,7 @@ def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_j
     Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
     certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
     """
-    from ptcc_certify.checker import read_and_check
+    from ptcc_certify.certificate.checking import read_and_check
 
     with _progress(("independent check",)) as begin:
         begin("independent check")

@@ -7,13 +7,15 @@ on none. Limits grow in proportion to a memory that is allowed, in GB.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from fractions import Fraction
 
-#: What may be spent for each GB, in products of two digits of 30 bits: some seconds.
-LIMIT = 10_000_000_000
+#: Bytes of a GB.
+GB = 1_000_000_000
+#: What may be spent for each byte, in products of two digits of 30 bits: some seconds for a GB.
+EACH_BYTE = 10
 #: What a product of short integers costs beside its digits.
 EACH = 60
 #: Digits from which on products cost less than the square, by Karatsuba's method.
@@ -29,24 +31,34 @@ class Account:
 
     Attributes
     ----------
-    memory : float
-        GB that are allowed.
-    left : float
-        Work that is left, in the unit of :func:`cost`.
-    needed : float
-        GB for which all that was counted so far would have been allowed.
-    kept : float
+    allowed : int
+        Bytes that are allowed.
+    spent : int
+        Work that is done, in the unit of :func:`cost`.
+    largest : int
+        Bytes for which all sizes so far would have been allowed.
+    kept : int
         Bytes of what stays to the end.
     """
 
     def __init__(self, memory: float):
-        self.memory, self.left, self.needed, self.kept = memory, LIMIT * memory, 0.0, 0.0
+        self.allowed, self.spent, self.largest, self.kept = int(Fraction(memory) * GB), 0, 0, 0
+
+    @property
+    def left(self) -> int:
+        """Work that is left."""
+        return EACH_BYTE * self.allowed - self.spent
+
+    @property
+    def needed(self) -> Fraction:
+        """GB for which all that was counted so far would have been allowed."""
+        return Fraction(max(self.largest, -(-self.spent // EACH_BYTE)), GB)
 
 
 _account: ContextVar[Account | None] = ContextVar("account", default=None)
 
 
-def cost(products: int, a: int = 0, b: int = 0) -> float:
+def cost(products: int, a: int = 0, b: int = 0) -> int:
     """Return what products of integers of ``a`` and ``b`` bits cost.
 
     Parameters
@@ -58,17 +70,20 @@ def cost(products: int, a: int = 0, b: int = 0) -> float:
 
     Returns
     -------
-    float
+    int
         In products of two digits of 30 bits, about a nanosecond each.
 
     Examples
     --------
     >>> cost(1), cost(10, 300, 300)
-    (61.0, 1810.0)
+    (61, 1810)
     """
     short, long = sorted((a // 30 + 1, b // 30 + 1))
-    digits = short * long if short <= LONG else long * LONG * (short / LONG) ** 0.585
-    return products * (EACH + float(digits))
+    if short <= LONG:
+        return products * (EACH + short * long)
+    # long * LONG * (short / LONG)^0.585, linear between doublings of the shorter one, each of which costs half more
+    k = (short // LONG).bit_length() - 1
+    return products * (EACH + (long * 3**k * ((LONG << k) + short) >> (2 * k + 1)))
 
 
 def spend(products: int, a: int = 0, b: int = 0, what: str = "exact arithmetic") -> None:
@@ -95,8 +110,7 @@ def spend(products: int, a: int = 0, b: int = 0, what: str = "exact arithmetic")
     lmi.exact.work.WorkError: a product of long matrices would take too long
     """
     if (account := _account.get()) is not None:
-        account.left -= cost(products, a, b)
-        account.needed = max(account.needed, account.memory - account.left / LIMIT)
+        account.spent += cost(products, a, b)
         if account.left < 0:
             raise WorkError(f"{what} would take too long")
 
@@ -114,7 +128,7 @@ def affordable(products: int, a: int = 0, b: int = 0) -> bool:
     return account is None or cost(products, a, b) <= account.left
 
 
-def fits(size: float, limit: float) -> bool:
+def fits(size: int, limit: int) -> bool:
     """Tell whether something is within a limit for each GB that is allowed; 1 GB outside of :func:`limited`.
 
     Examples
@@ -128,27 +142,28 @@ def fits(size: float, limit: float) -> bool:
     account = _account.get()
     if account is None:
         return size <= limit
-    account.needed = max(account.needed, size / limit)
-    return size <= limit * account.memory
+    share = -(-size * GB // limit)
+    account.largest = max(account.largest, share)
+    return share <= account.allowed
 
 
-def keeps(size: float) -> bool:
+def keeps(size: int) -> bool:
     """Tell whether so many bytes more may stay to the end, and count them.
 
     Examples
     --------
     >>> with limited(1):
-    ...     keeps(6e8), keeps(6e8)
+    ...     keeps(6 * 10**8), keeps(6 * 10**8)
     (True, False)
     """
     if (account := _account.get()) is None:
         return True
     account.kept += size
-    return fits(account.kept, 1e9)
+    return fits(account.kept, GB)
 
 
 @contextmanager
-def limited(memory: float = 1.0) -> Iterator[Account]:
+def limited(memory: float = 1) -> Iterator[Account]:
     """Limit what is spent inside.
 
     Parameters
@@ -161,9 +176,13 @@ def limited(memory: float = 1.0) -> Iterator[Account]:
     ValueError
         Not positive.
     """
-    if not 0 < memory < math.inf:
+    try:
+        account = Account(memory)
+    except (ValueError, OverflowError):  # nan, infinity
+        account = None
+    if account is None or memory <= 0:
         raise ValueError("the memory is not a positive number of GB")
-    token = _account.set(account := Account(memory))
+    token = _account.set(account)
     try:
         yield account
     finally:

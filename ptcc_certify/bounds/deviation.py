@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.definite import arithmetic, floats, unit_diagonal
+from lmi.exact import arithmetic
 from lmi.exact.enclosure import rounded
+from lmi.exact.fast import floats, unit_diagonal
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.graphs.structure import Structure
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.definite import arithmetic
-from lmi.exact.spectral_line import LARGEST, nonzero_spectrum_beyond, tractable
+from lmi.exact import arithmetic
+from lmi.exact.spectrum import LARGEST, nonzero_spectrum_beyond, tractable
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_bounds import (

@@ -24,6 +24,7 @@ from lmi.deadline import share_of_time
 from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
 from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.numbers import MAX_SCALE_BITS
 from lmi.exact.rounding import down
 from ptcc_certify.bounds.deviation import DistanceBound, OutcomeGeometry
 from ptcc_certify.bounds.enclosed_state import EnclosedOutcome, NotEnclosedError, enclose
@@ -35,7 +36,6 @@ from ptcc_certify.certificate.document import Writer, certificate_document, outc
 from ptcc_certify.certificate.verdict import MANY_DECADES, Assessment, Expectations, assess
 from ptcc_certify.checker import REACHING_BITS, CheckReport, check
 from ptcc_certify.checker.input_bounds import Form
-from ptcc_certify.checker.reading import MAX_SCALE_BITS
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import write_atomically

@@ -34,8 +34,9 @@ from ptcc_certify.bounds.input import (
     first_input,
 )
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.checking import read_and_check
 from ptcc_certify.certificate.verdict import Assessment, Expectations, assess
-from ptcc_certify.checker import CheckReport, read_and_check
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.vectors import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError

@@ -1,10 +1,12 @@
 """The independent check of a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
 Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from its edges, and checks every claim
-outside ``unverified``, step by step as the proof lists them. Imports the standard library and three modules on exact
-arithmetic, nothing that makes certificates; python-flint and NumPy are used where they are installed. ``FORMAT.md``
-specifies the file. The modules, in the order of the proof: ``reading``, ``vectors``, ``digraph``, ``structure``,
-``outcome``, ``lyapunov``, ``effort``.
+outside ``unverified``, obligation by obligation as the proof lists them; ``_verdict`` is the list. ``FORMAT.md``
+specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
+``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
+
+What makes certificates asks the same kernel, and takes the bounds of the input from ``input_bounds``; graph, structure,
+final state, Lyapunov functions and upper bounds on rates are verified by code that nothing else uses.
 
     python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]
 """
@@ -19,16 +21,35 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.checker.effort import INPUT_NODES, EffortCheck
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.final_state import check_final_state
+from ptcc_certify.checker.graph import check_graph
+from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
+from ptcc_certify.checker.lyapunov import check_functions
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
-from ptcc_certify.checker.outcome import REACHING_BITS, SLIDING_BOUND, SLIDING_CLOCK
-from ptcc_certify.checker.reading import SCHEMA, RejectedError, digest, entries, fields, need, read
-from ptcc_certify.checker.structure import MANY_COMPONENTS
+from ptcc_certify.checker.paper import check_paper
+from ptcc_certify.checker.protocol import (
+    REACHING_BITS,
+    SLIDING_BOUND,
+    SLIDING_CLOCK,
+    check_begin,
+    check_protocol,
+    check_sliding,
+)
+from ptcc_certify.checker.rates import check_rate_bound, check_rates
+from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, entries, fields, need, read
+from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.vectors import SideFiles
-from ptcc_certify.errors import FormatError
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib] [--memory GB]"
+
+KEYS = (
+    *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
+    *("prefactor", "initial_state", "sigma0", "outcome", "reaching_time", "effort", "proof", "verdict"),
+    *("digest", "unverified"),
+)
 
 __all__ = [
     "INPUT_NODES",
@@ -41,6 +62,7 @@ __all__ = [
     "CheckReport",
     "Statement",
     "Step",
+    "UnreadableError",
     "check",
     "digest",
     "read",
@@ -74,7 +96,7 @@ def check(
 
     Raises
     ------
-    FormatError
+    UnreadableError
         The file cannot be read as a certificate; one line.
 
     Examples
@@ -96,7 +118,7 @@ def read_and_check(
 
     Raises
     ------
-    FormatError
+    UnreadableError
         The file cannot be read as a certificate; one line.
 
     Examples
@@ -110,53 +132,54 @@ def read_and_check(
         else:
             data, folder = read(source), Path(source).parent
         report = _check(data, SideFiles(folder, files), stdlib)
-        return data, replace(report, memory=account.needed)
+        return data, replace(report, memory=float(account.needed))
 
 
 def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
-    run = _Check(data, files, stdlib)
+    doc, verdict, reason = Document(data, files, arithmetic(stdlib)), "", None
     try:
-        run.everything()
+        verdict = _verdict(doc)
     except (RejectedError, WorkError) as error:
         reason = str(error)
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         reason = f"malformed ({type(error).__name__})"
-    else:
-        return CheckReport(True, data["verdict"], tuple(run.steps), None, None, run.exact.name, run.sha256)
-    return CheckReport(False, "", tuple(run.steps), run.at, reason, run.exact.name, run.sha256)
+    at, steps = None if reason is None else doc.at, tuple(doc.steps)
+    return CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256)
 
 
-class _Check(EffortCheck):
-    """One run through a whole certificate."""
+def _verdict(doc: Document) -> str:
+    """Verify a whole certificate, part after part, each from those before; return its verdict.
 
-    def everything(self) -> None:
-        keys = ["schema", "producer", "graph", "structure", "claim", "protocol", "paper", "lyapunov", "rates"]
-        keys += ["prefactor", "initial_state", "sigma0", "outcome", "reaching_time", "effort", "proof", "verdict"]
-        components = ["components"] if "components" in self.data else []
-        fields(self.data, [*keys, *components, "digest", "unverified"], "the certificate")
-        need(self.data["schema"] == SCHEMA, "an unknown schema")
-        need(isinstance(self.data["producer"], str), "producer is not a text")
-        need(isinstance(self.data["unverified"], dict), "unverified is not an object")
-        entries(self.data["proof"], "proof")
-        self.protocol()
-        self.graph()
-        self.structure()
-        self.claims()
-        self.outcome()
-        self.paper()
-        self.members()
-        self.rates()
-        self.limit()
-        self.sliding()
-        self.effort()
-        self.at = "proof"
-        need(self.next == len(self.data["proof"]), "an obligation that nothing asks for")
-        self.at = "verdict"
-        moving = self.data["rates"]["certified"] is not None or not self.moving
-        said = "certified" if moving and self.data["outcome"] is not None else "undecided"
-        need(self.data["verdict"] == said, f"what was proved makes it {said}")
-        self.at = "digest"
-        need(digest(self.data) == self.data["digest"], "the certificate was changed after it was made")
+    Raises
+    ------
+    RejectedError
+        Something does not follow; ``doc.at`` tells where.
+    """
+    data = doc.data
+    fields(data, [key for key in KEYS if key != "components" or key in data], "the certificate")
+    need(data["schema"] == SCHEMA, "an unknown schema")
+    need(isinstance(data["producer"], str), "producer is not a text")
+    need(isinstance(data["unverified"], dict), "unverified is not an object")
+    entries(data["proof"], "proof")
+    protocol = check_protocol(doc)
+    graph = check_graph(doc)
+    structure = check_structure(doc, graph)
+    claim = check_claim(doc, structure, protocol.sliding)
+    begin = check_begin(doc, graph, protocol)
+    final = check_final_state(doc, structure, claim, begin)
+    paper = check_paper(doc, structure, claim)
+    functions = check_functions(doc, structure, final, paper)
+    rate = check_rates(doc, paper, functions)
+    bound = check_rate_bound(doc, structure)
+    check_sliding(doc, graph, protocol, begin)
+    check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
+    doc.at = "proof"
+    need(len(doc.steps) == len(data["proof"]), "an obligation that nothing asks for")
+    proved = data["outcome"] is not None and (rate is not None or not graph.listening)
+    verdict = "certified" if proved else "undecided"
+    need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")
+    need(doc.section("digest") == digest(data), "the certificate was changed after it was made")
+    return verdict
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -182,7 +205,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         report = check(paths[0], stdlib=stdlib, memory=memory)
-    except FormatError as error:
+    except UnreadableError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2
     print("\n".join(report.lines()))

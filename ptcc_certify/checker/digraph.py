@@ -1,7 +1,7 @@
-"""The signed digraph as the check needs it: rows, exact sums over edges, searches, pieces, signs, hash.
+"""A signed digraph in exact integers: sums over edges, searches, weak components, signs, hash.
 
-:class:`Digraph` needs the standard library alone. :class:`ArrayDigraph` gives the same answers, with NumPy where edges
-are many. What is summed is integers of any size, and every sum is exact.
+:class:`Digraph` needs the standard library alone; its twin in ``fast.py`` gives the same answers by NumPy. What is
+summed is integers of any size, and every sum is exact.
 """
 
 from __future__ import annotations
@@ -16,18 +16,15 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any
 
+from lmi.exact.numbers import common_denominator, longest, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.reading import common_denominator, longest, need, sized
+from ptcc_certify.checker.reading import need
 
-#: From this number of edges on NumPy is used, where it is there.
-MANY_EDGES = 10_000
 #: Lines hashed, and edges taken from arrays, at a time.
 CHUNK = 65_536
-#: Bits of the digits in which arrays of long integers are summed, and the passes over all edges that this may take.
-DIGIT, PASSES = 32, 200
 
 
-def _numbered(weights: Any) -> tuple[list[Any], list[int]]:
+def numbered(weights: Any) -> tuple[list[Any], list[int]]:
     """Return the distinct weights, and the number of each one; by their texts, whose hashes nobody can foresee."""
     number: dict[str, int] = {}
     distinct: list[Any] = []
@@ -46,7 +43,7 @@ class Digraph:
 
     Parameters
     ----------
-    n : int
+    labels : texts
     source, target : ints
         Strictly ascending by (target, source).
     weights : ints, floats or Fractions
@@ -67,14 +64,14 @@ class Digraph:
 
     Examples
     --------
-    >>> g = Digraph(3, [1, 0, 1], [0, 1, 2], [2, -3, 1], 1)
+    >>> g = Digraph("abc", [1, 0, 1], [0, 1, 2], [2, -3, 1], 1)
     >>> g.row(1), g.heard([1, 10, 100]), g.hearing([1, 10, 100])
     ({1: 3, 0: 3}, [20, 3, 10], [30, 102, 0])
     """
 
-    def __init__(self, n: int, source: Any, target: Any, weights: Any, scale: int):
-        self.n, self.source, self.target, self.scale = n, source, target, scale
-        self.n_edges = len(source)
+    def __init__(self, labels: Sequence[str], source: Any, target: Any, weights: Any, scale: int):
+        self.labels, self.index, self.n = labels, {label: v for v, label in enumerate(labels)}, len(labels)
+        self.source, self.target, self.scale, self.n_edges = source, target, scale, len(source)
         self._rows: dict[int, dict[int, int]] = {}
         self._formed = 0  # entries of these rows
         self._read(weights)
@@ -86,7 +83,7 @@ class Digraph:
         need(all(a < b for a, b in pairwise(ends)), "edges are not in order, or one occurs twice")
         need(all(0 <= s < self.n and 0 <= t < self.n and s != t for t, s in ends), "an edge of a node to itself")
         need(all(weights), "an edge of weight 0")
-        self.distinct, which = _numbered(weights)
+        self.distinct, which = numbered(weights)
         self.which: Any = array("q", which)
         self.negative: Any = bytearray(w < 0 for w in weights)
         leaving = sorted(range(self.n_edges), key=self.source.__getitem__)
@@ -139,8 +136,9 @@ class Digraph:
         at = bisect_left(ends, s, starts[t], starts[t + 1])
         return 0 if at == starts[t + 1] or ends[at] != s else -1 if negative[at] else 1
 
+    @cached_property
     def listening(self) -> list[int]:
-        """Return the nodes that some edge enters."""
+        """The nodes that some edge enters."""
         return [v for v, (a, b) in enumerate(pairwise(self.into[0])) if a < b]
 
     # ------------------------------------------------------------------ sums
@@ -152,6 +150,23 @@ class Digraph:
     def hearing(self, x: Sequence[int]) -> list[int]:
         """Return the sums of ``|w| x[t]`` over the edges out of every node; weights times ``unit``."""
         return self._sums(self.target, self.source, x, False)
+
+    def moved(self, x: Sequence[int]) -> list[int]:
+        """Return ``L x``, times ``unit``."""
+        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x, signed=True), strict=True)]
+
+    def compared(self, x: Sequence[int]) -> list[int]:
+        """Return ``M(L) x`` with the comparison matrix of ``L``, times ``unit``."""
+        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x), strict=True)]
+
+    def left(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
+        """Return ``x' M(L_k)``, times ``unit``, for a group of nodes that no edge enters."""
+        sums, rows = dict.fromkeys(group, 0), [self.row(v) for v in group]
+        spend(sum(map(len, rows)), self.bits, longest(x), "left null vectors")
+        for v, row, weight in zip(group, rows, x, strict=True):
+            for j, a in row.items():
+                sums[j] += weight * (a if j == v else -abs(a))
+        return list(sums.values())
 
     def _sums(self, of: Any, to: Any, x: Sequence[int], signed: bool) -> list[int]:
         values, bits = self.values if signed else [abs(w) for w in self.values], longest(x)
@@ -169,7 +184,7 @@ class Digraph:
 
         Examples
         --------
-        >>> list(Digraph(3, [0, 1], [1, 2], [1, 1], 1).reached([1]))
+        >>> list(Digraph("abc", [0, 1], [1, 2], [1, 1], 1).reached([1]))
         [0, 1, 1]
         """
         starts, ends, _ = self.into if back else self.out
@@ -230,10 +245,10 @@ class Digraph:
 
     # ------------------------------------------------------------------ hash
 
-    def sha256(self, labels: Sequence[str]) -> str:
+    def sha256(self) -> str:
         """Return the SHA-256 of nodes and edges, in an order that depends on the labels alone."""
-        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, labels)]
-        order = sorted(range(self.n), key=labels.__getitem__)
+        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
+        order = sorted(range(self.n), key=self.labels.__getitem__)
         rank = [0] * self.n
         for k, v in enumerate(order):
             rank[v] = k
@@ -265,154 +280,3 @@ def _starts(n: int, nodes: Any) -> list[int]:
     for v in range(n):
         starts[v + 1] += starts[v]
     return starts
-
-
-class ArrayDigraph(Digraph):
-    """The same with NumPy."""
-
-    def _read(self, weights: Any) -> None:
-        import numpy as np
-
-        n = self.n
-        source: Any = np.asarray(self.source, dtype=np.int64)
-        target: Any = np.asarray(self.target, dtype=np.int64)
-        inside = (source >= 0) & (source < n) & (target >= 0) & (target < n) & (source != target)
-        need(bool(inside.all()), "an edge of a node to itself")
-        above, beside = target[1:] > target[:-1], (target[1:] == target[:-1]) & (source[1:] > source[:-1])
-        need(bool((above | beside).all()), "edges are not in order, or one occurs twice")
-        if isinstance(weights, array):
-            values, which = np.unique(np.asarray(weights), return_inverse=True)
-            self.distinct = values.tolist()
-        else:
-            self.distinct, listed = _numbered(weights)
-            which = np.array(listed, dtype=np.int64)
-        need(all(self.distinct), "an edge of weight 0")
-        self.source, self.target, self.which = source, target, which
-        self.negative = np.array([w < 0 for w in self.distinct], dtype=np.uint8)[which]
-        self.leaving = np.argsort(source, kind="stable")
-        self.into = self._part(target), memoryview(source), memoryview(self.negative)
-        leaving = memoryview(target[self.leaving]), memoryview(self.negative[self.leaving])
-        self.out = self._part(source), *leaving
-
-    def _part(self, nodes: Any) -> list[int]:
-        import numpy as np
-
-        return [0, *np.cumsum(np.bincount(nodes, minlength=self.n)).tolist()]
-
-    @cached_property
-    def _parts(self) -> tuple[list[Any], int] | None:
-        """The weights, times ``unit``, as digits of so many bits that sums of products fit in 64; None if too many."""
-        import numpy as np
-
-        degree = max(b - a for starts in (self.into[0], self.out[0]) for a, b in pairwise(starts))
-        bits = 62 - DIGIT - degree.bit_length()
-        longest = max(abs(w).bit_length() for w in self.values)
-        if bits < 1 or longest > PASSES * bits:
-            return None
-        sizes, parts = [abs(w) for w in self.values], []
-        for shift in range(0, longest, bits):
-            digits = [(w >> shift) & ((1 << bits) - 1) for w in sizes]
-            parts.append(np.array(digits, dtype=np.int64)[self.which])
-        return parts, bits
-
-    def _sums(self, of: Any, to: Any, x: Sequence[int], signed: bool) -> list[int]:
-        import numpy as np
-
-        parts, bits = self._parts or ([], 0)
-        width = max(max(x).bit_length(), min(x).bit_length()) // DIGIT + 1
-        if len(parts) * width not in range(1, PASSES + 1):
-            return super()._sums(of, to, x, signed)
-        starts = np.array((self.into if to is self.target else self.out)[0])
-        order = slice(None) if to is self.target else self.leaving
-        sign = 1 - 2 * self.negative.astype(np.int64) if signed else 1
-        weights, at, some = [(sign * part)[order] for part in parts], of[order], np.flatnonzero(np.diff(starts))
-        # Two's complement: the last digit has the sign.
-        content = b"".join([value.to_bytes(width * DIGIT // 8, "little", signed=True) for value in x])
-        digits = np.frombuffer(content, dtype="<u4").reshape(self.n, width)
-        total = np.zeros(some.size, dtype=object)
-        for k in range(width):
-            digit = np.ascontiguousarray(digits[:, k])
-            each = (digit.view("<i4") if k == width - 1 else digit).astype(np.int64)[at]
-            for m, weight in enumerate(weights):
-                found = np.add.reduceat(weight * each, starts[some])
-                total += found.astype(object) << (k * DIGIT + m * bits)
-        sums = np.zeros(self.n, dtype=object)
-        sums[some] = total
-        return sums.tolist()
-
-    @cached_property
-    def pieces(self) -> tuple[list[int], set[int]]:
-        """Weak components and those in conflict, from the signed double cover; see :attr:`Digraph.pieces`.
-
-        Node ``v`` is there twice, ``v`` and ``v + n``: with either sign. An edge joins equal or opposite signs. Camps
-        exclude each other where both copies of a node are connected.
-        """
-        import numpy as np
-
-        n, over = self.n, self.n * self.negative.astype(np.int64)
-        x = np.concatenate([self.source, self.source + n])
-        y = np.concatenate([self.target + over, self.target + n - over])
-        label = np.arange(2 * n)
-        while x.size:
-            # Each label takes the smallest one next to it, then that one's, and so on.
-            a, b = label[x], label[y]
-            np.minimum.at(label, np.maximum(a, b), np.minimum(a, b))
-            while (label != (further := label[label])).any():
-                label = further
-            apart = label[x] != label[y]
-            x, y = x[apart], y[apart]
-        first = np.minimum(label[:n], label[n:])
-        return first.tolist(), set(first[label[:n] == label[n:]].tolist())
-
-    def closed(self, group: Sequence[int]) -> bool:
-        """Tell whether no edge enters a group from outside; see :meth:`Digraph.closed`."""
-        import numpy as np
-
-        number = np.array(group)
-        home = number[self.target]
-        return bool(((home == -1) | (home == number[self.source])).all())
-
-    def fits(self, gauge: Sequence[int]) -> bool:
-        """Tell whether camps fit; see :meth:`Digraph.fits`."""
-        import numpy as np
-
-        sign = np.array(gauge, dtype=np.int8)
-        product = sign[self.source] * sign[self.target]
-        return bool(((sign[self.target] == 0) | (product == 1 - 2 * self.negative.astype(np.int8))).all())
-
-    @cached_property
-    def mutual(self) -> tuple[bool, set[int]]:
-        """Compare opposite edges; see :attr:`Digraph.mutual`."""
-        import numpy as np
-
-        source, target = self.source[self.leaving], self.target[self.leaving]
-        keys, opposite = self.target * self.n + self.source, source * self.n + target
-        at = np.minimum(np.searchsorted(keys, opposite), self.n_edges - 1)
-        there, other = keys[at] == opposite, self.which[at]
-        own = self.which[self.leaving]
-        minus = np.array([w < 0 for w in self.distinct])
-        odd = np.array(self.pieces[0])[source[~there | (other != own)]]
-        return bool((~there | (minus[other] == minus[own])).all()), set(np.unique(odd).tolist())
-
-    def antagonistic(self) -> set[int]:
-        """Return the pieces with a negative weight."""
-        import numpy as np
-
-        return set(np.unique(np.array(self.pieces[0])[self.source[self.negative == 1]]).tolist())
-
-    def _lines(self, rank: Sequence[int], *columns: Sequence[str]) -> Iterator[str]:
-        import numpy as np
-
-        place, texts = np.array(rank), [np.array(column, dtype=object) for column in columns]
-        order = np.lexsort((place[self.target], place[self.source]))
-        for first in range(0, self.n_edges, CHUNK):
-            part = order[first : first + CHUNK]
-            numbers = self.source[part], self.target[part], self.which[part]
-            words = np.stack([text[number] for text, number in zip(texts, numbers, strict=True)], axis=1)
-            yield "".join(words.ravel().tolist())
-
-
-def digraph(n: int, source: Any, target: Any, weights: Any, scale: int, numpy: bool) -> Digraph:
-    """Return the graph in the form that is faster."""
-    kind = ArrayDigraph if numpy and len(source) >= MANY_EDGES else Digraph
-    return kind(n, source, target, weights, scale)

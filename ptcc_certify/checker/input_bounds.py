@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from operator import mul
+from itertools import islice
 from typing import Any, NamedTuple
 
 from lmi.exact.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
@@ -217,6 +217,19 @@ class Limits:
             ends.append(gain.rho1 + gain.k / latest)
         return min(ends, default=None)
 
+    def top(self, gain: PrescribedGain) -> Fraction:
+        """Return the largest gain that acts.
+
+        Raises
+        ------
+        ValueError
+            Nothing limits the gain.
+        """
+        top = self.largest_gain(gain)
+        if top is None:
+            raise ValueError("nothing limits the gain")
+        return top
+
     def clock_below(self, gain: PrescribedGain) -> Fraction:
         """Bound the integral of the gain up to the deadline from below.
 
@@ -228,10 +241,7 @@ class Limits:
         ValueError
             Nothing limits the gain: the integral is infinite.
         """
-        top = self.largest_gain(gain)
-        if top is None:
-            raise ValueError("nothing limits the gain")
-        T, rho1, k = gain.T, gain.rho1, gain.k
+        T, rho1, k, top = gain.T, gain.rho1, gain.k, self.top(gain)
         end, turn = T - (self.stop_before or 0), self._turn(gain, top)
         s = rho1 * turn + k * log(T / (T - turn), BITS)[0] + top * (end - turn)
         if self.sample_period is not None:
@@ -246,10 +256,7 @@ class Limits:
         ValueError
             Nothing limits the gain: the integral is infinite.
         """
-        top = self.largest_gain(gain)
-        if top is None:
-            raise ValueError("nothing limits the gain")
-        T, rho1, k = gain.T, gain.rho1, gain.k
+        T, rho1, k, top = gain.T, gain.rho1, gain.k, self.top(gain)
         end, turn = T - (self.stop_before or 0), self._turn(gain, top)
         squares = rho1**2 * turn + 2 * rho1 * k * log(T / (T - turn), BITS)[1] + k**2 * (1 / (T - turn) - 1 / T)
         return rounded(squares + top**2 * (end - turn), BITS, up=True)
@@ -329,23 +336,26 @@ class Form:
     lowest: Fraction
     gauge: Sequence[int] = ()
 
-    def value(self, z: Sequence[Fraction]) -> Fraction:
-        """Return ``z'P z``."""
-        if self.diagonal is not None:
-            return sum((w * x * x for w, x in zip(self.diagonal, z, strict=True)), Fraction(0))
-        rows = self.matrix or ()
-        common = math.lcm(*{p.denominator for row in rows for p in row})
-        scale = math.lcm(*{x.denominator for x in z})
-        Z = [x.numerator * (scale // x.denominator) for x in z]
-        each = (sum(p.numerator * (common // p.denominator) * x for p, x in zip(row, Z, strict=True)) for row in rows)
-        return Fraction(sum(map(mul, each, Z)), common * scale**2)
+    @cached_property
+    def entries(self) -> tuple[list[list[tuple[int, int]]], int]:
+        """The rows of ``P`` without zeros, pairs of place and entry, in integers over a scale; and the scale."""
+        lines = [[w] for w in self.diagonal] if self.diagonal is not None else self.matrix or ()
+        whole, scale = _whole([p for line in lines for p in line])
+        left = iter(whole)
+        first = range(len(lines)) if self.diagonal is not None else [0] * len(lines)
+        return [
+            [(j, p) for j, p in enumerate(islice(left, len(x)), i) if p] for i, x in zip(first, lines, strict=True)
+        ], scale
+
+    def value(self, z: Sequence[Fraction], sizes: bool = False) -> Fraction:
+        """Return ``z'P z``, or ``z'|P| z`` with the sizes of the entries."""
+        (rows, common), (Z, scale) = self.entries, _whole(z)
+        total = sum(x * sum((abs(p) if sizes else p) * Z[j] for j, p in row) for x, row in zip(Z, rows, strict=True))
+        return Fraction(total, common * scale**2)
 
     def largest_value(self, sizes: Sequence[Fraction]) -> Fraction:
         """Bound ``z'P z`` where ``|z_i| <= sizes_i``."""
-        if self.diagonal is not None:
-            return self.value(sizes)
-        rows = ([abs(p) for p in row] for row in self.matrix or ())
-        return sum((x * sum(map(mul, row, sizes)) for row, x in zip(rows, sizes, strict=True)), Fraction(0))
+        return self.value(sizes, sizes=True)
 
 
 @dataclass(frozen=True)
@@ -390,12 +400,11 @@ class Starts:
         Fraction
             Exact for a point or a box, rounded up for an ellipsoid.
         """
-        size = abs(sum((x * self.center[j] for j, x in row.items()), Fraction(0)))
+        size = abs(_dot(row, self.center))
         if self.radius:
             size += sum((abs(x) * self.radius[j] for j, x in row.items()), Fraction(0))
         elif self.axes:
-            shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in self.axes]
-            size += root_above(sum((x * x for x in shares), Fraction(0)))
+            size += root_above(sum((_dot(row, axis) ** 2 for axis in self.axes), Fraction(0)))
         return size
 
 
@@ -563,7 +572,6 @@ class InputBounds:
         if ("start", k) not in self._kept:
             form = self.form(k)
             rows = self._coordinates(form)
-            _count(form, rows, self.starts)
             known = [self._center[v] for v in form.nodes] if form.coordinates == "E" else None
             self._kept["start", k] = rounded(_largest_root(form, rows, self.starts, known), BITS, up=True)
         return self._kept["start", k]
@@ -571,8 +579,7 @@ class InputBounds:
     @cached_property
     def _center(self) -> list[Fraction]:
         """``L`` times the center of the starts."""
-        center = self.starts.center
-        return [sum((a * center[j] for j, a in row.items()), Fraction(0)) for row in self.rows]
+        return [_dot(row, self.starts.center) for row in self.rows]
 
     def _coordinates(self, form: Form) -> list[Linear]:
         """Return the rows of the coordinates of a form."""
@@ -690,7 +697,6 @@ class InputBounds:
         """Bound ``E(0)'W E(0)`` over the starts, ``E`` on the nodes that listen, in order."""
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
         form = Form(one, "E", nodes, None, W, one)
-        _count(form, [self.rows[v] for v in nodes], self.starts)
         known = [self._center[v] for v in nodes]
         return _largest_root(form, [self.rows[v] for v in nodes], self.starts, known) ** 2
 
@@ -739,6 +745,17 @@ def _bits(values: Iterable[Fraction]) -> int:
     return max((max(x.numerator.bit_length(), x.denominator.bit_length()) for x in values), default=0)
 
 
+def _whole(values: Sequence[Fraction]) -> tuple[list[int], int]:
+    """Return rationals times their common denominator, and that."""
+    scale = math.lcm(*{x.denominator for x in values})
+    return [x.numerator * (scale // x.denominator) for x in values], scale
+
+
+def _dot(row: Linear, x: Sequence[Fraction]) -> Fraction:
+    """Return ``sum_j a_j x_j``."""
+    return sum((a * x[j] for j, a in row.items()), Fraction(0))
+
+
 def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
     """Count the work of :func:`_largest_root`."""
     n, matrix = len(rows), [*([form.diagonal] if form.diagonal is not None else form.matrix or ())]
@@ -761,15 +778,12 @@ def _largest_root(
     ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid. ``center`` is ``z`` of
     the center, where it is known.
     """
-
-    def moved(x: Sequence[Fraction]) -> list[Fraction]:
-        return [sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
-
-    middle = root_above(form.value(moved(starts.center) if center is None else center))
+    _count(form, rows, starts)
+    middle = root_above(form.value([_dot(row, starts.center) for row in rows] if center is None else center))
     if starts.point:
         return middle
     if starts.axes:
-        spread = sum((form.value(moved(axis)) for axis in starts.axes), Fraction(0))
+        spread = sum((form.value([_dot(row, axis) for row in rows]) for axis in starts.axes), Fraction(0))
     else:
         spread = _spread(form, rows, starts.radius)
     entries = root_above(form.largest_value([starts.largest(row) for row in rows]))
@@ -778,24 +792,16 @@ def _largest_root(
 
 def _spread(form: Form, rows: Sequence[Linear], radius: Sequence[Fraction]) -> Fraction:
     """Return ``sum_jl |M_jl| radius_j radius_l``, ``M = A'P A``; in integers."""
-    n = len(radius)
-    unit, scale = (
-        math.lcm(*(x.denominator for row in rows for x in row.values())),
-        math.lcm(*(r.denominator for r in radius)),
-    )
-    A = [{j: x.numerator * (unit // x.denominator) for j, x in row.items()} for row in rows]
-    R = [r.numerator * (scale // r.denominator) for r in radius]
-    lines = [[w] for w in form.diagonal] if form.diagonal is not None else form.matrix or ()
-    common = math.lcm(*(x.denominator for line in lines for x in line))
-    M = [[0] * n for _ in range(n)]
-    for i, line in enumerate(lines):
-        moved = [0] * n  # row i of P A
-        for place, w in enumerate(line, i if form.diagonal is not None else 0):
-            if w:
-                times = w.numerator * (common // w.denominator)
-                for j, a in A[place].items():
-                    moved[j] += times * a
-        for j, a in A[i].items():
+    (whole, unit), (R, scale) = _whole([x for row in rows for x in row.values()]), _whole(radius)
+    left, (lines, common) = iter(whole), form.entries
+    A = [dict(zip(row, left, strict=False)) for row in rows]
+    M = [[0] * len(R) for _ in R]
+    for own, line in zip(A, lines, strict=True):
+        moved = [0] * len(R)  # a row of P A
+        for place, w in line:
+            for j, a in A[place].items():
+                moved[j] += w * a
+        for j, a in own.items():
             M[j] = [m + a * x for m, x in zip(M[j], moved, strict=True)]
     total = sum(r * sum(abs(m) * q for m, q in zip(row, R, strict=True)) for r, row in zip(R, M, strict=True))
     return Fraction(total, common * unit**2 * scale**2)

@@ -5,31 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import re
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
-from lmi.exact.work import fits, keeps, spend
-from ptcc_certify.errors import FormatError
+from lmi.exact.numbers import NumberError, longest, parse, shorten
+from lmi.exact.work import fits, keeps
 
 SCHEMA = "ptcc-certificate/1"
-#: Limits of a file, of the text of a number, and of its decimal and binary exponents.
-MAX_BYTES, MAX_CHARACTERS, MAX_EXPONENT, MAX_BINARY_EXPONENT = 200_000_000, 4000, 400, 1400
-#: Longest common denominator that is formed, and bits that a vector or a whole matrix of integers may take.
-MAX_SCALE_BITS, MAX_TOTAL_BITS = 100_000, 400_000_000
+#: Largest file.
+MAX_BYTES = 200_000_000
 #: Bytes that the JSON may take in memory, by :func:`loaded_bytes`.
 MAX_LOADED = 800_000_000
-#: Texts of numbers up to this length are kept once they are read.
-CACHED = 64
-#: Entries of an array that are hashed at a time.
-PIECE = 10_000
-INTEGER, SIGNED = re.compile(r"[0-9]+", re.ASCII), re.compile(r"[+-]?[0-9]+", re.ASCII)
-DECIMAL = re.compile(r"([+-]?[0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]{1,5}))?", re.ASCII)
-HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]{1,5})", re.ASCII)
 
 Interval = tuple[Fraction, Fraction]
 
@@ -38,12 +27,16 @@ class RejectedError(Exception):
     """A claim does not follow."""
 
 
+class UnreadableError(ValueError):
+    """A file cannot be read as a certificate; one line."""
+
+
 def read(path: str | Path) -> dict[str, Any]:
     """Read the JSON of a certificate strictly: bounded size, no duplicate keys, no number that is not finite.
 
     Raises
     ------
-    FormatError
+    UnreadableError
         Names the file and what is wrong.
     """
 
@@ -55,19 +48,20 @@ def read(path: str | Path) -> dict[str, Any]:
 
     def number(text: str) -> float:
         if len(text) > 100 or not math.isfinite(value := float(text)):
-            raise ValueError(f"{short(text)} is not a number that is kept")
+            raise ValueError(f"{shorten(text)} is not a number that is kept")
         return value
 
-    name = short(str(path), 200)
+    name = shorten(str(path), 200)
     try:
         with Path(path).open("rb") as file:
-            content = _content(file)
+            content = file.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
         text = content.decode("utf-8")
         loaded = loaded_bytes(content, text)
         if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
-            raise ValueError(f"it may take {loaded / 1e9:.1f} GB in memory; allow more by --memory")
+            tenths = -(-loaded // 10**8)
+            raise ValueError(f"it may take {tenths // 10}.{tenths % 10} GB in memory; allow more by --memory")
         del content
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(
@@ -79,21 +73,13 @@ def read(path: str | Path) -> dict[str, Any]:
         )
     except (OSError, ValueError, RecursionError) as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FormatError(f"{name}: not a readable certificate ({short(said, 160)})") from None
+        raise UnreadableError(f"{name}: not a readable certificate ({shorten(said, 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise FormatError(f'{name}: not a certificate of schema "{SCHEMA}"')
+        raise UnreadableError(f'{name}: not a certificate of schema "{SCHEMA}"')
     return data
 
 
-def _content(file: BinaryIO) -> bytearray:
-    """Read a file up to one byte more than is taken."""
-    found = bytearray()
-    while len(found) <= MAX_BYTES and (part := file.read(2**20)):
-        found += part
-    return found
-
-
-def loaded_bytes(content: bytes | bytearray, text: str) -> int:
+def loaded_bytes(content: bytes, text: str) -> int:
     """Bound the memory of a JSON text and of what it becomes, from its brackets, commas, colons and quotes.
 
     Examples
@@ -109,34 +95,24 @@ def loaded_bytes(content: bytes | bytearray, text: str) -> int:
 
 def digest(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of everything but ``digest`` and ``unverified``, as JSON with sorted keys and no blanks."""
-    said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
     hashed = hashlib.sha256()
-    for part in _canonical(said):
+    for part in _canonical({key: value for key, value in data.items() if key not in ("digest", "unverified")}):
         hashed.update(part.encode("ascii"))
     return hashed.hexdigest()
 
 
 def _canonical(value: Any) -> Iterator[str]:
     """Yield JSON with sorted keys and no blanks in pieces, lest the whole stand in memory once more."""
-    plain: dict[str, Any] = {"sort_keys": True, "separators": (",", ":")}
-    items = sorted(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-    if len(items) <= PIECE and not any(isinstance(value[k], dict | list) for k in items):
-        yield json.dumps(value, **plain)
-        return
-    yield "{" if isinstance(value, dict) else "["
-    part: Any
-    for first in range(0, len(items), PIECE):
-        piece = items[first : first + PIECE]
-        mark = "," if first else ""
-        if any(isinstance(value[k], dict | list) for k in piece):
-            for k in piece:
-                yield mark + f"{json.dumps(k)}:" if isinstance(value, dict) else mark
-                yield from _canonical(value[k])
-                mark = ","
-        else:
-            part = {k: value[k] for k in piece} if isinstance(value, dict) else value[piece[0] : piece[-1] + 1]
-            yield mark + json.dumps(part, **plain)[1:-1]
-    yield "}" if isinstance(value, dict) else "]"
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    if any(isinstance(x, dict | list) for x in parts):
+        opened, closed = "{}" if isinstance(value, dict) else "[]"
+        for key in sorted(value) if isinstance(value, dict) else range(len(value)):
+            yield opened + (f"{json.dumps(key)}:" if isinstance(value, dict) else "")
+            yield from _canonical(value[key])
+            opened = ","
+        yield closed
+    else:
+        yield json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
 def exact(text: Any) -> Fraction:
@@ -154,42 +130,10 @@ def exact(text: Any) -> Fraction:
     """
     if not isinstance(text, str):
         raise RejectedError(f"a value of type {type(text).__name__} is not an exact number")
-    if len(text) <= CACHED:
-        value = _short_number(text)
-    else:
-        spend(1, 2 * len(text), 2 * len(text), "reading long numbers")
-        value = _parsed(text) if len(text) <= MAX_CHARACTERS else None
-    if value is None:
-        raise RejectedError(f"{short(text)} is not an exact number")
-    return value
-
-
-@lru_cache(maxsize=10_000)
-def _short_number(text: str) -> Fraction | None:
-    return _parsed(text)
-
-
-def _parsed(text: str) -> Fraction | None:
-    top, slash, bottom = text.partition("/")
-    if SIGNED.fullmatch(top) and (not slash or (INTEGER.fullmatch(bottom) and int(bottom))):
-        return Fraction(int(top), int(bottom or 1))
-    if match := HEXADECIMAL.fullmatch(text):
-        part, exponent = match[3] or "", int(match[4])
-        value = Fraction(int(match[1] + match[2] + part, 16))
-        if abs(exponent) <= MAX_BINARY_EXPONENT:
-            return value * Fraction(2) ** (exponent - 4 * len(part))
-    match = DECIMAL.fullmatch(text)
-    if match and (match[1].strip("+-") or match[2]) and abs(int(match[3] or 0)) <= MAX_EXPONENT:
-        part = match[2] or ""
-        digits, shift = int(match[1] + part), int(match[3] or 0) - len(part)
-        return Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
-    return None
-
-
-def short(text: str, limit: int = 40) -> str:
-    """Return a text fit for a message: printable, and cut."""
-    clean = "".join(c if c.isprintable() else "?" for c in text[: limit + 1])
-    return clean if len(clean) <= limit else clean[:limit] + "..."
+    try:
+        return parse(text)
+    except NumberError:
+        raise RejectedError(f"{shorten(text)} is not an exact number") from None
 
 
 def need(holds: bool, reason: str) -> None:
@@ -203,12 +147,8 @@ def fields(value: Any, keys: Sequence[str], what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise RejectedError(f"{what} is not an object")
     known = set(keys)
-    for key in keys:
-        if key not in value:
-            raise RejectedError(f'the key "{short(key)}" is missing')
-    for key in value:
-        if key not in known:
-            raise RejectedError(f'the key "{short(str(key))}" is not known')
+    for key in [*(k for k in keys if k not in value), *(k for k in value if k not in known)]:
+        raise RejectedError(f'the key "{shorten(str(key))}" is {"missing" if key in known else "not known"}')
     return value
 
 
@@ -248,39 +188,6 @@ def interval(said: Any) -> Interval:
     return mid, radius
 
 
-def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
-    """Return rational rows times their common denominator, and that; the size of the whole is judged before."""
-    count, bits = sum(map(len, rows)), longest(x.numerator for row in rows for x in row)
-    scale = common_denominator({x.denominator for row in rows for x in row}, count)
-    size = scale.bit_length()
-    sized(count, bits + size)
-    spend(count, bits, size)
-    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
-
-
-def common_denominator(denominators: Collection[int], count: int, what: str = "the numbers") -> int:
-    """Return the least common multiple, by which ``count`` numbers are multiplied."""
-    scale = 1
-    for q in denominators:
-        spend(2, scale.bit_length(), q.bit_length(), "a common denominator")
-        scale = math.lcm(scale, q)
-        short = scale.bit_length() <= MAX_SCALE_BITS and fits(scale.bit_length() * count, MAX_TOTAL_BITS)
-        need(short, f"{what} have no common denominator of moderate length")
-    spend(count, scale.bit_length(), longest(denominators), "a common denominator")
-    return scale
-
-
-def sized(count: int, bits: int, what: str = "the numbers") -> None:
-    """Refuse a matrix or a vector of so many integers of so many bits, if it would take much memory."""
-    need(fits(count * bits, MAX_TOTAL_BITS), f"{what} are too long over one denominator")
-
-
-def longest(values: Iterable[int]) -> int:
-    """Return the bits of the longest integer.
-
-    Examples
-    --------
-    >>> longest([1, -8])
-    4
-    """
-    return max((x.bit_length() for x in values), default=0)
+def length(values: Iterable[Fraction]) -> int:
+    """Return the bits of the longest numerator or denominator."""
+    return longest(n for x in values for n in x.as_integer_ratio())

@@ -12,7 +12,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.checker.reading import RejectedError, exact, fields, integers, longest, need, sized
+from lmi.exact.numbers import integers, longest, sized
+from ptcc_certify.checker.reading import RejectedError, exact, fields, need
 
 NPY = re.compile(r"\{'descr': '(<i8|<f8)', 'fortran_order': False, 'shape': \(([0-9]{1,12}),\), \} *\n")
 

@@ -1,33 +1,30 @@
-"""The one written grammar of exact numbers, shared by the graph reader, the command line and certificates.
+"""Rationals of graphs, command line and certificates: read by the kernel's grammar, and written in it.
 
-A number is written as
-
-* an integer ``-12``,
-* a quotient of integers ``3/4``,
-* a decimal ``0.1``, ``-2.5e-3`` with an exponent of at most 400 in absolute value (``0.1`` *is* 1/10), or
-* a hexadecimal float ``0x1.8p-3``, read as an integer times a power of two.
-
-The length of a text is capped before anything is converted, so that no input can make a conversion expensive.
+The grammar is that of :mod:`lmi.exact.numbers`.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
 from numbers import Integral, Rational, Real
 
+from lmi.exact import numbers
+from lmi.exact.numbers import MAX_CHARACTERS, MAX_EXPONENT, shorten
 from ptcc_certify.errors import NumberError
 
-MAX_CHARACTERS = 4000
-MAX_EXPONENT = 400
-
-_INTEGER = re.compile(r"[+-]?[0-9]+", re.ASCII)
-_QUOTIENT = re.compile(r"([+-]?[0-9]+)/([0-9]+)", re.ASCII)
-_DECIMAL = re.compile(r"([+-]?)([0-9]*)(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?", re.ASCII)
-_HEXADECIMAL = re.compile(r"([+-]?)0[xX]([0-9a-fA-F]+)(?:\.([0-9a-fA-F]*))?[pP]([+-]?[0-9]+)", re.ASCII)
-_MAX_BINARY_EXPONENT = 1400
+__all__ = [
+    "MAX_CHARACTERS",
+    "MAX_EXPONENT",
+    "as_fraction",
+    "format_exact",
+    "nearest_float",
+    "parse_exact",
+    "short_exact",
+    "shorten",
+    "writable",
+]
 
 
 def parse_exact(text: str) -> Fraction:
@@ -52,48 +49,10 @@ def parse_exact(text: str) -> Fraction:
     >>> parse_exact("0.1"), parse_exact("-3/4"), parse_exact("2.5e-3"), parse_exact("0x1.8p-1")
     (Fraction(1, 10), Fraction(-3, 4), Fraction(1, 400), Fraction(3, 4))
     """
-    text = text.strip()
-    if len(text) > MAX_CHARACTERS:
-        raise NumberError(f"a number of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
-    if _INTEGER.fullmatch(text):
-        return Fraction(int(text))
-    if match := _QUOTIENT.fullmatch(text):
-        if int(match[2]) == 0:
-            raise NumberError(f'"{shorten(text)}" divides by zero')
-        return Fraction(int(match[1]), int(match[2]))
-    if match := _HEXADECIMAL.fullmatch(text):
-        return _hexadecimal(text, match)
-    match = _DECIMAL.fullmatch(text)
-    if match and (match[2] or match[3]):
-        whole, part = match[2] or "", match[3] or ""
-        exponent = _exponent(text, match[4], MAX_EXPONENT)
-        digits, shift = int(whole + part), exponent - len(part)
-        value = Fraction(digits * 10**shift) if shift >= 0 else Fraction(digits, 10**-shift)
-        return -value if match[1] == "-" else value
-    if text.lower().lstrip("+-") in {"nan", "inf", "infinity"}:
-        raise NumberError(f'"{text}" is not a finite number')
-    raise NumberError(f'"{shorten(text)}" is not a number')
-
-
-def _exponent(text: str, digits: str | None, limit: int) -> int:
-    if digits is None:
-        return 0
-    if len(digits.lstrip("+-0")) > 5 or abs(int(digits)) > limit:
-        raise NumberError(f'the exponent of "{shorten(text)}" is beyond {limit}')
-    return int(digits)
-
-
-def _hexadecimal(text: str, match: re.Match[str]) -> Fraction:
-    part = match[3] or ""
-    exponent = _exponent(text, match[4], _MAX_BINARY_EXPONENT)
-    value = Fraction(int(match[2] + part, 16)) * Fraction(2) ** (exponent - 4 * len(part))
-    return -value if match[1] == "-" else value
-
-
-def shorten(text: str, limit: int = 40) -> str:
-    """Return ``text`` fit for an error message: printable, and cut after ``limit`` characters."""
-    clean = "".join(c if c.isprintable() else "?" for c in text[: limit + 1])
-    return clean if len(clean) <= limit else clean[:limit] + "..."
+    try:
+        return numbers.parse(text.strip())
+    except numbers.NumberError as error:
+        raise NumberError(str(error)) from None
 
 
 def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:

@@ -28,13 +28,10 @@ import numpy as np
 
 import lmi
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.proofs import (
-    SparseDefinitenessProof,
-    prove_generalized_margin,
-    prove_sparse_positive_definite,
-    round_to_bits,
-)
+from lmi.exact.numbers import round_to_bits
 from lmi.iterative import FILL_ROWS, SparseHMatrix, fill_core
+from lmi.sparse_witness import SparseDefinitenessProof, prove_sparse_positive_definite
+from lmi.witness import prove_generalized_margin
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lmi.exact.proofs import prove_generalized_margin, round_to_bits
+from lmi.exact.numbers import round_to_bits
+from lmi.witness import prove_generalized_margin
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     Matrix,

@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.proofs import prove_positive_definite, round_to_bits
+from lmi.exact.numbers import round_to_bits
 from lmi.exact.rounding import float_down
+from lmi.witness import prove_positive_definite
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix

@@ -25,8 +25,8 @@ import lmi.full
 from lmi.apart import apart
 from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
 from lmi.errors import LMIError, OutOfTime
-from lmi.exact.proofs import prove_generalized_margin
 from lmi.matrices import block_columns
+from lmi.witness import prove_generalized_margin
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import DominantMember, dominant_members

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import lmi
-from lmi.exact.proofs import prove_generalized_margin, prove_margin, prove_positive_definite, round_to_bits
+from lmi.exact.numbers import round_to_bits
+from lmi.witness import prove_generalized_margin, prove_margin, prove_positive_definite
 from ptcc_certify.checker import Statement
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure

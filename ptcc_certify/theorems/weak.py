@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 import lmi
-from lmi.exact.proofs import prove_margin
+from lmi.witness import prove_margin
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.base import (
     KEPT,

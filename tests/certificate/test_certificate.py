@@ -30,8 +30,8 @@ from ptcc_certify.certificate.certificate import SEARCH_NODES, Certificate, cert
 from ptcc_certify.certificate.document import exact_or_ball, structure_document
 from ptcc_certify.certificate.saved import read_certificate
 from ptcc_certify.certificate.verdict import Expectations
-from ptcc_certify.checker import OBLIGATIONS, CheckReport, check, digest, read
-from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
@@ -921,11 +921,11 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
     path = tmp_path / "c.json"
     broken = BROKEN[how](example("fig1a").to_json())
     path.write_bytes(broken if isinstance(broken, bytes) else broken.encode())
-    with pytest.raises(FormatError, match=r"c\.json: not a") as refusal:
+    with pytest.raises(UnreadableError, match=r"c\.json: not a") as refusal:
         read(path)
     assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 500
     for missing in (tmp_path / "nowhere.json", tmp_path):
-        with pytest.raises(FormatError):
+        with pytest.raises(UnreadableError):
             read(missing)
 
 

@@ -16,7 +16,7 @@ from lmi import closed_form
 from lmi.certificate import DiagonalCertificate, diagonal_rate
 from lmi.closed_form import h_matrix_certificate, m_matrix_certificate, perron_certificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
-from lmi.exact.proofs import prove_positive_definite
+from lmi.witness import prove_positive_definite
 
 SEEDS = st.integers(0, 2**32 - 1)
 

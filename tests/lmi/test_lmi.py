@@ -15,6 +15,9 @@ from hypothesis import strategies as st
 
 import lmi
 import ptcc_certify
+from lmi.exact import fast
+from lmi.exact.definite import eliminate
+from lmi.witness import _integers
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -313,9 +316,7 @@ def test_rounding_to_bits(value, bits):
 
 @given(SEEDS, st.integers(21, 40), st.sampled_from([0.0, 3.0]), st.booleans())
 def test_both_exact_routes_agree(seed, n, magnitude, spoil):
-    """The residual of a rounded Cholesky factor (n > 20) and the elimination, judged by python-flint's determinants."""
-    from lmi.exact import proofs as exact
-
+    """A rounded factor (n > 20) and the elimination, judged by python-flint's determinants."""
     rng = np.random.default_rng(seed)
     A = random_h_matrix(rng, n, magnitude)
     omega = lmi.h_matrix_diagonal(A)
@@ -325,28 +326,26 @@ def test_both_exact_routes_agree(seed, n, magnitude, spoil):
     ]
     if spoil:
         S[n - 1][n - 1] = Fraction(0)
-    rows = exact._scaled_lower_triangle(exact._rationals(S))
-    quick = exact._residual_test([list(row) for row in rows])
-    slow = exact.prove_positive_definite(S)
-    assert slow.proved is not spoil
-    assert slow.proved or not quick
+    rows = _integers(S)[0]
+    quick = fast.factor(rows) is not None
+    assert (eliminate(rows) is None) is not spoil
+    assert lmi.prove_positive_definite(S).proved is not spoil
+    assert not (spoil and quick)
     whole = flint.fmpq_mat(n, n, [flint.fmpq(x.numerator, x.denominator) for row in S for x in row])
     assert (whole.det() > 0) or spoil
 
 
-def test_the_residual_test_never_proves_a_singular_or_indefinite_matrix():
-    from lmi.exact import proofs as exact
-
+def test_a_rounded_factor_never_proves_a_singular_or_indefinite_matrix():
     n = 30
     singular = [[n - 1 if i == j else -1 for j in range(n)] for i in range(n)]  # a Laplacian
     for shift in (0, Fraction(-1, 10**18)):
         S = [[Fraction(x) + (shift if i == j else 0) for j, x in enumerate(row)] for i, row in enumerate(singular)]
-        assert not exact._residual_test(exact._scaled_lower_triangle(S))
+        assert fast.factor(_integers(S)[0]) is None
         assert not lmi.prove_positive_definite(S)
     better = [
         [Fraction(x) + (Fraction(1, 10**6) if i == j else 0) for j, x in enumerate(r)] for i, r in enumerate(singular)
     ]
-    assert exact._residual_test(exact._scaled_lower_triangle(better))
+    assert fast.factor(_integers(better)[0]) is not None
 
 
 def test_exact_proofs_take_numpy_numbers_and_refuse_others():

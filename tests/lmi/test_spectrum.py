@@ -13,8 +13,9 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from lmi.exact import spectral_line
-from lmi.exact.spectral_line import characteristic, nonzero_spectrum_beyond, rank
+from lmi.exact import polynomials, spectrum
+from lmi.exact.polynomials import characteristic, rank
+from lmi.exact.spectrum import nonzero_spectrum_beyond
 
 #: Weights of the edges from j to i, by (j, i).
 Edges = dict[tuple[int, int], Fraction]
@@ -188,9 +189,9 @@ def unit_weights(r: random.Random) -> tuple[int, Edges]:
     return size, edges
 
 
-@pytest.mark.parametrize("bits", [spectral_line.BITS, ()], ids=["rounded first", "exact only"])
+@pytest.mark.parametrize("bits", [spectrum.BITS, ()], ids=["rounded first", "exact only"])
 def test_lines_through_eigenvalues(bits: tuple[int, ...], monkeypatch: pytest.MonkeyPatch, precision: None):
-    monkeypatch.setattr(spectral_line, "BITS", bits)
+    monkeypatch.setattr(spectrum, "BITS", bits)
     r = random.Random(7)
     seen: dict[str, int] = {}
     for _ in range(400):
@@ -304,15 +305,15 @@ def test_two_closed_rings_and_a_chain_after_them():
     assert location(8, chain, Fraction(3, 2)) == "defective"
 
 
-@pytest.mark.parametrize("bits", [spectral_line.BITS, ()], ids=["rounded first", "exact only"])
+@pytest.mark.parametrize("bits", [spectrum.BITS, ()], ids=["rounded first", "exact only"])
 def test_roots_in_symmetry_to_the_line(bits: tuple[int, ...], monkeypatch: pytest.MonkeyPatch):
     """Their polynomial in y has even powers only, as that of roots on the line, but one of each pair is below."""
-    monkeypatch.setattr(spectral_line, "BITS", bits)
+    monkeypatch.setattr(spectrum, "BITS", bits)
     # Followers at 1 and 3, each a block: none of them is on 2, and 1 is below.
     assert location(3, {(0, 1): 1, (0, 2): 3}, 2) == "below"
     # In one block: an undirected pair with 1 to a leader, 1 and 3.
     assert location(3, {(1, 2): 1, (2, 1): 1, (0, 1): 1, (0, 2): 1}, 2) == "below"
-    on_axis = spectral_line._roots_on_axis
+    on_axis = spectrum._roots_on_axis
     assert on_axis([1, 0, -1]) is None  # y^2 - 1
     assert on_axis([1, 0, 0, 0, 4]) is None  # y^4 + 4: +-1 +- i
     assert on_axis([1, -1, 0, 0, 4, -4]) is None  # (y^4 + 4)(y - 1)
@@ -324,20 +325,20 @@ def test_roots_in_symmetry_to_the_line(bits: tuple[int, ...], monkeypatch: pytes
     assert on_axis([1, 0, 1, 0, 1]) is None  # y^4 + y^2 + 1
 
 
-@pytest.mark.parametrize("bits", [(8,), (64,), spectral_line.BITS, ()])
+@pytest.mark.parametrize("bits", [(8,), (64,), spectrum.BITS, ()])
 def test_products_of_chosen_roots(bits: tuple[int, ...], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(spectral_line, "BITS", bits)
+    monkeypatch.setattr(spectrum, "BITS", bits)
     r = random.Random(3)
     for _ in range(150):
         p, zeros, pairs, below = [1], r.randint(0, 2), [1], False
         for _ in range(r.randint(0, 3)):
             square = r.randint(1, 5)
-            p, pairs = spectral_line.product(p, [1, 0, square]), spectral_line.product(pairs, [1, square])
+            p, pairs = polynomials.product(p, [1, 0, square]), polynomials.product(pairs, [1, square])
         for _ in range(r.randint(0, 4)):
             root, square = r.choice([-1, 1, 1, 2, 3, 50]), r.randint(0, 3)
             below |= root < 0
-            p = spectral_line.product(p, [1, -root] if not square else [1, -2 * root, root**2 + square])
-        assert spectral_line._roots_on_axis(p + [0] * zeros) == (None if below else (zeros, pairs))
+            p = polynomials.product(p, [1, -root] if not square else [1, -2 * root, root**2 + square])
+        assert spectrum._roots_on_axis(p + [0] * zeros) == (None if below else (zeros, pairs))
 
 
 def test_the_unit_and_the_line_scale_together():

@@ -1,0 +1,444 @@
+"""Proofs that a symmetric matrix is positive definite: floats propose a witness, the kernel decides.
+
+Nothing here trusts a float: what floats suggest is rounded to integers and handed to :mod:`lmi.exact`, which decides
+without a solver. Matrices are exact: a float is the dyadic number that it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from numbers import Rational
+from typing import Any
+
+import numpy as np
+
+from lmi.deadline import checkpoint
+from lmi.errors import MatrixError
+from lmi.exact import arithmetic, dominance, fast
+from lmi.exact.definite import LARGEST_SHIFT, eliminate, refutes
+from lmi.exact.polynomials import characteristic
+
+Rows = Sequence[Sequence[Fraction]]
+IntegerRows = Sequence[Sequence[int]]
+#: Above this many rows a rounded Cholesky factor is tried before the elimination.
+RESIDUAL_ROWS = 20
+#: Above this many rows a looser rate by the factor is preferred to what takes longer.
+ELIMINATION_ROWS = 60
+#: Entries longer than these bits go to the factor whatever the rows.
+LONG_BITS = 2000
+#: Relative amounts by which a float eigenvalue is lowered, one after the other, until the proof succeeds.
+LOSSES = (2e-10, 5e-9, 1e-7, 1e-5, 1e-3, 0.1, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualWitness:
+    """A rounded factor: ``scale 2^(e_i + e_j) S_ij = 2^(-2 bits) (R R')_ij + E_ij``, ``E`` strictly dominant.
+
+    Attributes
+    ----------
+    R : (n, n) int64 array
+        Lower triangular.
+    exponents : (n,) int array
+        ``e``: brings the diagonal of ``scale S`` into [1/4, 1).
+    bits : int
+        Binary places of ``R``.
+    scale : int
+        A common denominator.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> S = np.full((50, 50), 0.1) + np.eye(50)
+    >>> witness = prove_positive_definite(S).witness
+    >>> witness.proves(S), witness.proves(S - np.eye(50))
+    (True, False)
+    """
+
+    R: np.ndarray
+    exponents: np.ndarray
+    bits: int
+    scale: int = 1
+
+    def proves(self, S: Any) -> bool:
+        """Ask the kernel whether the remainder of ``S`` is strictly diagonally dominant, its diagonal positive."""
+        rows, shift, scale = _integers(S)
+        n = len(rows)
+        if self.R.shape != (n, n) or self.R.dtype != np.int64 or scale != self.scale or len(self.exponents) != n:
+            return False
+        own = np.asarray(self.exponents) - np.array(shift, dtype=np.int64)
+        if max(int(np.abs(own).max(initial=0)), abs(self.bits)) > LARGEST_SHIFT:
+            return False
+        spare = fast.dense_spare(rows, self.R, own, self.bits)
+        return spare is not None and min(spare, default=1) > 0
+
+
+@dataclass(frozen=True)
+class DefinitenessProof:
+    """Outcome of :func:`prove_positive_definite`.
+
+    Attributes
+    ----------
+    proved : bool
+        True: the matrix is positive definite. False: it is not (this is a refutation, as exact as the proof).
+    size : int
+        Number of rows.
+    failed_at : int or None
+        First row whose leading principal minor is not positive, where the elimination found it.
+    witness : ResidualWitness or None
+        The factor, where one decided; None where the elimination did.
+    direction : tuple of int, or None
+        A vector ``x`` with ``x' S x <= 0``, where one refuted the matrix.
+
+    References
+    ----------
+    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> prove_positive_definite([[1, 2], [2, 1]])
+    DefinitenessProof(proved=False, size=2, failed_at=1)
+    >>> "definite" if prove_positive_definite([[2, 1], [1, 2]]) else "not definite"
+    'definite'
+    """
+
+    proved: bool
+    size: int
+    failed_at: int | None = None
+    witness: ResidualWitness | None = field(default=None, repr=False, compare=False)
+    direction: tuple[int, ...] | None = field(default=None, repr=False, compare=False)
+
+    def __bool__(self) -> bool:
+        return self.proved
+
+
+def prove_positive_definite(S: Any) -> DefinitenessProof:
+    """Decide exactly whether a symmetric matrix is positive definite.
+
+    Larger matrices are first compared with a rounded Cholesky factor: if ``S - R R'``, formed in integers, has a
+    positive, strictly dominant diagonal, then ``S > 0`` (n = 1,000: about a second). Failing that, from 60 rows on, a
+    vector with ``x' S x <= 0`` is looked for. Otherwise ``S``, scaled to integers, is reduced to ``L D L'`` by
+    fraction-free symmetric elimination; ``S > 0`` iff every pivot, a leading principal minor, is positive (Sylvester).
+    The elimination always decides, in seconds at 100 rows and in minutes at 300.
+
+    Parameters
+    ----------
+    S : n rows of n Fractions, ints or floats, or an (n, n) array
+        A float is the dyadic number that it is. The matrix of size 0 counts as positive definite.
+
+    Returns
+    -------
+    DefinitenessProof
+
+    Raises
+    ------
+    MatrixError
+        ``S`` is not square, not exactly symmetric, or has an entry that is not a finite real number.
+
+    References
+    ----------
+    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> prove_positive_definite([[Fraction(2), Fraction(1)], [Fraction(1), Fraction(1, 2)]])
+    DefinitenessProof(proved=False, size=2, failed_at=1)
+    >>> bool(prove_positive_definite([[2, 1], [1, 1]]))
+    True
+    >>> S = np.full((50, 50), 0.1) + np.eye(50)
+    >>> prove_positive_definite(S).witness.proves(S)
+    True
+    """
+    rows, shift, scale = _integers(S)
+    n = len(rows)
+    if n > RESIDUAL_ROWS or _long(rows):
+        if (found := fast.factor(rows)) is not None:
+            R, exponents = found
+            witness = ResidualWitness(R, exponents + np.array(shift, dtype=np.int64), fast.FACTOR_BITS, scale)
+            return DefinitenessProof(True, n, witness=witness)
+        if n > ELIMINATION_ROWS and (x := _refuting_direction(rows)) is not None:
+            x = tuple(value << power - min(shift) for value, power in zip(x, shift, strict=True))
+            return DefinitenessProof(False, n, direction=x)
+    failed_at = eliminate(rows, checkpoint)
+    return DefinitenessProof(failed_at is None, n, failed_at)
+
+
+def _refuting_direction(rows: Any) -> tuple[int, ...] | None:
+    """Find ``x`` with ``x' S x <= 0`` along the float eigenvector of the smallest eigenvalue; the kernel decides."""
+    if any(row[i] <= 0 for i, row in enumerate(rows)):
+        return None
+    T, halves = fast.unit_diagonal(rows)
+    values, vectors = np.linalg.eigh(T)
+    if not values[0] < 0:
+        return None
+    whole = [round(math.ldexp(float(value), 40)) for value in vectors[:, 0]]
+    x = tuple(value << max(halves) - half for value, half in zip(whole, halves, strict=True))
+    return x if refutes(rows, x) else None
+
+
+def _long(rows: Any) -> bool:
+    """Tell whether entries are so long that the factor costs less than elimination."""
+    return max((x.bit_length() for row in rows for x in row), default=0) > LONG_BITS
+
+
+# ---------------------------------------------------------------------- matrices in integers
+
+
+def _integers(S: Any) -> tuple[Any, list[int], int]:
+    """Return ``scale 2^(shift_i + shift_j) S_ij`` in integers, ``shift`` and ``scale``; or refuse the matrix.
+
+    Scaling rows and columns alike keeps definiteness and keeps entries of very different size short.
+    """
+    if _is_plain(S):
+        if S.ndim != 2 or S.shape[0] != S.shape[1]:
+            raise MatrixError("the matrix is not square")
+        if S.dtype.kind == "f" and not np.isfinite(S).all():
+            raise MatrixError("the matrix has an entry that is not a finite real number")
+        if len(S) > RESIDUAL_ROWS:
+            return _array_integers(S)
+        S = S.tolist()
+    rows = _rationals(S)
+    scale = math.lcm(*{x.denominator for row in rows for x in row})
+    whole = [[x.numerator * (scale // x.denominator) for x in row] for row in rows]
+    shift = [-((abs(row[i]).bit_length() - 1) // 2) for i, row in enumerate(whole)]
+    pairs = [[(x, a + b) for x, b in zip(row, shift, strict=True)] for row, a in zip(whole, shift, strict=True)]
+    power = max(0, -min((place + (x & -x).bit_length() - 1 for row in pairs for x, place in row if x), default=0))
+    moved = [[x << p + power if p + power >= 0 else x >> -p - power for x, p in row] for row in pairs]
+    return moved, shift, scale << power
+
+
+def _is_plain(S: Any) -> bool:
+    """Tell whether something is an array of numbers that float64 or int64 hold."""
+    return isinstance(S, np.ndarray) and S.dtype.kind in "fiub" and S.dtype.itemsize <= 8 and S.dtype != np.uint64
+
+
+def _array_integers(S: np.ndarray) -> tuple[np.ndarray, list[int], int]:
+    """Return what :func:`_integers` does, of an array."""
+    if not (S == S.T).all():
+        raise MatrixError("the matrix is not symmetric")
+    whole, power = _odd(S)
+    half = (np.frexp(np.abs(np.diag(S).astype(float)))[1].astype(np.int64) - 1) // 2
+    places = np.where(whole != 0, power - half[:, None] - half[None, :], 0)
+    up = max(0, -int(places.min(initial=0)))
+    return whole.astype(object) << (places + up).astype(object), (-half).tolist(), 1 << up
+
+
+def dyadic_array(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return an array of floats or ints as integers over one power of two, in int64 if they fit.
+
+    Examples
+    --------
+    >>> dyadic_array(np.array([0.75, -2.0, 0.0]))
+    (array([ 3, -8,  0]), -2)
+    """
+    whole, power = _odd(values)
+    some = whole != 0
+    least = int(power[some].min(initial=2**20)) if some.any() else 0
+    up = np.where(some, power - least, 0)
+    if int((np.frexp(whole.astype(float))[1] + up).max(initial=0)) < 62:
+        return whole << up, least
+    return whole.astype(object) << up.astype(object), least
+
+
+def _odd(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``values = whole 2^power`` in int64, ``whole`` odd or 0."""
+    whole, power = values, np.zeros(values.shape, dtype=np.int64)
+    if values.dtype.kind == "f":
+        mantissa, exponent = np.frexp(values.astype(float))
+        whole, power = np.ldexp(mantissa, 53), exponent.astype(np.int64) - 53
+    whole = whole.astype(np.int64)
+    zeros = np.frexp(np.abs((whole & -whole).astype(float)))[1].astype(np.int64) - 1
+    return np.where(whole != 0, whole >> np.maximum(zeros, 0), 0), np.where(whole != 0, power + zeros, 0)
+
+
+def _rationals(S: Rows) -> list[list[Fraction]]:
+    """Return ``S`` in Fractions (a float is the dyadic number that it is), or refuse it."""
+    n = len(S)
+    if any(len(row) != n for row in S):
+        raise MatrixError("the matrix is not square")
+    rows = _fractions(S)
+    if any(rows[i][j] != rows[j][i] for i in range(n) for j in range(i)):
+        raise MatrixError("the matrix is not symmetric")
+    return rows
+
+
+def _fractions(S: Any) -> list[list[Any]]:
+    try:
+        return [[x if type(x) is Fraction or type(x) is int else _rational(x) for x in row] for row in S]
+    except (TypeError, ValueError, OverflowError):
+        raise MatrixError("the matrix has an entry that is not a finite real number") from None
+
+
+def _rational(x: Any) -> Fraction:
+    if isinstance(x, Rational):
+        return Fraction(int(x.numerator), int(x.denominator))
+    return Fraction(*x.as_integer_ratio()) if isinstance(x, np.floating) else Fraction(float(x))
+
+
+# ---------------------------------------------------------------------- margins
+
+
+def prove_margin(S: Rows, guess: float) -> Fraction | None:
+    """Find a rational ``m > 0``, as near to ``guess`` as proves, with ``S - m I`` positive definite.
+
+    Parameters
+    ----------
+    S : n rows of n Fractions
+        Symmetric.
+    guess : float
+        What floating point takes for the smallest eigenvalue.
+
+    Returns
+    -------
+    Fraction or None
+        A proved lower bound of the smallest eigenvalue of ``S``; None if none was found above ``guess / 2``.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> m = prove_margin([[Fraction(2), Fraction(0)], [Fraction(0), Fraction(3)]], 2.0)
+    >>> m < 2, float(m) > 2 - 1e-9
+    (True, True)
+    """
+    if not guess > 0:
+        return None
+    identity = [[int(i == j) for j in range(len(S))] for i in range(len(S))]
+    return prove_generalized_margin(S, identity, guess)
+
+
+def prove_generalized_margin(S: Rows | IntegerRows, Z: Rows | IntegerRows, guess: float) -> Fraction | None:
+    """Find a rational ``b``, as near to ``guess`` as proves, with ``S - b Z`` positive definite.
+
+    Parameters
+    ----------
+    S, Z : n rows of n Fractions or ints
+        Symmetric.
+    guess : float
+        What floating point takes for the largest such ``b``; not 0.
+
+    Returns
+    -------
+    Fraction or None
+        Of the sign of ``guess``; None if none was found above ``guess - |guess| / 2``.
+
+    References
+    ----------
+    Rump, Verification of positive definiteness, BIT 46 (2006).
+
+    Examples
+    --------
+    >>> b = prove_generalized_margin([[Fraction(6)]], [[Fraction(2)]], 3.0)
+    >>> b < 3, float(b) > 3 - 1e-9
+    (True, True)
+    """
+    if not math.isfinite(guess) or guess == 0:
+        return None
+    n = len(S)
+    scale = math.lcm(*{x.denominator for M in (S, Z) for row in M for x in row})
+    a, z = ([[x.numerator * (scale // x.denominator) for x in row] for row in M] for M in (S, Z))
+
+    def lowered(b: Fraction) -> list[list[int]]:
+        """Return ``scale q (S - b Z)``, ``b = p/q``."""
+        checkpoint()
+        p, q = b.as_integer_ratio()
+        return [[q * x - p * y for x, y in zip(*rows, strict=True)] for rows in zip(a, z, strict=True)]
+
+    candidates = [b for loss in LOSSES if (b := Fraction(guess - abs(guess) * loss)) * Fraction(guess) > 0]
+    long = _long(a) or _long(z)
+    if n > RESIDUAL_ROWS or long:
+        # What decides takes seconds here: it comes last, after all that a factor from floats can give.
+        for b in candidates if long or n > ELIMINATION_ROWS else candidates[:4]:
+            if fast.factor(lowered(b)) is not None:
+                return b
+    return next((b for b in candidates if arithmetic().definite(lowered(b))), None)
+
+
+# ---------------------------------------------------------------------- other witnesses
+
+
+def definite_by_polynomial(S: Rows) -> bool:
+    """Decide whether a symmetric rational matrix is positive definite by the signs of its characteristic polynomial.
+
+    All roots of ``det(x I - S) = x^n + c_1 x^(n-1) + ... + c_n`` are real. They are positive iff ``(-1)^k c_k > 0`` for
+    all ``k`` (Descartes). The coefficients are exact; nothing of the other proofs is used. Seconds at n = 40.
+
+    Parameters
+    ----------
+    S : n rows of n Fractions
+        Or other real numbers; a float is the dyadic number that it is.
+
+    Returns
+    -------
+    bool
+        True: positive definite. False: not.
+
+    Raises
+    ------
+    MatrixError
+        As in :func:`prove_positive_definite`.
+
+    References
+    ----------
+    Horn and Johnson, Matrix Analysis, 2nd ed., Cambridge 2013, section 7.2.
+
+    Examples
+    --------
+    >>> definite_by_polynomial([[2, 1], [1, 1]])
+    True
+    >>> definite_by_polynomial([[2, 2], [2, 2]])
+    False
+    """
+    rows = [dict(enumerate(row)) for row in _integers(S)[0]]
+    return all(c * (-1) ** k > 0 for k, c in enumerate(characteristic(rows)))
+
+
+def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
+    """Check in rationals that ``Y`` proves: no diagonal ``Omega > 0`` decays faster than ``rate``.
+
+    That is, ``Omega A + A' Omega >= b Omega`` needs ``b <= rate``; the proof is that of
+    :func:`lmi.exact.dominance.bounds_diagonal_rates`. With ``rate = 0``: no diagonal Lyapunov matrix exists.
+
+    Parameters
+    ----------
+    A : n rows of n Fractions
+        Or other real numbers; a float is the dyadic number that it is.
+    Y : n rows of k Fractions
+    rate : Fraction
+        Per unit of the clock.
+
+    Returns
+    -------
+    bool
+        False: this ``Y`` proves nothing.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not square or has no rows, ``Y`` has not as many, or an entry is not a finite real number.
+
+    References
+    ----------
+    Barker, Berman, Plemmons, Positive diagonal solutions to the Lyapunov equations, Linear Multilinear Algebra 5
+    (1978).
+
+    Examples
+    --------
+    >>> no_diagonal_rate_above([[1, -1], [-1, 1]], [[1], [1]], Fraction(0))
+    True
+    >>> no_diagonal_rate_above([[1, -1], [-1, 2]], [[1], [1]], Fraction(0))
+    False
+    """
+    n = len(A)
+    if n == 0 or len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
+        raise MatrixError("A is not square, is empty, or Y has not as many rows")
+    return dominance.bounds_diagonal_rates(_fractions(A), _fractions(Y), _fractions([[rate]])[0][0])

@@ -1,0 +1,73 @@
+"""The independent check as this package calls it: a file that cannot be read is a :class:`FormatError`, as elsewhere.
+
+:mod:`ptcc_certify.checker` imports nothing of this package, hence has an exception of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ptcc_certify import checker
+from ptcc_certify.errors import FormatError
+
+
+def check(
+    source: str | Path | Mapping[str, Any],
+    *,
+    stdlib: bool = False,
+    files: Mapping[str, bytes] | None = None,
+    memory: float = 1,
+) -> checker.CheckReport:
+    """Check a certificate: from its JSON alone, in exact arithmetic, without a solver.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        A path, or the parsed JSON object.
+    stdlib : bool
+        Use the standard library alone, even where python-flint and NumPy are installed.
+    files : mapping of str to bytes, optional
+        The side files by name, in place of those in the folder of the certificate.
+    memory : float
+        GB that the check may take; what would take more is rejected before it is formed. The work that is allowed, some
+        seconds for each GB, grows with it.
+
+    Returns
+    -------
+    CheckReport
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> from ptcc_certify import check
+    >>> check({"schema": "ptcc-certificate/1"}).reason
+    'the key "producer" is missing'
+    """
+    return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
+
+
+def read_and_check(
+    source: str | Path | Mapping[str, Any], **options: Any
+) -> tuple[dict[str, Any], checker.CheckReport]:
+    """Return the parsed JSON object beside the report of :func:`check`, whose options these are.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> read_and_check({"schema": "ptcc-certificate/1"})[0]
+    {'schema': 'ptcc-certificate/1'}
+    """
+    try:
+        return checker.read_and_check(source, **options)
+    except checker.UnreadableError as error:
+        raise FormatError(str(error)) from None

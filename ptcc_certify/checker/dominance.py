@@ -1,0 +1,191 @@
+"""Verifies a diagonal Lyapunov function of a large graph: each leader group by itself, then every row."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from operator import mul
+from typing import Any
+
+from lmi.exact.definite import SparseFactor
+from lmi.exact.numbers import longest
+from lmi.exact.rounding import down
+from lmi.exact.work import fits, spend
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.matrices import Sparse, block
+from ptcc_certify.checker.paper import group_decrease
+from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.structure import Structure
+from ptcc_certify.checker.vectors import Numbers
+
+#: Products of entries up to which sparse matrices are multiplied, and entries of one that are kept.
+LARGEST_PRODUCT, LARGEST_KEPT = 50_000_000, 3_000_000
+#: Entries of the factor of a leader group, and of the matrix that it is of.
+LARGEST_FACTOR, LARGEST_FORM = 2_000_000, 700_000
+#: The groups that were proved: number, rate, and weights without common factor.
+Proved = set[tuple[int, Fraction, tuple[int, ...]]]
+
+
+def check_dominance(
+    doc: Document,
+    structure: Structure,
+    nodes: Sequence[int],
+    weights: Numbers,
+    rate: Fraction,
+    of: str,
+    proved: Proved,
+) -> None:
+    """Verify ``S_ii d_i > sum_j |S_ij| d_j`` for all rows, after each leader group by itself."""
+    graph, number = structure.graph, structure.number
+    step = doc.open("dominance", of, ["b"], witness=True)
+    need(step["b"] == rate, "b is not the rate")
+    said = fields(step["witness"], ("vector", "groups"), "the witness")
+    vector = doc.files.numbers(said["vector"], "vector", len(nodes))
+    need(vector.positive(), "the vector is not positive")
+    (own, scale), (each, _) = (numbers.over(range(len(nodes))) for numbers in (weights, vector))
+    W, D = [0] * graph.n, [0] * graph.n
+    for v, w, d in zip(nodes, own, each, strict=True):
+        W[v], D[v] = w, d
+    groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
+    known = {  # g_k of leader groups
+        k: _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
+        for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True)
+    }
+    # w_i d_i times rate, less what the others push, times q and unit
+    p, q = (rate * graph.unit).as_integer_ratio()
+    spare = {k: ((g - rate) * graph.unit).as_integer_ratio() for k, g in known.items()}
+    bits = longest((p, q, *(x for pair in spare.values() for x in pair))) + graph.bits
+    if bits > 1000:
+        spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
+    heard, diagonal = graph.heard(D), graph.diagonal
+    pushes = [0 if k >= 0 else w * d for k, w, d in zip(number, W, D, strict=True)]
+    pushed = graph.hearing(pushes)
+    for v in nodes:
+        if number[v] < 0:
+            left = (2 * q * diagonal[v] - p) * pushes[v] - q * (W[v] * heard[v] + pushed[v])
+        else:
+            top, bottom = spare[number[v]]
+            left = top * W[v] * D[v] - bottom * pushed[v]
+        need(left > 0, "a row is not dominated by its diagonal")
+    doc.done(f"b = {down(rate)}, {len(nodes)} rows")
+
+
+def _group(
+    doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, said: Any, proved: Proved
+) -> Fraction:
+    """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
+    has_factor = isinstance(said, dict)
+    if has_factor:
+        fields(said, ("rate", "factor"), "a leader group")
+    g, common = exact(said["rate"] if has_factor else said), math.gcd(*weights)
+    key = k, g, tuple(w // common for w in weights)
+    if key in proved:
+        need(not has_factor, "a factor of a leader group that is proved already")
+    elif has_factor:
+        _factor(doc, structure, k, Fraction(common, scale), key[2], g, said["factor"])
+    else:
+        need(group_decrease(doc, structure, k, key[2], g), "a leader group is not proved")
+    proved.add(key)
+    return g
+
+
+def _factor(
+    doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, said: Any
+) -> None:
+    """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
+    keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
+    said, read, arithmetic = fields(said, keys, "factor"), doc.files.integers, doc.exact
+    group, gauge = structure.closed[k], structure.gauges[k]
+    n = len(group) - (gauge is not None)
+    need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")
+    order, exponents, indptr = (
+        read(said[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
+    )
+    vector = None if said["weights"] is None else read(said["weights"], "weights", n)
+    few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
+    need(few, "the factor has too many entries")
+    work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
+    need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
+    indices, data = (read(said[key], key, indptr[-1]) for key in ("indices", "data"))
+    A, basis, unit = block(structure.graph, group), None, structure.graph.unit
+    if said["parents"] is not None:
+        need(gauge is not None, "parents of a group that is not balanced")
+        basis = _differences(A, ratios, gauge or (), read(said["parents"], "parents", len(group)))
+    elif gauge is not None:
+        basis = [{j - 1: x for j, x in row.items() if j} for row in A]
+    lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
+    if gauge is not None and said["parents"] is None:
+        scale *= unit**2
+    factor = SparseFactor(order, indptr, indices, data, exponents, said["bits"], vector)
+    proved = arithmetic.residual_definite(n, lower, factor, said["power"], scale * times.denominator)
+    need(proved, "a leader group is not proved by its factor")
+
+
+def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:
+    """Return a basis of all ``y`` with ``eta'y = 0``, ``eta = G w``, which contain the range of ``A``, by rows.
+
+    One column ``w_q G_i e_i - w_i G_q e_q`` for each node ``i`` but the root of a tree, ``q`` its parent.
+    """
+    n, kept = len(A), [0] * len(A)
+    for i, row in enumerate(A):
+        for j, x in row.items():
+            kept[j] += gauge[i] * w[i] * x
+    need(not any(kept), "the weights are not a left null vector")
+    need(min(parents) == -1 and parents.count(-1) == 1 and max(parents) < n, "parents have not one root")
+    children: list[list[int]] = [[] for _ in range(n + 1)]  # those of the root's parent, -1, at the end
+    for i, q in enumerate(parents):
+        children[q].append(i)
+    reached = list(children[-1])
+    for i in reached:
+        reached += children[i]
+    need(len(reached) == n, "parents are no tree")
+    basis: Sparse = [{} for _ in range(n)]
+    for column, i in enumerate(i for i, q in enumerate(parents) if q >= 0):
+        q = parents[i]
+        basis[i][column], basis[q][column] = w[q] * gauge[i], -w[i] * gauge[q]
+    return basis
+
+
+def _form(
+    A: Sparse, weights: Sequence[int], g: Fraction, unit: int, basis: Sparse | None
+) -> tuple[tuple[list[int], list[int], list[int]], int]:
+    """Return the lower triangle of ``S = W A + A'W - g W``, or of ``B'S B`` with a basis ``B``, times a scale."""
+    p, q = (g * unit).as_integer_ratio()
+    S: Sparse = [defaultdict(int, {i: -p * w}) for i, w in enumerate(weights)]
+    for i, row in enumerate(A):
+        for j, x in row.items():
+            S[i][j] += q * weights[i] * x
+            S[j][i] += q * weights[i] * x
+    rows: Iterator[dict[int, int]] = iter(S)
+    if basis is not None:
+        columns: Sparse = [{} for _ in range(len(A) - 1)]
+        for i, row in enumerate(basis):
+            for j, x in row.items():
+                columns[j][i] = x
+        work = sum(len(basis[j]) for row in S for j in row)
+        few = work <= LARGEST_PRODUCT and fits(min(work, len(A) ** 2), LARGEST_KEPT)
+        need(few, "a leader group of too many edges")
+        SB = list(_multiplied(S, basis))
+        need(sum(map(mul, map(len, basis), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
+        rows = _multiplied(columns, SB)
+    lower: tuple[list[int], list[int], list[int]] = [], [], []
+    for i, row in enumerate(rows):
+        need(fits(len(lower[0]), LARGEST_FORM), "a leader group of too many edges")
+        for j, x in row.items():
+            if j <= i:
+                for part, value in zip(lower, (i, j, x), strict=True):
+                    part.append(value)
+    return lower, q * unit
+
+
+def _multiplied(A: Sparse, B: Sparse) -> Iterator[dict[int, int]]:
+    """Yield the rows of ``A B``."""
+    for left in A:
+        row: dict[int, int] = defaultdict(int)
+        for k, x in left.items():
+            for j, y in B[k].items():
+                row[j] += x * y
+        yield row

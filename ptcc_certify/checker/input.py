@@ -1,0 +1,418 @@
+"""Verifies what is said of the input: whether it stays bounded, how large it gets, what limits of actuators leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+from lmi.exact.numbers import integers, longest, shorten, sized
+from lmi.exact.rounding import down, up
+from lmi.exact.spectrum import nonzero_spectrum_beyond, tractable
+from lmi.exact.work import spend
+from ptcc_certify.checker import input_bounds as formulas
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.final_state import FinalState
+from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
+from ptcc_certify.checker.protocol import Begin, Protocol
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
+from ptcc_certify.checker.structure import Structure
+from ptcc_certify.checker.vectors import Numbers
+
+KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
+LIMIT_KEYS = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
+#: Graphs up to this size have bounds of the input.
+INPUT_NODES = 400
+#: Limits of actuators that are read.
+MANY_LIMITS = 100
+
+
+@dataclass(frozen=True)
+class Verified:
+    """What the bounds of the input rest on.
+
+    Attributes
+    ----------
+    rate, limit : Fraction or None
+        The largest rate, and the upper bound on all.
+    """
+
+    structure: Structure
+    protocol: Protocol
+    begin: Begin
+    final: FinalState
+    functions: Sequence[Function]
+    rate: Fraction | None
+    limit: Fraction | None
+
+    @cached_property
+    def gain(self) -> formulas.PrescribedGain:
+        """The gain of the nominal part of the input."""
+        g = self.protocol.gains
+        return formulas.PrescribedGain(
+            g["T_r"] + g["T_s"] if self.protocol.sliding else g["T"], g["rho1"], g["rho2"] * g["kappa"]
+        )
+
+    @property
+    def sliding_bounded(self) -> bool:
+        """Whether the sliding part of the input is bounded for every ``sigma(0)``."""
+        return self.protocol.gains["mu3"] * self.protocol.gains["kappa"] >= 1
+
+    def sliding_part(self) -> list[Fraction]:
+        """Return what the sliding-mode protocol adds to the input of every agent at most."""
+        g, sigma0 = self.protocol.gains, self.begin.sigma or Numbers([])
+        need(self.sliding_bounded or not any(sigma0), "the sliding part is not bounded")
+        push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
+        return [g["mu1"] + push * abs(s) for s in sigma0]
+
+
+def check_input(doc: Document, known: Verified) -> None:
+    """Verify the section ``effort``."""
+    said = doc.section("effort")
+    decays = known.rate is not None or not known.structure.graph.listening
+    need((said is not None) == decays, "the input is spoken of iff the decay is proved")
+    if said is None:
+        return
+    fields(said, (*KEYS, "residual", "disturbed"), "effort")
+    _threshold(doc, known, said)
+    constants = _constants(doc, known, entries(said["constants"], "constants", len(known.functions)))
+    _sliding(doc, known, said["sliding"])
+    starts = _starts(doc, known, said["starts"])
+    if starts is None:
+        for key in ("peak", "energy", "path_length", "disturbed"):
+            need(said[key] is None, f"{key} without a start, or of too large a graph")
+        need(said["residual"] == [], "limits without a start, or of too large a graph")
+        return
+    try:
+        bounds = _bounds(doc, known, starts, constants)
+        _peak(doc, known, said["peak"], bounds)
+        _integral(doc, known, said["energy"], bounds)
+        _length(doc, known, said["path_length"], bounds)
+        need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
+        for k, entry in enumerate(said["residual"]):
+            _limited(doc, known, f"effort.residual[{k}]", entry, said["peak"], bounds)
+        _disturbed(doc, known, said["disturbed"], bounds)
+    except ValueError as error:
+        raise RejectedError(str(error)) from None
+
+
+def _member(known: Verified, k: Any) -> int:
+    """Return the number of a Lyapunov function."""
+    if type(k) is not int or not 0 <= k < len(known.functions):
+        raise RejectedError("there is no such member")
+    return k
+
+
+def _each(doc: Document, known: Verified, said: Any, what: str) -> Numbers:
+    """Read numbers by agent, which are in no side file here."""
+    return by_agent(doc, known.structure.graph, said, what, files=False)
+
+
+def _above(doc: Document, known: Verified, said: Any, what: str, least: Sequence[Fraction]) -> Numbers:
+    """Read bounds by agent, none of which is below what is proved."""
+    told, labels = _each(doc, known, said, what), known.structure.graph.labels
+    low = next((label for label, x, y in zip(labels, told, least, strict=True) if x < y), None)
+    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
+    return told
+
+
+# ---------------------------------------------------------------------- bounded or not
+
+
+def _threshold(doc: Document, known: Verified, said: Mapping[str, Any]) -> None:
+    """Verify whether the input stays bounded for every start, and the bounds of the threshold."""
+    ends, k = fields(said["threshold"], ("lower", "upper"), "threshold"), known.gain.k
+    for key, rate in (("lower", known.rate), ("upper", known.limit)):
+        value = None if rate is None else k * rate / 2
+        need((None if ends[key] is None else exact(ends[key])) == value, f"the {key} end is not the proved one")
+    bounded = said["bounded"]
+    if bounded is None:
+        return
+    need(isinstance(bounded, bool), "bounded is no truth value")
+    by = doc.open("input-threshold", "effort", witness=True)["witness"]
+    if by == "rate":
+        holds = not known.structure.graph.listening or (known.rate is not None and known.rate * k >= 2)
+        need(bounded and holds, "no rate proves that the input stays bounded")
+    elif by == "limit":
+        need(not bounded and known.limit is not None and known.limit * k < 2, "no limit proves that the input grows")
+    else:
+        need(by == "spectrum", "another proof")
+        place = _spectrum(doc, known.structure, 1 / k)
+        need(bounded == (place in ("beyond", "on")), f"the spectrum is {place} the line")
+    doc.done("the input stays bounded" if bounded else "the input of some start grows without limit")
+
+
+def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
+    """Return where the nonzero eigenvalues of ``L`` lie, exactly."""
+    graph, components = structure.graph, list[list[int]]()
+    need(graph.n <= INPUT_NODES, "too large a graph, or too long numbers")
+    rows = block(graph, range(graph.n))
+    need(tractable(rows, graph.unit, line), "too large a graph, or too long numbers")
+    zero, seen = set(), set[int]()
+    for v in range(graph.n):
+        if v not in seen:
+            own, still = structure.strong_component(v)
+            zero |= {len(components)} if still else set()
+            components.append(own)
+            seen.update(own)
+    return nonzero_spectrum_beyond(rows, graph.unit, components, zero, line, doc.exact.characteristic)
+
+
+# ---------------------------------------------------------------------- constants, sliding part, starts
+
+
+def _constants(doc: Document, known: Verified, said: Sequence[Any]) -> list[list[Fraction] | None]:
+    """Verify ``e_k^2 <= c_k V`` for full matrices; for diagonal ones the constants follow."""
+    found: list[list[Fraction] | None] = []
+    for k, (given, function) in enumerate(zip(said, known.functions, strict=True)):
+        doc.at = f"effort.constants[{k}]"
+        if given is None:
+            found.append(None)
+            continue
+        form = function.form
+        if form is None or form.matrix is None:
+            raise RejectedError("constants that follow from a diagonal")
+        doc.open("input-constants", f"lyapunov.members[{k}]")
+        constants = list(_each(doc, known, given, "constants"))
+        P, scale = integers(form.matrix)
+        place, forms = {v: i for i, v in enumerate(form.nodes)}, []
+        for v, c in enumerate(constants):
+            p, q = (c / scale).as_integer_ratio()
+            sized(v + 1, longest((q, q * p)), "constants")
+            forms.append(([q * (place.get(v) == i) for i in range(len(P))], q * p))
+        failed = doc.exact.bounded(P, forms)
+        label = known.structure.graph.labels[failed or 0]
+        need(failed is None, f"the constant of agent {shorten(label)} is not proved")
+        doc.done(f"at most {up(max(constants))}")
+        found.append(constants)
+    return found
+
+
+def _sliding(doc: Document, known: Verified, said: Any) -> None:
+    """Verify the sliding part of the input."""
+    doc.at = "effort.sliding"
+    need((said is not None) == known.protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
+    if said is None:
+        return
+    fields(said, ("bounded", "agents"), "sliding")
+    need(said["bounded"] is known.sliding_bounded, "bounded for every start iff mu3 kappa >= 1")
+    if said["agents"] is not None:
+        doc.open("input-sliding", "effort")
+        _above(doc, known, said["agents"], "the sliding part", known.sliding_part())
+        doc.done("for every disturbance within delta")
+
+
+def _starts(doc: Document, known: Verified, said: Any) -> formulas.Starts | None:
+    """Read the set of starts; None if there is none, or the graph is too large."""
+    doc.at = "effort.starts"
+    small = known.structure.graph.n <= INPUT_NODES and bool(known.structure.graph.listening)
+    if said is None:
+        return formulas.Starts(list(known.begin.state)) if known.begin.state is not None and small else None
+    need(small, "starts of too large a graph, or of one that does not move")
+    shape = "axes" if isinstance(said, dict) and "axes" in said else "radius"
+    center = list(_each(doc, known, fields(said, ("center", shape), "starts")["center"], "center"))
+    if shape == "axes":
+        axes = entries(said["axes"], "axes")
+        need(len(axes) <= INPUT_NODES, "too many axes")
+        return formulas.Starts(center, axes=[list(_each(doc, known, x, "an axis")) for x in axes])
+    radius = list(_each(doc, known, said["radius"], "radius"))
+    need(all(r >= 0 for r in radius), "a radius is negative")
+    return formulas.Starts(center, radius)
+
+
+def _bounds(
+    doc: Document, known: Verified, starts: formulas.Starts, constants: Sequence[Sequence[Fraction] | None]
+) -> formulas.InputBounds:
+    """Return what bounds the input over the starts."""
+    graph, g, sigma0 = known.structure.graph, known.protocol.gains, list(known.begin.sigma or ())
+    whole, _ = integers([starts.center, starts.radius, *starts.axes])
+    own, each = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(whole))
+    sized(graph.n_edges + graph.n, own, "the rows of L")
+    spend(len(whole) * (graph.n_edges + graph.n), own + each, own + each, "the starts")
+    rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
+    reaching = None
+    if any(sigma0):
+        times = [z for z, s in zip(doc.data["reaching_time"]["z"].values(), sigma0, strict=True) if s]
+        last = None if None in times else max(map(exact, times))
+        push = g["mu1"] + g["delta"]
+        reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
+    return formulas.InputBounds(rows, known.gain, [f.form for f in known.functions], constants, starts, reaching)
+
+
+# ---------------------------------------------------------------------- peak, energy, length
+
+
+def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the peak of every agent's input and of their norm."""
+    doc.at = "effort.peak"
+    if said is None:
+        return
+    fields(said, ("agents", "largest", "norm"), "peak")
+    step = doc.open("input-peak", "effort", ["z"], witness=True)
+    witness = fields(step["witness"], ("agents", "norm"), "the witness")
+    ways = ordered(known.structure.graph.labels, witness["agents"], "agents").values()
+    own = known.sliding_part() if known.protocol.sliding else [Fraction(0)] * len(bounds.rows)
+    least = []
+    for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in ways):
+        least.append(bounds.bound(formulas.peak_above, v, _member(known, k), exact(z)) + own[v])
+    peaks = _above(doc, known, said["agents"], "the peak", least)
+    need(exact(said["largest"]) == max(peaks), "the largest peak is another")
+    norm = bounds.bound(formulas.peak_above, None, _member(known, witness["norm"]), step["z"])
+    norm += formulas.root_above(sum((x * x for x in own), Fraction(0)))
+    need(exact(said["norm"]) >= norm, "the peak of the norm is not proved")
+    doc.done(f"at most {up(max(peaks))}, norm {up(exact(said['norm']))}")
+
+
+def _length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the length of the path."""
+    doc.at = "effort.path_length"
+    if said is not None:
+        step = doc.open("input-length", "effort", ["z"], witness=True)
+        least = bounds.bound(formulas.length_above, None, _member(known, step["witness"]), step["z"])
+        need(exact(said) >= least, "the bound is not proved")
+        doc.done(f"at most {up(exact(said))}")
+
+
+def _integral(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the energy: by one function, or by ``L'W + W L - c W > m I`` on the range of ``L`` for two matrices."""
+    doc.at = "effort.energy"
+    if said is None:
+        return
+    if isinstance(doc.following.get("witness"), dict):
+        step = doc.open("input-energy", "effort", ["p", "m0", "m1"], witness=True)
+        matrices = fields(step["witness"], ("W0", "W1"), "the witness")
+        need(bounds.reaching is None, "sliding variables move")
+        even = _remainder(doc, known, matrices, "W0", step["m0"], bounds)
+        grown = _remainder(doc, known, matrices, "W1", step["m1"], bounds)
+        least = formulas.integral_above(known.gain, even, grown, step["p"])
+    else:
+        step = doc.open("input-energy", "effort", ["z"], witness=True)
+        least = bounds.bound(formulas.energy_above, None, _member(known, step["witness"]), step["z"])
+    need(exact(said) >= least, "the bound is not proved")
+    doc.done(f"at most {up(exact(said))}")
+
+
+def _remainder(
+    doc: Document, known: Verified, said: Any, key: str, m: Fraction, bounds: formulas.InputBounds
+) -> Fraction:
+    """Verify ``W L + L'W - c W - m I > 0`` on the range of ``L``, ``c`` being 0 or ``1/k``, then ``W > 0`` besides.
+
+    Returns a bound of the integral of ``e^(c s) ||E||^2``.
+    """
+    graph, nodes, c = known.structure.graph, known.structure.graph.listening, (key == "W1") / known.gain.k
+    need_rows(graph.n)
+    rows = triangle(said[key], len(nodes))
+    W, scale = integers(rows)
+    S, more = decrease(doc.exact, W, block(graph, nodes), c, graph.unit)
+    for T in [less(S, m * scale * more), *([W] if c else [])]:  # W0 > 0 need not be known: E tends to 0
+        proved = m > 0 and doc.exact.definite(_on_range(doc, known.structure, T))
+        need(proved, f"the inequality of {key} is not proved")
+    return bounds.largest_form(rows) / m
+
+
+def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
+    """Return a form of ``E``, on the nodes that listen, where ``E`` lives: ``L'S L`` on ``kept``, times a scale.
+
+    Where only single nodes are balanced closed components, ``E`` may be anything on the nodes that listen.
+    """
+    if all(len(group) == 1 for _, group, _ in structure.balanced):
+        return S
+    rows = [structure.graph.row(v) for v in structure.graph.listening]
+    return only(congruence(doc.exact, S, rows, structure.graph.n), structure.kept)
+
+
+# ---------------------------------------------------------------------- limits of actuators
+
+
+def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, bounds: formulas.InputBounds) -> None:
+    """Verify what is left at the deadline under limits of the gain, and the largest input."""
+    doc.at = of
+    fields(said, LIMIT_KEYS, of)
+    need(not known.protocol.sliding, "limits are for the nominal protocol")
+    cap, stop, period = (None if said[key] is None else exact(said[key]) for key in LIMIT_KEYS[:3])
+    need(all(x is None or x > 0 for x in (cap, stop, period)), "a limit is not positive")
+    need(stop is None or stop < known.gain.T, "a stop before the start")
+    need(period is None or period <= known.gain.T, "a period beyond the deadline")
+    limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
+    top = limits.top(known.gain)
+    step = doc.open("limited-gain", of, ["growth"], witness=True)
+    chosen = [step["witness"]] if said["noise"] is None else entries(step["witness"], "the witness", 2)
+    k = _member(known, chosen[0])
+    form = bounds.form(k)
+    need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
+    if period is not None:
+        _growth(doc, known.structure, form, step["growth"])
+    need(0 <= clock <= limits.clock_below(known.gain), "the clock does not come so far")
+    left = bounds.share(k, limits, clock, step["growth"]) * bounds.start(k)
+    norm = bounds.root_constant(k, None) * left
+    need(exact(said["norm"]) >= norm, "what is left is not proved")
+    if said["agents"] is not None:
+        distance = doc.data["lyapunov"]["members"][k]["distance"]
+        need(distance is not None, "distances without constants")
+        least = [formulas.root_above(c) * left for c in _each(doc, known, distance["agents"], "agents")]
+        if period is None:
+            most = _largest_deviation(known.final, bounds.starts)
+            least = [min(x, most) for x in least]
+        _above(doc, known, said["agents"], "what is left", least)
+    need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
+    if said["largest"] is not None:
+        ends = [top * max(bounds.held)] + ([exact(peak["largest"])] if peak is not None else [])
+        need(exact(said["largest"]) >= min(ends), "the largest input is not proved")
+    if said["noise"] is not None:
+        need(period is None, "noise of a held gain")
+        noise = {key: exact(x) for key, x in fields(said["noise"], ("bound", "norm", "largest"), "noise").items()}
+        need(noise["bound"] > 0, "noise of no size")
+        whole, each = bounds.noisy(_member(known, chosen[1]), noise["bound"])
+        need(noise["norm"] >= norm + whole, "what is left by noise is not proved")
+        largest = exact(said["largest"]) + top * max(each)
+        need(noise["largest"] >= largest, "the largest input under noise is not proved")
+    doc.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
+
+
+def _largest_deviation(final: FinalState, starts: formulas.Starts) -> Fraction:
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
+    rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(final.projection)]
+    bits = length(x for row in rows for x in row.values()) + length(starts.center)
+    spend(5 * sum(map(len, rows)) * (2 + len(starts.axes)), bits, bits, "deviations of all starts")
+    return max(map(starts.largest, rows))
+
+
+def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fraction) -> None:
+    """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
+    graph = structure.graph
+    need(form.coordinates == "E", "deviations say nothing of a step")
+    P = integers(form.matrix)[0] if form.matrix else diagonal(integers([form.diagonal or []])[0][0])
+    F = congruence(doc.exact, P, [graph.row(v) for v in form.nodes], graph.n)
+    step = congruence(doc.exact, F, block(graph, range(graph.n)), graph.n)
+    p, q = (growth * graph.unit**2).as_integer_ratio()
+    bits, ratio = longest(chain.from_iterable([*F, *step])), longest((p, q))
+    sized(graph.n**2, bits + ratio, "L'F L")
+    spend(2 * len(structure.kept) ** 2, bits, ratio, "L'F L")
+    S = [[p * F[i][j] - q * step[i][j] for j in structure.kept] for i in structure.kept]
+    need(doc.exact.definite(S), "the growth of a step is not proved")
+
+
+# ---------------------------------------------------------------------- disturbances of the nominal protocol
+
+
+def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify what disturbances within ``delta`` add under the nominal protocol."""
+    doc.at = "effort.disturbed"
+    if said is None:
+        return
+    need(not known.protocol.sliding, "the sliding-mode protocol has its own claims")
+    fields(said, ("delta", "inputs", "drift"), "disturbed")
+    step = doc.open("nominal-disturbed", "effort", ["delta"], witness=True)
+    delta = exact(said["delta"])
+    need(delta == step["delta"] and delta > 0, "another delta")
+    inputs = bounds.disturbed(_member(known, step["witness"]), delta)
+    _above(doc, known, said["inputs"], "the input", inputs)
+    if said["drift"] is not None:
+        drift = [delta * known.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in known.final.projection]
+        _above(doc, known, said["drift"], "the drift", drift)
+    doc.done(f"for every disturbance within {down(delta)}")

@@ -1,0 +1,233 @@
+"""Verifies the Lyapunov function of the theorem's row, as the paper has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from lmi.exact.numbers import integers, sized
+from lmi.exact.rounding import down
+from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.matrices import (
+    Matrix,
+    block,
+    congruence,
+    decrease,
+    diagonal,
+    less,
+    need_rows,
+    only,
+)
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.structure import Claim, Structure
+
+#: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.
+NEAR = 10**9
+
+
+class Block(NamedTuple):
+    """A diagonal block of the Lyapunov matrix: its name, nodes and weights, and whether these are times ``rho``."""
+
+    name: str
+    nodes: list[int]
+    weights: list[Fraction]
+    times_rho: bool
+
+
+@dataclass(frozen=True)
+class Paper:
+    """The Lyapunov function of the theorem's row; ``rate`` is None where none was proved."""
+
+    structure: Structure
+    coordinates: str
+    blocks: list[Block]
+    rho: Fraction
+    rate: Fraction | None
+
+    def weights(self, rho: Fraction) -> dict[int, Fraction]:
+        """Return the diagonal by node, with some ``rho``."""
+        return {
+            v: w * (rho if b.times_rho else 1) for b in self.blocks for v, w in zip(b.nodes, b.weights, strict=True)
+        }
+
+
+def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | None:
+    """Verify the certificate of the theorem's row; None if there is none."""
+    said, graph = doc.section("paper"), structure.graph
+    if said is None:
+        return None
+    keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "prefactor")
+    need_rows(graph.n)
+    fields(said, keys, "paper")
+    objective, coordinates, expected = _row(structure, claim.theorem)
+    need(said["theorem"] == claim.theorem and said["objective"] == objective, "another theorem or objective")
+    need(said["coordinates"] == coordinates, "other coordinates")
+    blocks = []
+    for entry, (name, nodes, times_rho) in zip(entries(said["blocks"], "blocks", len(expected)), expected, strict=True):
+        fields(entry, ("name", "nodes", "diagonal", "times_rho"), "a block")
+        need(entry["name"] == name and entry["times_rho"] is times_rho, "another block")
+        need(positions(doc, graph, entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
+        weights = [exact(w) for w in entries(entry["diagonal"], "diagonal", len(nodes))]
+        need(all(w > 0 for w in weights), "a weight is not positive")
+        blocks.append(Block(name, nodes, weights, times_rho))
+    need((said["rho"] is not None) == any(b.times_rho for b in blocks), "rho belongs to a block times rho")
+    rho = Fraction(1) if said["rho"] is None else exact(said["rho"])
+    need(rho > 0, "rho is not positive")
+    rate = None if said["rate"] is None else exact(said["rate"])
+    need(rate is None or rate > 0, "the rate is not positive")
+    paper = Paper(structure, coordinates, blocks, rho, rate)
+    if not blocks:
+        need(rate is None and said["prefactor"] is None, "a rate where nothing moves")
+    else:
+        weights = list(paper.weights(rho).values())
+        need(exact(said["prefactor"]) == max(weights) / min(weights), "prefactor")
+    if rate is None or coordinates == "eps":
+        need(said["rho_interval"] is None, "an interval without a proof, or without rho")
+    if rate is not None and coordinates == "eps":
+        _deviation_decrease(doc, paper, rate)
+    elif rate is not None:
+        gamma = _leaders(doc, paper, claim.theorem)
+        _margin(doc, paper, gamma, rate)
+        _interval(doc, paper, gamma)
+    return paper
+
+
+def _row(structure: Structure, theorem: str) -> tuple[str, str, list[tuple[str, list[int], bool]]]:
+    """Return objective, coordinates and blocks of the theorem's row, by section 10 of the format."""
+    row, balanced, F = (int(theorem[0]) - 1) % 3 + 1, theorem.endswith("1"), structure.followers
+    groups = [(k, group) for k, group in enumerate(structure.closed, start=1) if len(group) > 1]
+    if not structure.graph.listening:
+        return "none: every agent keeps its state", "eps" if row == 1 else "E", []
+    if row == 1 and balanced:
+        return "2 a(L)", "eps", [("P", structure.closed[0], False)]
+    if row == 1:
+        return "lmin(Omega L + L' Omega) / lmax(Omega)", "E", [("Omega", structure.closed[0], False)]
+    if balanced and not groups:
+        letter = "Xi_F" if row == 2 else "H_F"
+        return f"lmin({letter} L_F + L_F' {letter}) / lmax({letter})", "E", [(letter, F, False)]
+    if row == 2:
+        name, objective = ("Xi_L", "lmin(Phi) / lmax(Xi)") if balanced else ("Xit_L", "lmin(Psi) / lmax(Xit)")
+        return objective, "E", [(name, groups[0][1], False), ("Xi_F", F, True)]
+    one, last = ("H_", "H_F") if balanced else ("Theta_L", "Theta_F")
+    objective = "lmin(Pi) / lmax(H)" if balanced else "lmin(Theta L + L' Theta) / lmax(Theta)"
+    return objective, "E", [(f"{one}{k}", group, False) for k, group in groups] + ([(last, F, True)] if F else [])
+
+
+def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
+    """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term, as the paper's formula asks."""
+    (scaled,), _ = integers([list(p)])
+    left, graph = structure.graph.left(nodes, scaled), structure.graph
+    near = all(abs(x) * NEAR <= w * graph.row(v)[v] for x, w, v in zip(left, scaled, nodes, strict=True))
+    need(near, "the weights are not the left null vector of the comparison matrix")
+
+
+def deviation_form(paper: Paper) -> tuple[Matrix, Fraction]:
+    """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale, and the scale."""
+    p, gauge = paper.blocks[0].weights, paper.structure.gauges[0] or []
+    bits = 2 * length(p)
+    spend(4 * len(p) ** 2, bits, bits, "deviations")
+    sized(len(p) ** 2, 2 * bits, "deviations")
+    (own,), scale = integers([p])
+    total = sum(own)
+    Z = [
+        [g * h * (total * x * (g_at == h_at) - x * y) for h_at, (h, y) in enumerate(zip(gauge, own, strict=True))]
+        for g_at, (g, x) in enumerate(zip(gauge, own, strict=True))
+    ]
+    return Z, Fraction(total * scale)
+
+
+def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
+    """Verify ``Z L + L'Z - b Z > 0`` modulo ``G 1``."""
+    graph, one = paper.structure.graph, paper.blocks[0]
+    b = doc.open("deviation-decrease", "paper", ["b"])["b"]
+    need(b == rate, "b is not the rate")
+    _near_null_vector(paper.structure, one.nodes, one.weights)
+    S, _ = decrease(doc.exact, deviation_form(paper)[0], block(graph, range(graph.n)), b, graph.unit)
+    need(doc.exact.definite(only(S, paper.structure.kept)), "not proved definite")
+    doc.done(f"b = {down(b)}")
+
+
+def group_decrease(doc: Document, structure: Structure, k: int, weights: Sequence[int], b: Fraction) -> bool:
+    """Tell whether ``F L_k + L_k'F - b F > 0``, ``F = L_k'W L_k``, is proved, modulo ``G_k 1`` if that is balanced."""
+    A = block(structure.graph, structure.closed[k])
+    F = congruence(doc.exact, diagonal(weights), A, len(A))
+    S, _ = decrease(doc.exact, F, A, b, structure.graph.unit)
+    return doc.exact.definite(only(S, range(structure.gauges[k] is not None, len(A))))
+
+
+def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction] | None:
+    """Verify the decrease of each leader block; return the diagonal of Gamma, None where the row has no Gamma."""
+    structure, gamma = paper.structure, dict[int, Fraction]()
+    if theorem not in ("2.1", "3.1", "5.1", "6.1"):
+        return None
+    for name, nodes, weights, times_rho in paper.blocks:
+        if times_rho or nodes == structure.followers:
+            continue
+        k, ((scaled,), scale) = structure.closed.index(nodes), integers([weights])
+        if structure.gauges[k] is None:
+            m = doc.open("leader-margin", f"paper.{name}", ["m"])["m"]
+            S, unit = decrease(
+                doc.exact, diagonal(scaled), block(structure.graph, nodes), Fraction(0), structure.graph.unit
+            )
+            need(m > 0 and doc.exact.definite(less(S, m * unit * scale)), "not proved definite")
+            gamma |= dict.fromkeys(nodes, m)
+            doc.done(f"m = {down(m)}")
+        else:
+            b = doc.open("leader-decrease", f"paper.{name}", ["b"])["b"]
+            _near_null_vector(structure, nodes, weights)
+            need(b > 0 and group_decrease(doc, structure, k, scaled, b), "not proved definite")
+            least = min(weights)
+            gamma |= {v: b * (w if theorem in ("2.1", "5.1") else least) for v, w in zip(nodes, weights, strict=True)}
+            doc.done(f"b = {down(b)}")
+    return gamma
+
+
+def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rate: Fraction) -> None:
+    """Verify ``S - m I > 0``, and that the rate is ``m`` over the largest weight."""
+    has_rho = doc.data["paper"]["rho"] is not None
+    numbers = doc.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
+    need(numbers.get("rho", paper.rho) == paper.rho, "another rho")
+    need(_coupled(doc, paper, gamma, paper.rho, numbers["m"]), "not proved definite")
+    need(rate == numbers["m"] / max(paper.weights(paper.rho).values()), "the rate is not m / largest weight")
+    doc.done(f"m = {down(numbers['m'])}, rate {down(rate)}")
+
+
+def _coupled(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rho: Fraction, m: Fraction) -> bool:
+    """Tell whether ``S > m I`` is proved: ``S = W A + A'W`` at some rho, with Gamma in place of the leaders' block."""
+    graph, weights, gamma = paper.structure.graph, paper.weights(rho), gamma or {}
+    nodes, ((own,), scale) = list(weights), integers([list(weights.values())])
+    S, unit = decrease(doc.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
+    (tops,), other = integers([[*(gamma[v] * scale * unit for v in nodes if v in gamma)]])
+    S = [[x * other for x in row] for row in S]
+    leading = [i for i, v in enumerate(nodes) if v in gamma]
+    for i, top in zip(leading, tops, strict=True):
+        for j in leading:
+            S[i][j] = top * (i == j)
+    return doc.exact.definite(less(S, m * scale * unit * other))
+
+
+def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None) -> None:
+    """Verify that both ends of the interval of ``rho`` are admissible."""
+    said, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
+    doc.at = "rho-interval of paper"
+    if rho is None:
+        need(said is None, "an interval without rho")
+        return
+    ends = {key: exact(x) for key, x in fields(said, ("printed", "exact"), "rho_interval").items() if x is not None}
+    need(len(ends) != 1, "one end without the other")
+    if not ends:
+        leading = {v for b in paper.blocks if not b.times_rho for v in b.nodes}
+        free = all(j not in leading for v in paper.structure.followers for j in paper.structure.graph.row(v))
+        need(free, "rho is bounded, since followers listen to these leaders")
+        return
+    numbers: dict[str, Any] = doc.open("rho-interval", "paper", list(ends))
+    need(numbers == {**ends, "witness": None}, "other ends")
+    need(ends["printed"] <= ends["exact"], "the ends are in the wrong order")
+    for end in ends.values():
+        need(end > 0 and _coupled(doc, paper, gamma, end, Fraction(0)), "an end is not proved admissible")
+    need(paper.rho <= ends["exact"], "rho lies beyond the interval")
+    doc.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))

@@ -1,0 +1,93 @@
+"""Verifies the parameters of the protocol, and when the sliding variables are 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.numbers import shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.reading import exact, fields, need
+from ptcc_certify.checker.vectors import Numbers
+
+SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
+SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
+#: Bits of the bounds that prove reaching times.
+REACHING_BITS = 64
+#: Products of short integers that an instant of a reaching time costs, about.
+EACH_INSTANT = 12_000
+NOMINAL = ("T", "rho1", "rho2", "kappa")
+SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """The parameters by name, and whether the protocol is the sliding-mode one."""
+
+    sliding: bool
+    gains: dict[str, Fraction]
+
+
+@dataclass(frozen=True)
+class Begin:
+    """``X(0)`` and ``sigma(0)``; None: not given, or the nominal protocol."""
+
+    state: Numbers | None
+    sigma: Numbers | None
+
+
+def check_protocol(doc: Document) -> Protocol:
+    """Read the parameters, which are positive; mu1 is above delta."""
+    said = doc.section("protocol")
+    sliding = isinstance(said, dict) and said.get("kind") == "sliding-mode"
+    names = SLIDING if sliding else NOMINAL
+    said = fields(said, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
+    need(sliding or said["kind"] == "nominal", "an unknown kind of protocol")
+    gains = {name: exact(said[name]) for name in names}
+    need(all(value > 0 for name, value in gains.items() if name != "delta"), "a parameter is not positive")
+    if sliding:
+        need(0 <= gains["delta"] < gains["mu1"], "mu1 is not above delta")
+        need(said["disturbance"] is None or isinstance(said["disturbance"], str), "disturbance is not a text")
+    return Protocol(sliding, gains)
+
+
+def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
+    """Read ``X(0)`` and ``sigma(0)``."""
+    state, sigma = (
+        None if (said := doc.section(key)) is None else by_agent(doc, graph, said, key)
+        for key in ("initial_state", "sigma0")
+    )
+    need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
+    return Begin(state, sigma)
+
+
+def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
+    """Verify Proposition 1 and every reaching time."""
+    said, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
+    if sigma0 is None:
+        need(said is None, "reaching times without sliding variables")
+        return
+    fields(said, ("bound", "clock", "z"), "reaching_time")
+    need(said["bound"] == SLIDING_BOUND and said["clock"] == SLIDING_CLOCK, "another bound or clock")
+    told = ordered(graph.labels, said["z"], "z").values()
+    doc.open("sliding-bound", "protocol")
+    doc.done("for every disturbance within delta")
+    z = [None if x is None else exact(x) for x in told]
+    if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
+        need(not any(z), "a reaching time of a variable that is 0 from the start")
+        return
+    doc.open("reaching-time", "reaching_time")
+    need(all(end is None or end >= 0 for end in z), "a reaching time before the start")
+    asked = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
+    spend(len(asked) * EACH_INSTANT, what="the reaching times of many agents")
+    known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)
+    for label, size, end in zip(graph.labels, map(abs, sigma0), z, strict=True):
+        if size and end is not None:
+            need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {shorten(label)} need not be there by then")
+        else:
+            need(not end, f"agent {shorten(label)} starts at 0")
+    doc.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")

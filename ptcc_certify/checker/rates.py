@@ -1,0 +1,83 @@
+"""Verifies the rates that are stated, and the upper bound that no rate exceeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.numbers import integers, longest
+from lmi.exact.rounding import up
+from lmi.exact.work import spend
+from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.matrices import block, decrease, need_rows, product, transposed
+from ptcc_certify.checker.paper import Paper
+from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
+from ptcc_certify.checker.structure import Structure
+
+
+def check_rates(doc: Document, paper: Paper | None, functions: Sequence[Function]) -> Fraction | None:
+    """Verify that the rates and the prefactor are those of the functions; return the largest rate."""
+    said = fields(doc.section("rates"), ("paper", "diagonal", "certified", "limit"), "rates")
+    decaying = [f for f in functions if f.rate > 0]
+    best = max(decaying, key=lambda f: (f.rate, -f.prefactor), default=None)
+    proved = {
+        "paper": paper and paper.rate,
+        "diagonal": max((f.rate for f in decaying if f.kind in ("perron", "lmi")), default=None),
+        "certified": best and best.rate,
+    }
+    for key, value in proved.items():
+        need((None if said[key] is None else exact(said[key])) == value, f"the rate {key} is not the proved one")
+    said = doc.section("prefactor")
+    if best is None:
+        need(said is None, "a prefactor without a rate")
+        return None
+    fields(said, ("value", "of"), "prefactor")
+    of = f"||{best.form.coordinates if best.form else 'E'}||^2"
+    need(exact(said["value"]) == best.prefactor and said["of"] == of, "not that of the largest rate")
+    return best.rate
+
+
+def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
+    """Verify the upper bound on every rate: by the mean nonzero eigenvalue of a strong component, or by inertia."""
+    said = doc.data["rates"]["limit"]
+    if said is None:
+        return None
+    mean = doc.following.get("kind") == "rate-mean"
+    step = doc.open("rate-mean" if mean else "rate-limit", "rates", ["limit"], witness=True)
+    need(exact(said) == step["limit"], "the limit is another")
+    (_mean if mean else _inertia)(doc, structure, step["limit"], step["witness"])
+    doc.done(f"no rate exceeds {up(step['limit'])}")
+    return step["limit"]
+
+
+def _mean(doc: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
+    """Verify that the limit is twice the mean of the nonzero eigenvalues, whose sum is the trace."""
+    graph = structure.graph
+    (v,) = positions(doc, graph, [fields(witness, ("node",), "the witness")["node"]], "node")
+    own, still = structure.strong_component(v)
+    trace = Fraction(sum(graph.diagonal[u] for u in own), graph.unit)
+    need(v == own[0], "not the first node of a strong component")
+    need(len(own) > still and limit * (len(own) - still) == 2 * trace, "not twice the mean nonzero eigenvalue")
+
+
+def _inertia(doc: Document, structure: Structure, limit: Fraction, witness: Any) -> None:
+    """Verify ``H B + B'H > 0``, which gives ``H`` and ``B = A - (limit/2) I`` the same inertia."""
+    said, graph = fields(witness, ("nodes", "lower_triangle", "vectors"), "the witness"), structure.graph
+    nodes = positions(doc, graph, said["nodes"], "nodes")
+    need(bool(nodes), "no nodes")
+    own, still = structure.strong_component(nodes[0])
+    need(nodes == own, "the nodes are not a strong component")
+    need_rows(len(nodes))
+    H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
+    S, _ = decrease(doc.exact, H, block(graph, nodes), limit, graph.unit)
+    need(doc.exact.definite(S), "not proved definite")
+    # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
+    rows = entries(said["vectors"], "vectors", 2 if still else 1)
+    X, _ = integers([[exact(x) for x in entries(row, "a vector", len(nodes))] for row in rows])
+    bits = longest(x for row in H for x in row)
+    spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
+    below = product(X, product(H, transposed(X)))
+    need(doc.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")

@@ -1,0 +1,221 @@
+"""The trusted files: a list that is complete, that runs alone, and that computes without floats."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import ptcc_certify
+from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.examples import load_graph, select
+
+ROOT = Path(ptcc_certify.__file__).parents[1]
+LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()
+ALL = [line for line in LISTED if not line.startswith("#")]
+TWINS = [line for line in ALL if line.endswith("/fast.py")]
+PLAIN = [line for line in ALL if line not in TWINS]
+MODULES = [line for line in PLAIN if line.endswith(".py")]
+
+STANDARD = {
+    *("__future__", "array", "bisect", "collections", "contextlib", "contextvars", "dataclasses", "decimal"),
+    *(
+        "fractions",
+        "functools",
+        "graphlib",
+        "hashlib",
+        "io",
+        "itertools",
+        "json",
+        "math",
+        "numbers",
+        "operator",
+        "pathlib",
+    ),
+    *("re", "sys", "typing"),
+}
+#: Functions of ``math`` that give integers.
+EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
+#: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
+FLOATS = {
+    ("lmi/exact/rounding.py", "float_up"): "the float next to a number",
+    ("lmi/exact/rounding.py", "_written"): "prints a number; the digits come from a Decimal",
+    ("lmi/exact/work.py", "limited"): "GB that are allowed",
+    ("ptcc_certify/checker/__init__.py", "main"): "GB that are allowed",
+    ("ptcc_certify/checker/__init__.py", "read_and_check"): "tells the GB that were needed",
+    ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",
+    ("ptcc_certify/checker/reading.py", "number"): "JSON numbers of `unverified`, which nothing reads",
+    ("ptcc_certify/checker/vectors.py", "column"): "side files of floats: finite",
+    ("ptcc_certify/checker/vectors.py", "numbers"): "side files of floats: each as the dyadic rational that it is",
+}
+
+
+def tree(name: str) -> ast.Module:
+    return ast.parse((ROOT / name).read_text(encoding="utf-8"))
+
+
+def imports(name: str) -> set[str]:
+    """The modules that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(tree(name)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0 and node.module
+            found.add(node.module)
+            inside = ROOT / node.module.replace(".", "/")
+            found |= {f"{node.module}.{a.name}" for a in node.names if (inside / f"{a.name}.py").exists()}
+        elif isinstance(node, ast.Name):
+            assert node.id not in ("__import__", "eval", "exec", "compile", "pickle", "import_module", "importlib"), (
+                name
+            )
+    return found
+
+
+def file_of(module: str) -> str:
+    path = module.replace(".", "/")
+    return f"{path}/__init__.py" if (ROOT / path).is_dir() else f"{path}.py"
+
+
+def test_the_list_is_what_the_checker_imports():
+    todo, seen = ["ptcc_certify/checker/__main__.py"], set()
+    while todo:
+        name = todo.pop()
+        if name not in seen:
+            seen.add(name)
+            for module in imports(name):
+                if module.split(".")[0] in ("lmi", "ptcc_certify"):
+                    todo.append(file_of(module))
+                else:
+                    assert module.split(".")[0] in STANDARD | ({"numpy", "flint"} if name in TWINS else set()), name
+    assert sorted(ALL) == sorted([*seen, "ptcc_certify/checker/obligations.json"])
+    assert all(name.startswith(("lmi/exact/", "ptcc_certify/checker/")) for name in ALL)
+    assert {str(p.relative_to(ROOT)) for p in (ROOT / "ptcc_certify/checker").glob("*.py")} <= set(ALL)
+
+
+def test_each_file_of_the_list_is_there_once():
+    assert TWINS == ["lmi/exact/fast.py", "ptcc_certify/checker/fast.py"] and ALL[-2:] == TWINS
+    assert len(set(ALL)) == len(ALL) and all((ROOT / name).is_file() for name in ALL)
+
+
+# ---------------------------------------------------------------------- no floats
+
+
+class Floats(ast.NodeVisitor):
+    """Finds float literals, the names ``float`` and ``complex``, and functions of ``math`` that give floats.
+
+    Annotations may say ``float``. A quotient or a power may be a float too: see :class:`Watched`.
+    """
+
+    def __init__(self) -> None:
+        self.inside, self.found = [""], set[str]()
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+        self.inside.append(node.name)
+        for part in (*node.args.defaults, *(d for d in node.args.kw_defaults if d), *node.body):
+            self.visit(part)
+        self.inside.pop()
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value:
+            self.visit(node.value)
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
+        assert node.module != "math" or {a.name for a in node.names} <= EXACT_MATH
+        assert node.module not in ("cmath", "random", "statistics", "time")
+
+    def visit_Constant(self, node: ast.Constant) -> None:
+        if isinstance(node.value, float | complex):
+            self.found.add(self.inside[-1])
+
+    def visit_Name(self, node: ast.Name) -> None:
+        if node.id in ("float", "complex"):
+            self.found.add(self.inside[-1])
+
+    def visit_Attribute(self, node: ast.Attribute) -> None:
+        if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr not in EXACT_MATH:
+            self.found.add(self.inside[-1])
+        self.generic_visit(node)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_no_floats_but_where_it_is_said(name: str):
+    visitor = Floats()
+    visitor.visit(tree(name))
+    assert {(name, inside) for inside in visitor.found} == {where for where in FLOATS if where[0] == name}
+
+
+class Watched(ast.NodeTransformer):
+    """Passes every quotient and every power through a function that refuses floats."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Div | ast.Pow):
+            return node
+        call = ast.Call(ast.Name("_exact", ast.Load()), [node], [])
+        return ast.copy_location(call, node)
+
+
+WATCH = """
+def _exact(x):
+    assert type(x) not in (float, complex), x
+    return x
+"""
+
+
+# ---------------------------------------------------------------------- alone
+
+
+@cache
+def examples() -> list[str]:
+    """The JSON of the certificates of the paper's examples."""
+    found = []
+    for example, name, _ in select("all"):
+        x0, sigma0 = example.x0.split(","), example.sigma0 and example.sigma0.split(",")
+        found.append(certify(load_graph(name), example.protocol(), x0, sigma0=sigma0, simulation=False).to_json())
+    return found
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
+    """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
+
+    Once more with every quotient and power watched: none that is formed is a float.
+    """
+    for name in PLAIN:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        if watched and name.endswith(".py"):
+            whole = tree(name)
+            future = next(k for k, node in enumerate(whole.body) if isinstance(node, ast.ImportFrom | ast.Import))
+            changed = ast.fix_missing_locations(Watched().visit(whole))
+            changed.body[future + 1 : future + 1] = ast.parse(WATCH).body
+            (tmp_path / name).write_text(ast.unparse(changed), encoding="utf-8")
+        else:
+            shutil.copy(ROOT / name, tmp_path / name)
+
+    def run(program: str, *words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-I", "-S", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {program}"]
+        return subprocess.run([*command, *words], capture_output=True, text=True, cwd=tmp_path, env=dict(os.environ))
+
+    for name in ("numpy", "scipy", "casadi", "cvxpy", "clarabel", "flint", "ptcc_certify.errors", "lmi.witness"):
+        assert "ModuleNotFoundError" in run(f"import {name}").stderr
+    check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
+    for text in examples():
+        (tmp_path / "c.json").write_text(text, encoding="utf-8")
+        done = run(check, "c.json")
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.stdout.splitlines()[-1].startswith("accepted   certified;")
+        assert done.stdout.splitlines()[-1].endswith("by standard library")
+    assert len(examples()) == 12
+    false = json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) | {"verdict": "undecided"}
+    (tmp_path / "c.json").write_text(json.dumps(false), encoding="utf-8")
+    done = run(check, "c.json")
+    assert done.returncode == 1 and done.stdout.splitlines()[-1].startswith("rejected   verdict")
+    assert run(check).returncode == 2
