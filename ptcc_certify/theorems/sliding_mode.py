@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ptcc_certify.graphs.structure import Claim, Structure
-from ptcc_certify.theorems.base import LyapunovFunction, RateProof, Theorem
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.theorems.base import RateProof, Theorem
 
 _COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
 
@@ -55,7 +56,7 @@ class SlidingMode(Theorem):
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """Search as for the nominal row."""
-        return replace(self._nominal.lyapunov(structure), theorem=self.number)
+        return self._nominal.lyapunov(structure)
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """Return the matrix of the nominal row."""
