@@ -105,7 +105,7 @@ def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence
         middle[structure.followers], radius[structure.followers] = _enclosed_followers(
             structure, exact, middle, radius, u
         )
-    final: list[Fraction | float] = middle.tolist() if unit == 1 else [Fraction(x) * unit for x in middle.tolist()]
+    final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
     spreads = [Fraction(r) * unit for r in radius.tolist()]
     for v, x in exact.items():
         final[v], spreads[v] = x * unit, Fraction(0)

@@ -294,7 +294,7 @@ class Outcome:
         if self.radius is None and not self.exact:
             return None
         radius = self.radius or (Fraction(0),) * len(self.final_state)
-        return tuple(zip(map(Fraction, self.final_state), radius, strict=True))
+        return tuple(zip((Fraction(x) for x in self.final_state), radius, strict=True))
 
     @cached_property
     def values(self) -> np.ndarray:

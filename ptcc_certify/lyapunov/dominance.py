@@ -146,11 +146,12 @@ class _Composite:
         found = self._rate(w, d)
         if not found > 0:
             raise NoCertificate("no positive rate is left")
-        block = LyapunovBlock("P", self.nodes, w)
+        block = LyapunovBlock("P", self.nodes, dyadic=w)
         rate = round_to_bits(found * (1 - _SLACK), 53)
-        return LyapunovFunction(
-            kind, "E", (block,), rate=rate, numerical_rate=float(rate), dominance=Dominance(d, self.proofs)
-        )
+        firsts = np.cumsum([0, *(proof.weights.size for proof in self.proofs)])
+        scales = tuple(float(w[i] / proof.weights[0]) for i, proof in zip(firsts, self.proofs, strict=False))
+        proof = Dominance(d, self.proofs, scales)
+        return LyapunovFunction(kind, "E", (block,), rate=rate, numerical_rate=float(rate), dominance=proof)
 
     def _rate(self, w: np.ndarray, d: np.ndarray) -> float:
         """Return the largest ``b`` for which every row of the inequality holds."""

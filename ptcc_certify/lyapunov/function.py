@@ -22,31 +22,33 @@ from lmi.exact.rounding import float_down, float_up
 from ptcc_certify.checker.input_bounds import Form
 
 Matrix = list[list[Fraction]]
-#: Diagonal matrices in rationals, or, for large graphs, in floats that are the dyadic numbers they are.
-Diagonal = tuple[Fraction, ...] | np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class LyapunovBlock:
-    """One block of a Lyapunov matrix, exact: diagonal, or full if ``matrix`` is given.
+    """One block of a Lyapunov matrix, exact: its diagonal, or one of ``matrix`` and ``dyadic`` in place of that.
 
     Attributes
     ----------
     name : str
         The paper's letter: ``P``, ``Omega``, ``Xi_L``, ``Xi_F``, ``H_2``, ``H_F``, ``Theta_L1``, ``Theta_F``.
     nodes : tuple of int
-    diagonal : tuple of Fraction, or array
+    diagonal : tuple of Fraction
         Positive, without the factor ``rho``.
     times_rho : bool
         Whether the block enters the Lyapunov matrix multiplied by ``rho``.
     matrix : rows of Fractions or None
+        Of a full block.
+    dyadic : (n,) array or None
+        The diagonal of a large block, in floats that are the dyadic numbers they are.
     """
 
     name: str
     nodes: tuple[int, ...]
-    diagonal: Diagonal = ()
+    diagonal: tuple[Fraction, ...] = ()
     times_rho: bool = False
     matrix: Matrix | None = None
+    dyadic: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,13 @@ class Dominance:
         ``d`` of the inequality; every entry is the dyadic number that it is, of at most 40 significant bits.
     groups : tuple of GroupProof
         Of every leader group that moves; empty where it was read back, and the check has verified it.
+    scales : tuple of float
+        Powers of two, by which the weights of the groups are multiplied in ``P``.
     """
 
     vector: np.ndarray
     groups: tuple[GroupProof, ...] = ()
+    scales: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +188,7 @@ class LyapunovFunction:
         return tuple(
             Fraction(w) * (self.rho if block.times_rho and self.rho is not None else 1)
             for block in self.blocks
-            for w in (block.diagonal.tolist() if isinstance(block.diagonal, np.ndarray) else block.diagonal)
+            for w in (block.diagonal if block.dyadic is None else block.dyadic.tolist())
         )
 
     @property
@@ -245,8 +250,8 @@ class LyapunovFunction:
         """``P`` (n, n), or its diagonal (n,) if it is diagonal."""
         if self.matrix is not None:
             return np.array([[float(x) for x in row] for row in self.matrix])
-        if len(self.blocks) == 1 and isinstance(self.blocks[0].diagonal, np.ndarray):
-            return self.blocks[0].diagonal
+        if len(self.blocks) == 1 and self.blocks[0].dyadic is not None:
+            return self.blocks[0].dyadic
         return np.array([float(w) for w in self.weights])
 
     @cached_property

@@ -172,7 +172,8 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 else:
                     proved.append(member)
             checkpoint()
-            near = _for_deviations(system, candidates, chosen, wanted) if any(m.proved_rate > 0 for m in proved) else None
+            decays = any(V.proved_rate > 0 for V in proved)
+            near = _for_deviations(system, candidates, chosen, wanted) if decays else None
             extra = None if near is None else prove_member(system, near)
     limit = min((c.upper for c in every), default=math.inf)
     members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
@@ -272,7 +273,8 @@ def _without_hair_splitting(members: list[LyapunovFunction]) -> list[LyapunovFun
     """
     result = []
     for member in members:
-        near = [m.proved_rate for m in members if m.prefactor < member.prefactor and 0 < m.proved_rate < member.proved_rate]
+        slower = (m.proved_rate for m in members if m.prefactor < member.prefactor)
+        near = [rate for rate in slower if 0 < rate < member.proved_rate]
         close = [rate for rate in near if member.proved_rate - rate <= Fraction(_SAME_RATE) * rate]
         if close:
             member = replace(member, rate=max(close))

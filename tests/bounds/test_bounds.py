@@ -12,9 +12,9 @@ import pytest
 from balls import BITS, ball, clock, form_value, states, value
 from generators import all_classes, random_graph
 
-from ptcc_certify.bounds.envelope import Envelope, Member
-from ptcc_certify.certificate.certificate import Certificate, certify
-from ptcc_certify.certificate.saved import read_certificate
+from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
@@ -176,7 +176,7 @@ def pair_envelope(rate: float) -> tuple[Envelope, NominalProtocol, SignedDigraph
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol, [3, 1], simulation=False)
     assert cert.lyapunov is not None
-    member = Member.of(cert.structure, cert.lyapunov, rate)
+    member = replace(cert.lyapunov, rate=rate)
     return Envelope(cert.structure, protocol.gain, (member,)), protocol, graph
 
 
@@ -259,7 +259,7 @@ def test_more_members_make_the_envelope_the_pointwise_best():
     from dataclasses import replace
 
     slow = envelope.members[0]
-    fast = replace(slow, rate=2.0, prefactor=100.0)
+    fast = replace(slow, rate=Fraction(2), ends=(slow.lowest, 100 * slow.lowest))
     both = replace(envelope, members=(slow, fast))
     for s in (0.0, 1.0, 5.0, 50.0):
         alone = [replace(envelope, members=(m,)).norm_factor(s) for m in (slow, fast)]

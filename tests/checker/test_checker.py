@@ -35,9 +35,9 @@ from lmi.exact.sparse import residual_definite
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.input import box, ellipsoid
-from ptcc_certify.certificate import certificate as certificate_module
-from ptcc_certify.certificate import document
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate import procedure, vectors
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check, digraph
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
@@ -230,7 +230,7 @@ def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monke
 
 
 def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "LONG", 5)
+    monkeypatch.setattr(vectors, "LONG", 5)
     for k, name in enumerate(("fig1a", "fig3b")):
         graph = load_graph(name)
         if k:  # floats
@@ -651,7 +651,7 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
 def large(name: str, seed: int = 3, slides: bool = False) -> Json:
     """The JSON of a certificate of a small graph that is treated as a large one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(certificate_module, "EXACT_NODES", 0)
+        patch.setattr(procedure, "EXACT_NODES", 0)
         patch.setattr(outcomes, "EXACT_NODES", 0)
         return made.__wrapped__(name, seed, slides)
 
