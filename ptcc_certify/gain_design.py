@@ -52,6 +52,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_bounds import BITS, InputBounds, Linear, PrescribedGain
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
@@ -85,7 +86,7 @@ class TradeOff(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Design:
+class Design(Shown):
     """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
 
     Attributes
@@ -310,11 +311,6 @@ class Design:
             "shortest_possible": text(self.shortest_possible),
             "ratio": self.ratio,
         }
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import design_html
-
-        return design_html(self)
 
     def __repr__(self) -> str:
         if self.protocol is None or self.peak is None:

@@ -17,6 +17,7 @@ from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport, check, read_and_check
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.rationals import shorten
@@ -60,7 +61,7 @@ class RejectedCertificate(PTCCError, ValueError):
 
 
 @dataclass(frozen=True, repr=False)
-class Certificate(Content):
+class Certificate(Content, Shown):
     """A claim about a signed digraph under a protocol, with its proof.
 
     Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`.

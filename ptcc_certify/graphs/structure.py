@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ptcc_certify.display import Shown
 from ptcc_certify.graphs.digraph import SignedDigraph
 
 STABILITY = "stability"
@@ -193,7 +194,7 @@ class WeakComponent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure:
+class Structure(Shown):
     """The structure of a signed digraph; made by :func:`analyse`.
 
     Attributes
@@ -295,11 +296,6 @@ class Structure:
             surplus[int(self.graph.target[edge])] += weight
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import structure_html
-
-        return structure_html(self)
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)

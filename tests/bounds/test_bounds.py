@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -49,7 +50,7 @@ def proved_forms(cert: Certificate) -> list[tuple[Fraction, Callable[[list[flint
     if (V := cert.lyapunov) is not None and V.blocks and cert.proof.rate is not None:
         forms.append((cert.proof.rate, lambda X: value(graph, V, gauge, X)))
     for m in cert.sharpening.members:
-        forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.diagonal, m.matrix, X)))
+        forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.weights or None, m.matrix, X)))
     return forms
 
 
@@ -256,8 +257,6 @@ def test_the_residual_is_what_the_bound_leaves():
 
 def test_more_members_make_the_envelope_the_pointwise_best():
     envelope, _, _ = pair_envelope(1.0)
-    from dataclasses import replace
-
     slow = envelope.members[0]
     fast = replace(slow, rate=Fraction(2), ends=(slow.lowest, 100 * slow.lowest))
     both = replace(envelope, members=(slow, fast))

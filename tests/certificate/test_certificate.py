@@ -1409,11 +1409,11 @@ def same_members(first: Certificate, second: Certificate, order: np.ndarray, sca
     """Member by member equal, node ``v`` of the first being ``order[v]`` of the second."""
     assert len(first.sharpening.members) == len(second.sharpening.members)
     for a, b in zip(first.sharpening.members, second.sharpening.members, strict=True):
-        assert a.kind == b.kind and a.diagonal is not None and b.diagonal is not None
+        assert a.kind == b.kind and a.matrix is None and b.matrix is None
         assert float(b.rate) == pytest.approx(float(a.rate) * scale, rel=1e-6)
         assert float(b.prefactor) == pytest.approx(float(a.prefactor), rel=1e-3)
-        weights = {int(order[v]): float(w) for v, w in zip(a.nodes, a.diagonal, strict=True)}
-        assert dict(zip(b.nodes, map(float, b.diagonal), strict=True)) == pytest.approx(weights, rel=1e-3)
+        weights = {int(order[v]): float(w) for v, w in zip(a.nodes, a.weights, strict=True)}
+        assert dict(zip(b.nodes, map(float, b.weights), strict=True)) == pytest.approx(weights, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", ["perron", "best"])

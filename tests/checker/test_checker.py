@@ -37,6 +37,7 @@ from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.input import box, ellipsoid
 from ptcc_certify.certificate import procedure, vectors
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.format import certificate_document
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check, digraph
 from ptcc_certify.errors import FormatError
@@ -163,7 +164,7 @@ def judged(graph: SignedDigraph, rng: np.random.Generator, slides: bool) -> Cert
 
 def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):
     """A wrong claim that slips in anywhere before the JSON ends as undecided, with a note."""
-    honest = document.certificate_document
+    honest = certificate_document
 
     def lying(certificate: Any, verdict: str, files: bool = False) -> tuple[Json, Any]:
         data, written = honest(certificate, verdict, files)
@@ -189,7 +190,7 @@ def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
 @pytest.mark.parametrize("slides", [False, True])
 def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
-    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__(name, 5, slides)
     assert data["verdict"] == "certified"
     accepted(data)

@@ -123,7 +123,7 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
     assert isinstance(data["components"], dict) and data["outcome"]["influence"]["followers"] is None
     for key in data["components"]:
         assert not valid(changed(data, ("components", key), data["components"][key][:MANY_COMPONENTS]))
-    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__("3.1 no single")
     VALIDATOR.validate(data)
     assert data["proof"][2]["witness"] is not None
