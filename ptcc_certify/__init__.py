@@ -24,7 +24,7 @@ _EXPORTS = {
     "write_graph": "graphs.io",
     "read_state": "graphs.io",
     "Structure": "graphs.structure",
-    "Claim": "graphs.structure",
+    "Claim": "theorems.claims",
     "ClosedComponent": "graphs.structure",
     "WeakComponent": "graphs.structure",
     "analyse": "graphs.structure",

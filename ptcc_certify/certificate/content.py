@@ -25,7 +25,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_bounds import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.structure import Claim, Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_bound import RateLimit, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Sharpening
@@ -35,6 +35,7 @@ from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
 from ptcc_certify.theorems import Obligation, RateProof, Theorem, sliding_claim, theorem_for
+from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: What a simulated run meets under the sliding-mode protocol unless a file states an expression.

@@ -14,7 +14,8 @@ from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.vectors import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.structure import Claim, Structure
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.theorems.claims import Claim
 
 
 def structure_document(structure: Structure) -> dict[str, Any]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from lmi.exact.enclosure import LARGEST_PUSH
 from lmi.exact.rounding import down, near, up
-from ptcc_certify.graphs.structure import Claim, Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
+from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

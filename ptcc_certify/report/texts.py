@@ -16,8 +16,9 @@ from lmi.exact.rounding import down, up
 from ptcc_certify.bounds.input import Limited, Starts
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
-from ptcc_certify.graphs.structure import Claim, ClosedComponent
+from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.theorems.claims import Claim
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
