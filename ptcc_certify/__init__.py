@@ -65,7 +65,7 @@ _EXPORTS = {
     "Comparison": "bounds.envelope",
     "Certificate": "certificate.certificate",
     "certify": "certificate.procedure",
-    "Expectations": "certificate.content",
+    "Expectations": "certificate.request",
     "Assessment": "certificate.verdict",
     "RejectedCertificate": "certificate.certificate",
     "read_certificate": "certificate.certificate",

@@ -206,9 +206,9 @@ def certify(
     **options: Any,
 ) -> int:
     """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
-    from ptcc_certify.certificate.content import Expectations
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.request import Expectations
     from ptcc_certify.report.screen import certificate_lines
 
     instant, bound = _number(at, "--at"), _number(initial_bound, "--initial-bound")
@@ -484,8 +484,8 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
     """
     from lmi.exact.rounding import down
-    from ptcc_certify.certificate.content import Expectations
     from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.request import Expectations
     from ptcc_certify.certificate.verdict import worst_code
     from ptcc_certify.examples import load_graph, select
     from ptcc_certify.report.paper_figures import Run, paper_figures, results_csv

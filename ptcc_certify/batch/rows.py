@@ -57,8 +57,8 @@ import numpy as np
 from lmi.exact.rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, Start
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.content import Expectations
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state

@@ -20,6 +20,7 @@ from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import Influence, Outcome, influence
 from ptcc_certify.bounds.input import Effort, Limits, Starts, WorstStart, bound_effort, worst_start
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import Interval, outcome_witness
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_bounds import Form
@@ -40,73 +41,6 @@ from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: What a simulated run meets under the sliding-mode protocol unless a file states an expression.
 ADVERSARY = "adversary"
-
-
-@dataclass(frozen=True)
-class Expectations:
-    """What is asked of a certificate besides.
-
-    Attributes
-    ----------
-    behaviour : str or None
-        As :attr:`ptcc_certify.graphs.structure.Claim.behaviour` or one of its special cases.
-    min_rate : Fraction or None
-        A proved rate of at least so much, per unit of the stretched clock.
-    max_input : Fraction or None
-        A proved peak of every ``|u_k|`` of at most so much, in units of the input.
-
-    References
-    ----------
-    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances, say which behaviour follows.
-
-    Examples
-    --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
-    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
-    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
-    refuted: rate >= 5 (none exceeds 4, proved); certified; met: bipartite consensus
-    """
-
-    behaviour: str | None = None
-    min_rate: Fraction | None = None
-    max_input: Fraction | None = None
-
-
-@dataclass(frozen=True)
-class Request:
-    """What was asked of :func:`ptcc_certify.certify`, beside graph, protocol and initial state.
-
-    Attributes
-    ----------
-    method : str
-        Which Lyapunov functions are searched.
-    at : Fraction or None
-        Instant for which the bound was optimised, in units of time.
-    starts : Starts or None
-        The set of starts for which the input is bounded; None: that of the initial state alone.
-    limits : tuple of Limits
-        Limits of the gain that are judged besides.
-    delta : Fraction or None
-        Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
-    noise : Fraction or None
-        Nominal protocol: bound of the measurement noise that is judged under each of the limits.
-    time_limit : float
-        Seconds that the searches were given, infinity for no limit.
-    expectations : Expectations
-        What is asked besides; what became of it is part of ``assessment``.
-    """
-
-    method: str = "best"
-    at: Fraction | None = None
-    starts: Starts | None = None
-    limits: tuple[Limits, ...] = ()
-    delta: Fraction | None = None
-    noise: Fraction | None = None
-    time_limit: float = math.inf
-    expectations: Expectations = field(default_factory=Expectations)
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,10 @@ from ptcc_certify.bounds.enclosed_state import rounding_radius
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import Outcome
 from ptcc_certify.bounds.input import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
-from ptcc_certify.certificate.content import Content, Expectations, Observations, Request, Source
+from ptcc_certify.certificate.content import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import (
     Interval,
     Reader,

@@ -8,7 +8,7 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -21,28 +21,23 @@ from lmi.apart import apart
 from lmi.deadline import share_of_time
 from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
-from lmi.exact.enclosure import decay_integrals_below
 from ptcc_certify.bounds.enclosed_state import NotEnclosedError, enclose, enclosed_outcome
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import Influence, Outcome, exact_start, influence, outcome
-from ptcc_certify.bounds.input import Limits, Starts, starts_within
+from ptcc_certify.bounds.final_state import Influence, Outcome, influence, outcome
+from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.content import Expectations, Observations, Request
+from ptcc_certify.certificate.content import Observations
+from ptcc_certify.certificate.request import Expectations, Request, initial_state, read_request, refuse, sliding_start
 from ptcc_certify.certificate.verdict import MANY_DECADES
-from ptcc_certify.checker import REACHING_BITS
-from ptcc_certify.checker.reading import MAX_SCALE_BITS
-from ptcc_certify.errors import HypothesisError, NumberError, ParameterError, SimulationError
+from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_bound import RateLimit, mean_limit, prove_rate_limit
-from ptcc_certify.lyapunov.search import APART_NODES, METHODS, Sharpening, sharpen, sharpen_large
+from ptcc_certify.lyapunov.search import APART_NODES, Sharpening, sharpen, sharpen_large
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.gain import parameter
 from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
-from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.simulation.run import PAST, simulate
@@ -70,10 +65,6 @@ SEARCH_NODES = 150
 SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
 #: A simulated end state is settled when it is this near to the outcome, relative to the start.
 SETTLED = 1e-6
-#: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
-LARGEST_STATE = Fraction(10**300)
-#: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
-LONGEST_BITS = 470_000
 
 
 def certify(
@@ -168,23 +159,12 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.outcome
     Outcome(1=-1.5, 2=1.5)
     """
-    _refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
-    instant = None if at is None else _instant(at, protocol)
+    asked = {"method": method, "at": at, "starts": starts, "limits": limits, "delta": delta, "noise": noise}
+    refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
-    request = Request(
-        method=method,
-        at=instant,
-        starts=_starts(structure, starts),
-        noise=None if noise is None else parameter("noise", noise),
-        delta=None if delta is None else parameter("delta", delta),
-        limits=tuple(_limits(entry, protocol) for entry in limits),
-        time_limit=60 + graph.n_nodes / 1000 if time_limit is None else time_limit,
-        expectations=expectations or Expectations(),
-    )
-    start = None if x0 is None else _start(structure, x0, "x0")
-    manifold, reaching = _reaching(structure, protocol, sigma0)
-    if not request.time_limit > 0:
-        raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
+    request = read_request(structure, protocol, {**asked, "time_limit": time_limit, "expectations": expectations})
+    start = None if x0 is None else initial_state(structure, x0, "x0")
+    manifold, reaching = sliding_start(structure, protocol, sigma0)
     case = Case(structure, protocol, request, start, manifold, progress)
     runs = case.simulated(simulation) and start is not None
     if not runs and disturbance is not None and isinstance(protocol, SlidingModeProtocol):
@@ -344,127 +324,6 @@ class Case:
         return matrix, result
 
 
-# ---------------------------------------------------------------------- what is asked
-
-
-def _refuse(
-    graph: SignedDigraph, protocol: Protocol, method: str, sliding: Mapping[str, Any], nominal: Sequence[Any]
-) -> None:
-    """Refuse what does not fit together."""
-    if not protocol.prescribed:
-        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-    for name, value in sliding.items():
-        if value is not None and not isinstance(protocol, SlidingModeProtocol):
-            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
-    if method not in METHODS:
-        raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
-    if isinstance(protocol, SlidingModeProtocol) and any(value is not None for value in nominal):
-        raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
-    _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
-
-
-def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
-    """Return limits of the gain, or refuse them."""
-    actuator = Actuator(entry.gain_cap, entry.stop_before, entry.sample_period)
-    if actuator.ideal:
-        raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
-    limits = Limits(actuator.gain_cap, actuator.stop_before, actuator.sample_period)
-    T = protocol.T
-    if limits.stop_before is not None and limits.stop_before >= T:
-        raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
-    if limits.sample_period is not None and limits.sample_period > T:
-        raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
-    return limits
-
-
-def _starts(structure: Structure, starts: Any) -> Starts | None:
-    """Return a set of starts, or refuse it."""
-    if starts is None:
-        return None
-    if not isinstance(starts, Starts):
-        return starts_within(structure, starts)
-    n = structure.graph.n_nodes
-    for name, vector in (("center", starts.center), ("radius", starts.radius or starts.center)):
-        if len(vector) != n:
-            raise ParameterError(f"{name} of the starts has {len(vector)} entries for {n} agents")
-    if any(len(axis) != n for axis in starts.axes):
-        raise ParameterError(f"an axis of the starts has another number of entries than {n} agents")
-    if starts.radius and starts.axes:
-        raise ParameterError("starts have a radius, for a box, or axes, for an ellipsoid; leave one out")
-    if any(r < 0 for r in starts.radius):
-        raise ParameterError("a radius of the starts is negative")
-    numbers = [x for vector in (starts.center, starts.radius, *starts.axes) for x in vector]
-    if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
-        raise ParameterError("the starts are beyond 1e300, or have too many digits to keep")
-    return starts
-
-
-def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
-    """Return the weights that may be long, each once."""
-    table, _ = graph.weight_table()
-    if table is None:
-        return (graph.exact_weight(i) for i in range(graph.n_edges))
-    return map(Fraction, np.unique(table).tolist()) if table.dtype.kind == "f" else ()
-
-
-def _bits(value: Fraction) -> int:
-    return value.numerator.bit_length() + value.denominator.bit_length()
-
-
-def _longest_edge(graph: SignedDigraph) -> str:
-    edge = max(range(graph.n_edges), key=lambda i: _bits(graph.exact_weight(i)))
-    ends = (graph.labels[int(part[edge])] for part in (graph.source, graph.target))
-    return " -> ".join(map(shorten, ends))
-
-
-def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[[], str]) -> None:
-    """Refuse numbers of ``n`` agents whose exact arithmetic would take long: judged over a common denominator.
-
-    Large graphs are proved row by row, in short numbers: only what their check refuses is refused.
-    """
-    most = int(LONGEST_BITS / n**1.25) if n <= EXACT_NODES else MAX_SCALE_BITS
-    common, longest = 1, 0
-    for value in values:
-        common = math.lcm(common, value.denominator)
-        longest = max(longest, value.numerator.bit_length() - value.denominator.bit_length())
-        if common.bit_length() + longest > most:
-            raise ParameterError(
-                f"{what} take more than {most:,} bits over a common denominator, too many for exact proofs of {n:,} "
-                f"agents (the longest is that of {where()}); round them, to 17 digits say"
-            )
-
-
-def _start(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
-    start = tuple(exact_start(structure, values, name))
-    for label, value in zip(structure.graph.labels, start, strict=True):
-        if abs(value) > LARGEST_STATE:
-            raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
-        if not writable(value):
-            raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
-    longest = max(zip(structure.graph.labels, start, strict=True), key=lambda entry: _bits(entry[1]))[0]
-    _refuse_long(start, len(start), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
-    return start
-
-
-def _reaching(
-    structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
-) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
-    """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
-    if not isinstance(protocol, SlidingModeProtocol):
-        return None, None
-    start = (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else _start(structure, sigma0, "sigma0")
-    times = certified_reaching_times(protocol, start)
-    # Whatever the check could not confirm is not claimed.
-    asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
-    pole = protocol.mu3 * protocol.kappa
-    known = decay_integrals_below(protocol.T_r, protocol.mu2, pole, asked, REACHING_BITS)
-    push = protocol.mu1 - protocol.delta
-    return start, tuple(
-        r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
-        for r, s in zip(times, start, strict=True)
-    )
-
-
 def _search_and_prove(
     structure: Structure, theorem: Theorem, notes: list[str]
 ) -> tuple[LyapunovFunction | None, RateProof, float | None]:
@@ -504,36 +363,17 @@ def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
     return [theorem.lyapunov(structure)]
 
 
-def _instant(at: Any, protocol: Protocol) -> Fraction:
-    """Read an instant before the deadline."""
-    try:
-        instant = as_fraction(at, "at")
-    except NumberError as error:
-        raise ParameterError(f"at: {error}") from None
-    if not 0 <= instant < protocol.T:
-        raise ParameterError(
-            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}"
-        )
-    return instant
-
-
 def _sharpen(
     structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
 ) -> Sharpening:
     """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
-    n, gain = structure.graph.n_nodes, protocol.gain
+    gain = protocol.gain
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
-    if n > EXACT_NODES:
-        if method not in ("perron", "lmi", "best"):
-            notes.append(f"above {EXACT_NODES} nodes only the classes perron and lmi are proved; the graph has {n}")
-            return Sharpening()
-        if at is not None:
-            clocks.append(float(gain.clock_at_remaining(float(1 - at / protocol.T))))
-        found = sharpen_large(structure, method, clocks)
-        notes.extend(found.notes)
-        return found
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
-    found = sharpen(ErrorSystem(structure), method, clocks, own)
+    if structure.graph.n_nodes <= EXACT_NODES:
+        found = sharpen(ErrorSystem(structure), method, clocks, own)
+    else:
+        found = sharpen_large(structure, method, clocks if own is None else [*clocks, own])
     notes.extend(found.notes)
     return found
 

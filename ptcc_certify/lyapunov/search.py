@@ -198,6 +198,10 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
     clocks : sequence of float
         See :func:`sharpen`.
     """
+    if method not in (*DIAGONAL, "best"):
+        n = structure.graph.n_nodes
+        note = f"above {EXACT_NODES} nodes only the classes perron and lmi are proved; the graph has {n}"
+        return Sharpening(notes=(note,))
     members: dict[Candidate, LyapunovFunction] = {}
     notes: list[str] = []
     tried: dict[str, float] = {}

@@ -27,9 +27,9 @@ from lmi.exact.rounding import float_up
 from ptcc_certify.batch import certify_many
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.content import Expectations
 from ptcc_certify.certificate.format_graph import structure_document
 from ptcc_certify.certificate.procedure import SEARCH_NODES, certify
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.vectors import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, check, digest, read
 from ptcc_certify.errors import FormatError, ParameterError
