@@ -15,7 +15,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import Example, load_graph, select
 
 

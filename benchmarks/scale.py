@@ -30,7 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 
 REAL = ("wiki-elec.txt.gz", "soc-sign-bitcoinotc.csv.gz", "soc-sign-epinions.txt.gz")

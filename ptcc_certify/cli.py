@@ -163,7 +163,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **read: Any) -> int:
     expected = _behaviour(expect)
     structure = analyse(_read(graph, **read))
     if as_json:
-        from ptcc_certify.certificate.document import structure_document
+        from ptcc_certify.certificate.format_graph import structure_document
 
         _print_json(structure_document(structure))
     else:
@@ -206,9 +206,9 @@ def certify(
     **options: Any,
 ) -> int:
     """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
-    from ptcc_certify.certificate.certificate import STEPS
-    from ptcc_certify.certificate.certificate import certify as run
-    from ptcc_certify.certificate.verdict import Expectations
+    from ptcc_certify.certificate.procedure import STEPS
+    from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.request import Expectations
     from ptcc_certify.report.screen import certificate_lines
 
     instant, bound = _number(at, "--at"), _number(initial_bound, "--initial-bound")
@@ -290,7 +290,7 @@ def _same_graph(
     certificate: str, document: dict[str, Any], report: CheckReport, graph: str, read: dict[str, Any]
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
-    from ptcc_certify.certificate.saved import certificate_graph
+    from ptcc_certify.certificate.format_graph import certificate_graph
     from ptcc_certify.graphs.difference import difference
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
@@ -322,7 +322,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
     certificate the page tells the reason and no claim.
     """
-    from ptcc_certify.certificate.saved import RejectedCertificate
+    from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.report import write_report
 
     try:
@@ -484,8 +484,9 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
     """
     from lmi.exact.rounding import down
-    from ptcc_certify.certificate.certificate import certify as run
-    from ptcc_certify.certificate.verdict import Expectations, worst_code
+    from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.request import Expectations
+    from ptcc_certify.certificate.verdict import worst_code
     from ptcc_certify.examples import load_graph, select
     from ptcc_certify.report.paper_figures import Run, paper_figures, results_csv
 

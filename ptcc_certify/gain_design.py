@@ -48,9 +48,11 @@ import numpy as np
 from lmi.exact.enclosure import rounded, sqrt
 from lmi.exact.rounding import down, float_up, up
 from ptcc_certify.bounds.input import Limits, Starts, WorstStart, starts_within, worst_start
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_bounds import BITS, InputBounds, Linear, PrescribedGain
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
@@ -84,7 +86,7 @@ class TradeOff(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Design:
+class Design(Shown):
     """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
 
     Attributes
@@ -309,11 +311,6 @@ class Design:
             "shortest_possible": text(self.shortest_possible),
             "ratio": self.ratio,
         }
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import design_html
-
-        return design_html(self)
 
     def __repr__(self) -> str:
         if self.protocol is None or self.peak is None:
@@ -578,7 +575,7 @@ def _options(
         options.append(Option(_decimal(Fraction(a) * k), k, None, Fraction(product) * least * top))
     if residual is not None:
         for i in members:
-            bound = base.envelope.members[i].distance
+            bound = base.functions[i].deviation
             if bound is None:
                 continue
             left = max(map(_log, bound.agents)) / 2 + _log(bounds.start(i)) - _log(residual)
@@ -660,7 +657,7 @@ def _at(base: Certificate, bounds: InputBounds, option: Option, T: Fraction, inp
     else:
         cap = _decimal(option.clock / T, up=True)
         protocol, limits = NominalProtocol(T, cap, option.k, 1), (Limits(gain_cap=cap),)
-    return _fit_of(replace(base, protocol=protocol, limits=limits), bounds, input_norm)
+    return _fit_of(base.changed(protocol=protocol, limits=limits), bounds, input_norm)
 
 
 def _fit_of(cert: Certificate, bounds: InputBounds, input_norm: int | None) -> Fit:

@@ -56,8 +56,9 @@ import numpy as np
 
 from lmi.exact.rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, Start
-from ptcc_certify.certificate.certificate import Certificate, certify
-from ptcc_certify.certificate.verdict import Expectations
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
@@ -216,7 +217,7 @@ def _columns(certificate: Certificate) -> Row:
         "rate": _down(rate),
         "upper_bound": _up(certificate.upper_bound),
         "optimality_ratio": certificate.optimality_ratio,
-        "fastest": None if rate is None else certificate.fastest[2],
+        "fastest": None if rate is None else certificate.fastest.kind,
         "prefactor": _up(certificate.prefactor),
         "paper_rate": _down(certificate.proof.rate),
         "diagonal_rate": _down(certificate.diagonal_rate),

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -26,6 +25,7 @@ from lmi.exact.enclosure import rounded
 from lmi.exact.fast import floats, unit_diagonal
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import DistanceBound, LyapunovFunction
 
 #: Bits of the constants that are kept.
 KEPT_BITS = 40
@@ -37,48 +37,6 @@ LEAST = 2.0**-900
 RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
 
 Integers = list[list[int]]
-
-
-@dataclass(frozen=True)
-class DistanceBound:
-    """``|x_k - (Q x)_k|^2 <= agents[k] V`` and ``||x - Q x||^2 <= norm V``; the check proves it.
-
-    Attributes
-    ----------
-    agents : tuple of N Fraction
-    norm : Fraction
-    """
-
-    agents: tuple[Fraction, ...]
-    norm: Fraction
-
-    @cached_property
-    def roots(self) -> np.ndarray:
-        """``sqrt(agents)`` (N,), rounded up."""
-        return np.array([root_above(c) for c in self.agents])
-
-    @cached_property
-    def norm_root(self) -> float:
-        """``sqrt(norm)``, rounded up."""
-        return root_above(self.norm)
-
-
-def root_above(value: Fraction) -> float:
-    """Return a float that is not below the square root of a nonnegative rational of any size.
-
-    Examples
-    --------
-    >>> root_above(Fraction(10) ** 500) >= 1e250, root_above(Fraction(0))
-    (True, 0.0)
-    """
-    if value == 0:
-        return 0.0
-    shift = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
-    root = math.sqrt(float(value * Fraction(4) ** -shift)) * (1 + 1e-15)
-    try:
-        return math.nextafter(math.ldexp(root, shift), math.inf)
-    except OverflowError:
-        return math.inf
 
 
 class OutcomeGeometry:
@@ -94,24 +52,9 @@ class OutcomeGeometry:
     def __init__(self, structure: Structure, influence: Influence):
         self._structure, self._influence = structure, influence
 
-    def bound(
-        self,
-        coordinates: str,
-        nodes: Sequence[int],
-        diagonal: Sequence[Fraction] | None,
-        matrix: Sequence[Sequence[Fraction]] | None,
-    ) -> DistanceBound | None:
-        """Return the constants of ``V = z' P z``, or None where ``V`` is not seen to be definite.
-
-        Parameters
-        ----------
-        coordinates : {"E", "eps"}
-        nodes : sequence of int
-            The rows of ``z``.
-        diagonal, matrix
-            ``P``, one of both.
-        """
-        F, scale = self._error_form(nodes, diagonal, matrix) if coordinates == "E" else self._mean_form(diagonal or ())
+    def bound(self, V: LyapunovFunction) -> DistanceBound | None:
+        """Return the constants of ``V``, or None where it is not seen to be definite."""
+        F, scale = self._error_form(V) if V.coordinates == "E" else self._mean_form(V.weights)
         D, common = self._deviation
         unit, found = scale / common**2, _constants(F, D)
         if found is None:
@@ -148,22 +91,17 @@ class OutcomeGeometry:
         whole = ({j: int(x * scale) for j, x in row.items()} for row in parts)
         return [[row.get(j, 0) for j in self._kept] for row in whole], scale
 
-    def _error_form(
-        self,
-        nodes: Sequence[int],
-        diagonal: Sequence[Fraction] | None,
-        matrix: Sequence[Sequence[Fraction]] | None,
-    ) -> tuple[Integers, Fraction]:
+    def _error_form(self, V: LyapunovFunction) -> tuple[Integers, Fraction]:
         """Return ``L'P L`` times a scale on ``kept``, and the scale."""
         import flint
 
         L, unit = self._laplacian
-        rows = flint.fmpz_mat([L[v] for v in nodes])
-        if diagonal is not None:
-            (weights,), scale = _over_one_scale([diagonal])
-            moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(nodes, weights, strict=True)])
+        rows = flint.fmpz_mat([L[v] for v in V.nodes])
+        if V.matrix is None:
+            (weights,), scale = _over_one_scale([V.weights])
+            moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(V.nodes, weights, strict=True)])
         else:
-            P, scale = _over_one_scale(matrix or ())
+            P, scale = _over_one_scale(V.matrix)
             moved = flint.fmpz_mat(P) * rows
         return _rows(rows.transpose() * moved), Fraction(scale * unit**2)
 

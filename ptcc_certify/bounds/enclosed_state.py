@@ -12,7 +12,6 @@ forms them exactly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -20,7 +19,7 @@ import numpy as np
 
 from lmi.errors import LMIError
 from lmi.iterative import SparseHMatrix, solve
-from ptcc_certify.bounds.final_state import Influence, Outcome, follower_state
+from ptcc_certify.bounds.final_state import Enclosure, Influence, Outcome, follower_state
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 
 #: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
@@ -32,82 +31,52 @@ _MORE, _ULP = 1 + 1e-6, 2.0**-52
 #: Starts below this size leave no room for radii in float64, and are taken in another unit.
 _SMALLEST = Fraction(1, 10**290)
 
-Interval = tuple[Fraction, Fraction]
-
 
 class NotEnclosedError(ArithmeticError):
     """No interval was found; the message tells why."""
 
 
-@dataclass(frozen=True, eq=False)
-class EnclosedOutcome:
-    """The final state in intervals, and what proves them.
-
-    Attributes
-    ----------
-    middle, radius : (N,) arrays, or None without a start
-        In units of ``unit``. What is exact has radius 0 or the rounding of its float.
-    unit : Fraction
-        1, or a power of 2 for tiny starts.
-    exact : mapping of node to Fraction
-        The ends that are known exactly.
-    degenerate : tuple of int, or None without a start
-        1-based numbers of the balanced closed components that meet at 0.
-    voices : mapping of k to (middle, radius)
-        Of those of ``Influence.balanced`` whose voices are not rational.
-    witness : (N,) array
-        ``u``; 1 for leaders, but for those of ``voices``.
-    """
-
-    middle: np.ndarray | None
-    radius: np.ndarray | None
-    unit: Fraction
-    exact: dict[int, Fraction]
-    degenerate: tuple[int, ...] | None
-    voices: dict[int, tuple[np.ndarray, np.ndarray]]
-    witness: np.ndarray
-
-    def outcome(self, found: Outcome) -> Outcome:
-        """Return an outcome in floats with what is proved in its place: exact ends, middles, degenerate groups."""
-        if self.middle is None or self.degenerate is None:
-            return found
-        final: list[Fraction | float] = self.middle.tolist()
-        if self.unit != 1:  # floats may not hold the product
-            final = [Fraction(x) * self.unit for x in final]
-        for v, x in self.exact.items():
-            final[v] = x
-        values = [final[c.nodes[0]] * sign for c in found.influence.balanced for sign in [(c.gauge or (1,))[0]]]
-        return replace(found, final_state=tuple(final), consensus_values=tuple(values), degenerate=self.degenerate)
-
-
-def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction] | None) -> EnclosedOutcome:
-    """Enclose ``Q start``.
+def enclose(structure: Structure, influence: Influence) -> Enclosure:
+    """Enclose the voices of ``Q``, and find the witness of all intervals.
 
     Raises
     ------
     NotEnclosedError
-        The equations of followers or voices are too ill-conditioned for floats, or a consensus value may be 0.
-
-    Examples
-    --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.bounds.final_state import influence
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
-    >>> found = enclose(st, influence(st, exact=False), [Fraction(1), Fraction(0), Fraction(1)])
-    >>> bool(abs(found.middle[1] + 1 / 3) <= found.radius[1] < 1e-9)  # the follower c ends at -1/3
-    True
+        The equations of followers or voices are too ill-conditioned for floats.
     """
-    n, F = structure.graph.n_nodes, structure.followers
-    u = np.ones(n)
+    F = structure.followers
+    u = np.ones(structure.graph.n_nodes)
     if F.size:
         u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
     voices = {}
     for k, (component, voice) in enumerate(zip(influence.balanced, influence.voices, strict=True)):
         if not all(isinstance(w, Fraction | int) for w in voice):
             voices[k] = _enclosed_voices(structure, component, np.array(voice, dtype=float), u)
-    if start is None:
-        return EnclosedOutcome(None, None, Fraction(1), {}, None, voices, u)
+    return Enclosure(voices, u)
+
+
+def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence[Fraction]) -> Outcome:
+    """Enclose ``Q start``, what is known of ``Q`` being enclosed.
+
+    Raises
+    ------
+    NotEnclosedError
+        The followers' equations are too ill-conditioned for floats, or a consensus value may be 0.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.bounds.final_state import influence
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
+    >>> who = influence(st, exact=False)
+    >>> found = enclosed_outcome(st, replace(who, enclosure=enclose(st, who)), [Fraction(1), Fraction(0), Fraction(1)])
+    >>> bool(abs(Fraction(found.final_state[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
+    True
+    """
+    assert influence.enclosure is not None
+    n, voices, u = structure.graph.n_nodes, influence.enclosure.voices, influence.enclosure.witness
     size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
     unit = Fraction(1)
     if 0 < size < _SMALLEST:
@@ -130,13 +99,30 @@ def enclose(structure: Structure, influence: Influence, start: Sequence[Fraction
         known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
         degenerate += [number] if known == 0 else []
         exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
-        middle[nodes] = signs * float(known)
-        radius[nodes] = 0.0 if Fraction(float(known)) == known else _spacing(float(known))
+        middle[nodes], radius[nodes] = signs * float(known), rounding_radius(known)
     exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
-    if F.size and middle.any():
-        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, u)
-    exact = {v: x * unit for v, x in exact.items()} if unit != 1 else exact
-    return EnclosedOutcome(middle, radius, unit, exact, tuple(degenerate), voices, u)
+    if structure.followers.size and middle.any():
+        middle[structure.followers], radius[structure.followers] = _enclosed_followers(
+            structure, exact, middle, radius, u
+        )
+    final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
+    spreads = [Fraction(r) * unit for r in radius.tolist()]
+    for v, x in exact.items():
+        final[v], spreads[v] = x * unit, Fraction(0)
+    values = [final[c.nodes[0]] * (c.gauge or (1,))[0] for c in influence.balanced]
+    return Outcome(structure.graph.labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
+
+
+def rounding_radius(value: Fraction) -> float:
+    """Bound how far the nearest float, or its decimal text, is from a rational.
+
+    Examples
+    --------
+    >>> rounding_radius(Fraction(1, 2)), 0 < rounding_radius(Fraction(1, 3)) < 1e-15
+    (0.0, True)
+    """
+    near = float(value)
+    return 0.0 if Fraction(near) == value else float(_spacing(near))
 
 
 def _spacing(x: float | np.ndarray) -> Any:

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.bounds.deviation import DistanceBound
+from lmi.exact.rounding import float_up
 from ptcc_certify.bounds.final_state import Influence, exact_start, influence
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.search import SharpMember
+from ptcc_certify.lyapunov.function import DistanceBound, LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.theorems import LyapunovFunction
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
@@ -31,31 +30,6 @@ FRACTIONS = (0.5, 0.9, 0.99)
 LAST_INSTANTS = (1e-6, 1e-9)
 #: The integrator's error is taken to be below this multiple of its tolerance times the size of the state.
 FLOOR_FACTOR = 1000.0
-
-
-def float_above(value: Fraction) -> float:
-    """Return a float that is not below ``value``; infinity where it is beyond float64.
-
-    Examples
-    --------
-    >>> float_above(Fraction(1, 3)) >= Fraction(1, 3), float_above(Fraction(10) ** 400)
-    (True, inf)
-    """
-    try:
-        return math.nextafter(float(value), math.inf)
-    except OverflowError:
-        return math.inf
-
-
-def float_below(value: Fraction | float) -> float:
-    """Return a float that is not above ``value``.
-
-    Examples
-    --------
-    >>> float_below(Fraction(1, 3)) <= Fraction(1, 3), float_below(Fraction(-1, 3)) <= Fraction(-1, 3)
-    (True, True)
-    """
-    return math.nextafter(float(value), -math.inf)
 
 
 def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
@@ -105,120 +79,6 @@ def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
     if outside.size:
         raise ParameterError(f"{name} = {outside.flat[0]:.12g} is outside its domain; {domain}")
     return array
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """One bound of an envelope: ``V <= e^(-rate s) V(0)`` for ``V = z' P z``.
-
-    Attributes
-    ----------
-    kind : str
-        Class of the certificate: ``paper``, ``perron``, ``lmi``, ``full``.
-    coordinates : {"E", "eps"}
-        See :class:`ptcc_certify.theorems.LyapunovFunction`.
-    nodes : (n,) int array
-    weights : (n,) array or (n, n) array
-        ``P``, its diagonal if it is diagonal.
-    gauge : (N,) array or None
-        Camps, for the coordinates ``eps``.
-    rate : float
-        Not above the proved rate.
-    prefactor : float
-        Not below the proved prefactor; it multiplies the squared norm.
-    lowest : float
-        Not above the smallest eigenvalue of ``P``.
-    distance : DistanceBound or None
-        Constants from ``V`` to the distance of each agent to its outcome.
-    exact_weights : tuple of Fraction
-        The diagonal as it was proved, for the coordinates ``eps``, whose mean it defines.
-    """
-
-    kind: str
-    coordinates: str
-    nodes: np.ndarray
-    weights: np.ndarray
-    gauge: np.ndarray | None
-    rate: float
-    prefactor: float
-    lowest: float
-    distance: DistanceBound | None = None
-    exact_weights: tuple[Fraction, ...] = ()
-
-    @classmethod
-    def of(cls, structure: Structure, V: LyapunovFunction, rate: Fraction | float, **more: Any) -> Member:
-        """Build the member of a paper row with a given rate, rounded to the safe side."""
-        weights = np.array([float(w) for w in V.weights])
-        return cls(
-            "paper",
-            V.coordinates,
-            np.array(V.nodes, dtype=np.int64),
-            weights,
-            structure.gauge,
-            float_below(rate),
-            float_above(V.prefactor),
-            math.nextafter(float(weights.min(initial=np.inf)), 0.0),
-            exact_weights=V.weights,
-            **more,
-        )
-
-    @classmethod
-    def of_sharp(cls, member: SharpMember, **more: Any) -> Member:
-        """Build the member of a sharper Lyapunov function, rounded to the safe side."""
-        if member.dominance is not None:
-            weights = member.dominance.weights
-        elif member.diagonal is not None:
-            weights = np.array([float(w) for w in member.diagonal])
-        else:
-            weights = np.array([[float(x) for x in row] for row in member.matrix or ()])
-        return cls(
-            member.kind,
-            "E",
-            np.array(member.nodes, dtype=np.int64),
-            weights,
-            None,
-            float_below(member.rate),
-            float_above(member.prefactor),
-            float_below(member.lowest),
-            **more,
-        )
-
-    @cached_property
-    def root(self) -> np.ndarray:
-        """``R`` with ``P = R'R``: the square root of the weights, or the Cholesky factor of a full ``P``."""
-        return np.sqrt(self.weights) if self.weights.ndim == 1 else np.linalg.cholesky(self.weights).T
-
-    def coordinates_of(self, states: np.ndarray, L: object) -> np.ndarray:
-        """Return ``z`` for states of shape (N, ...): rows of ``-L X``, or the weighted deviation of ``X``."""
-        if self.coordinates == "E":
-            flat = states.reshape(len(states), -1)
-            return -np.asarray(L @ flat).reshape(states.shape)[self.nodes]  # type: ignore[operator]
-        assert self.gauge is not None
-        X, g = states[self.nodes], self.gauge[self.nodes].astype(float)
-        share = self.weights / self.weights.sum()
-        mean = np.tensordot(share * g, X, axes=1)
-        return X - np.multiply.outer(g, mean)
-
-    def exact_coordinates_of(self, x: Sequence[Fraction], error: Sequence[Fraction]) -> list[Fraction]:
-        """Return ``z`` of one state in rationals; ``error`` is its ``-L x``."""
-        if self.coordinates == "E":
-            return [error[v] for v in self.nodes.tolist()]
-        assert self.gauge is not None
-        signs = [int(self.gauge[v]) for v in self.nodes.tolist()]
-        own = [x[v] for v in self.nodes.tolist()]
-        weighted = sum((w * g * y for w, g, y in zip(self.exact_weights, signs, own, strict=True)), Fraction(0))
-        mean = weighted / sum(self.exact_weights)
-        return [y - g * mean for y, g in zip(own, signs, strict=True)]
-
-    def scaled(self, z: np.ndarray) -> np.ndarray:
-        """Return ``R z``, whose Euclidean norm is ``sqrt(V)``, for coordinates of shape (n, ...)."""
-        if self.root.ndim == 1:
-            return self.root.reshape(-1, *([1] * (z.ndim - 1))) * z
-        return np.tensordot(self.root, z, axes=1)
-
-    def value(self, z: np.ndarray) -> np.ndarray:
-        """Return ``V`` for coordinates of shape (n, ...)."""
-        return (self.scaled(z) ** 2).sum(axis=0)
 
 
 @dataclass(frozen=True)
@@ -304,7 +164,7 @@ class Envelope:
     ----------
     structure : Structure
     gain : Gain
-    members : tuple of Member
+    members : tuple of LyapunovFunction
 
     References
     ----------
@@ -326,7 +186,7 @@ class Envelope:
 
     structure: Structure
     gain: Gain
-    members: tuple[Member, ...]
+    members: tuple[LyapunovFunction, ...]
 
     @cached_property
     def _laplacian(self) -> object:
@@ -338,7 +198,7 @@ class Envelope:
         return "eps" if all(m.coordinates == "eps" for m in self.members) and self.members else "E"
 
     @property
-    def _in_norm(self) -> list[Member]:
+    def _in_norm(self) -> list[LyapunovFunction]:
         return [m for m in self.members if m.coordinates == self.coordinates]
 
     def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
@@ -360,7 +220,7 @@ class Envelope:
             A value is negative or not a number.
         """
         clock = clock_values(clock)
-        factors = [_grown(math.sqrt(m.prefactor), m.rate, clock) for m in self._in_norm]
+        factors = [_grown(math.sqrt(m.prefactor_above), m.rate_below, clock) for m in self._in_norm]
         return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
@@ -409,7 +269,7 @@ class Envelope:
             A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
         """
         clock, x0 = clock_values(clock), exact_start(self.structure, x0)
-        bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest), m.rate, clock) for m in self._in_norm]
+        bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest_below), m.rate_below, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
@@ -480,10 +340,10 @@ class Envelope:
         clock, x0 = clock_values(clock), exact_start(self.structure, x0)
         bounds = []
         for m in self.members:
-            if m.distance is not None:
+            if m.deviation is not None:
                 with np.errstate(over="ignore", invalid="ignore"):
-                    size = np.nan_to_num(constants(m.distance) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
-                bounds.append(_grown(size, m.rate, clock))
+                    size = np.nan_to_num(constants(m.deviation) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
+                bounds.append(_grown(size, m.rate_below, clock))
         if bounds:
             most = self._largest_deviation(x0)
             if len(bounds[0]) < len(x0):  # of the norm, which has N such entries
@@ -504,7 +364,7 @@ class Envelope:
         """Return ``max_k |x_k(0) - (Q x0)_k|``, rounded up."""
         start = [as_exact(x) for x in x0]
         final, _ = self._influence.apply(start)
-        return float_above(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
+        return float_up(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
 
     @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
@@ -522,14 +382,14 @@ class Envelope:
             self._errors[key] = [-sum((w * key[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
         return self._errors[key]
 
-    def _start(self, member: Member, x0: Sequence[Fraction]) -> float:
+    def _start(self, member: LyapunovFunction, x0: Sequence[Fraction]) -> float:
         """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
         z = member.exact_coordinates_of(x0, self._exact_error(x0))
         top = max(map(abs, z), default=Fraction(0))
         if top == 0:
             return 0.0
         relative = np.array([float(x / top) for x in z])
-        return float(np.sqrt(member.value(relative))) * (1 + 1e-12) * float_above(top)
+        return float(np.sqrt(member.value(relative))) * (1 + 1e-12) * float_up(top)
 
     def _unit(self, x0: np.ndarray) -> float:
         """Return the size of the start, in which squares neither overflow nor vanish."""
@@ -604,7 +464,7 @@ class Envelope:
 
         Before the deadline only: the bound is 0 from there on, and whether the run has arrived is told elsewhere.
         """
-        if not any(m.distance is not None for m in self.members) or trajectory.t[0] != 0:
+        if not any(m.deviation is not None for m in self.members) or trajectory.t[0] != 0:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
@@ -629,12 +489,12 @@ class Envelope:
         bounds = np.vstack([self.distance(trajectory.clock, own), self.distance_norm(trajectory.clock, own)])
         return bounds, start
 
-    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+    def histories(self, member: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start.
 
         Parameters
         ----------
-        member : Member
+        member : LyapunovFunction
             Of this envelope.
         trajectory : Trajectory
             Of the same graph and protocol.
@@ -649,7 +509,7 @@ class Envelope:
         z = member.coordinates_of(states, self._laplacian)
         unit = _sizes(z)
         root = np.sqrt(member.value(z / unit))
-        bounds = _grown(root[:, 0], member.rate, trajectory.clock - trajectory.clock[0])
+        bounds = _grown(root[:, 0], member.rate_below, trajectory.clock - trajectory.clock[0])
         return [
             History(
                 root[column],
@@ -659,13 +519,13 @@ class Envelope:
             for column in range(states.shape[1])
         ]
 
-    def _state_scale(self, member: Member, states: np.ndarray, unit: float) -> float:
+    def _state_scale(self, member: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
         size = np.abs(states).max(axis=1)
         if member.coordinates == "E":
-            size = np.asarray(abs(self._laplacian) @ size)[member.nodes]  # type: ignore[arg-type, operator]
+            size = np.asarray(abs(self._laplacian) @ size)[member.rows]  # type: ignore[arg-type, operator]
         else:
-            size = 2 * size[member.nodes]
+            size = 2 * size[member.rows]
         if member.root.ndim == 1:
             return float(np.linalg.norm(member.root * (size / unit)))
         return float(np.linalg.norm(np.abs(member.root) @ (size / unit)))

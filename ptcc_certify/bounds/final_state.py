@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,22 @@ if TYPE_CHECKING:
 Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
 MANY_PULLS = 1_000_000
-#: Largest leader group of a large graph whose voices are computed in rationals.
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """What is proved of ``Q`` in a large graph, and what proves it.
+
+    Attributes
+    ----------
+    voices : mapping of k to (middle, radius)
+        Of those of ``Influence.balanced`` whose voices are not rational.
+    witness : (N,) array
+        ``u > 0`` with ``M(L_F) u > 0``; 1 for leaders, but for those of ``voices``.
+    """
+
+    voices: dict[int, tuple[np.ndarray, np.ndarray]]
+    witness: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -53,6 +68,8 @@ class Influence:
         followers times components are more than ``MANY_PULLS``.
     exact : bool
         Whether the numbers are rationals.
+    enclosure : Enclosure or None
+        What is proved where they are not.
 
     References
     ----------
@@ -73,6 +90,7 @@ class Influence:
     voices: tuple[tuple[Number, ...], ...]
     pulls: tuple[tuple[Number, ...], ...] | None
     exact: bool
+    enclosure: Enclosure | None = field(default=None, compare=False)
 
     @cached_property
     def balanced(self) -> tuple[ClosedComponent, ...]:
@@ -234,14 +252,14 @@ class Outcome:
     labels : tuple of str
         The N agents.
     final_state : tuple of Fraction or float
-        ``Q X(0)``, exact for small graphs.
+        ``Q X(0)``, exact for small graphs, otherwise the middles of intervals.
     consensus_values : tuple
         ``c_k`` of each balanced closed component.
     degenerate : tuple of int
         1-based numbers of the closed components that meet at 0 although they are balanced: the special starts with
         ``eta' G X(0) = 0``, for which the consensus value of Definitions 3 to 5 is not positive.
-    influence : Influence
-        ``Q``, factored.
+    radius : tuple of Fraction, or None
+        Of the proved intervals, 0 where an end is exact; None if all are, or if nothing is proved.
 
     References
     ----------
@@ -263,12 +281,20 @@ class Outcome:
     final_state: tuple[Number, ...]
     consensus_values: tuple[Number, ...]
     degenerate: tuple[int, ...]
-    influence: Influence
+    radius: tuple[Fraction, ...] | None = None
 
     @property
     def exact(self) -> bool:
-        """Whether ``final_state`` is rational."""
-        return self.influence.exact
+        """Whether ``final_state`` is exact: rational, without a radius."""
+        return self.radius is None and all(isinstance(x, Fraction) for x in self.final_state)
+
+    @property
+    def intervals(self) -> tuple[tuple[Fraction, Fraction], ...] | None:
+        """Middle and radius of a proved interval for each agent; None if nothing is proved."""
+        if self.radius is None and not self.exact:
+            return None
+        radius = self.radius or (Fraction(0),) * len(self.final_state)
+        return tuple(zip((Fraction(x) for x in self.final_state), radius, strict=True))
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -327,7 +353,7 @@ def outcome(
     size = max((abs(float(x)) for x in start), default=0.0)
     meets_at_zero = [c == 0 if matrix.exact else abs(float(c)) <= 1e-12 * size for c in values]
     degenerate = tuple(k for k, zero in zip(numbers, meets_at_zero, strict=True) if zero)
-    return Outcome(structure.graph.labels, tuple(final), tuple(values), degenerate, matrix)
+    return Outcome(structure.graph.labels, tuple(final), tuple(values), degenerate)
 
 
 def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0") -> list[Fraction]:

@@ -23,19 +23,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.exact.rounding import float_up
 from ptcc_certify.bounds.envelope import (
     FLOOR_FACTOR,
     Comparison,
     Envelope,
     History,
-    Member,
     as_exact,
     clock_values,
-    float_above,
     remaining_part,
 )
 from ptcc_certify.bounds.final_state import exact_start
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime, sliding_bound
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
@@ -139,7 +139,7 @@ class SlidingEnvelope(Envelope):
             if self._usable(member):
                 v, sliding = self._bounds(member, x0, unit, z, clock)
                 with np.errstate(over="ignore"):
-                    bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest) * unit * (1 + 1e-12))
+                    bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest_below) * unit * (1 + 1e-12))
         return bound if np.ndim(remaining) else bound[0]
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
@@ -201,7 +201,7 @@ class SlidingEnvelope(Envelope):
             ratio = np.append(ratio, np.where(norm > 0, norm / (self.sliding_norm(z) / size), 0.0))
         return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
 
-    def histories(self, member: Member, trajectory: Trajectory) -> list[History]:
+    def histories(self, member: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of the start."""
         assert isinstance(trajectory, SlidingTrajectory)
         if self.direct:
@@ -228,12 +228,12 @@ class SlidingEnvelope(Envelope):
         with np.errstate(divide="ignore"):
             return -np.log(trajectory.reaching_remaining)
 
-    def _usable(self, member: Member) -> bool:
+    def _usable(self, member: LyapunovFunction) -> bool:
         """Whether a member bounds the reaching phase: one that bounds only the growth would end in infinity."""
-        return self.direct or member.rate > 0
+        return self.direct or member.rate_below > 0
 
     def _bounds(
-        self, member: Member, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+        self, member: LyapunovFunction, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
 
@@ -241,7 +241,7 @@ class SlidingEnvelope(Envelope):
         """
         own = Fraction(unit)
         y0 = [(as_exact(x) - sigma) / own for x, sigma in zip(x0, self.sigma0, strict=True)]
-        half = member.rate / 2
+        half = member.rate_below / 2
         C, B = self._drive(member)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
         size = self._sliding(knots) / unit
@@ -285,11 +285,11 @@ class SlidingEnvelope(Envelope):
         T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
         return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
-    def _drive(self, member: Member) -> tuple[np.ndarray, np.ndarray]:
+    def _drive(self, member: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
         """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
         L = self.structure.graph.laplacian()
         if member.coordinates == "E":
-            rows = L[member.nodes]
+            rows = L[member.rows]
             return np.abs(member.scaled(rows.toarray())), np.abs(member.scaled((rows @ L).toarray()))
         deviation = member.coordinates_of(np.eye(L.shape[0]), L)
         return np.abs(member.scaled(deviation)), np.abs(member.scaled(deviation @ L))
@@ -310,15 +310,15 @@ class SlidingEnvelope(Envelope):
         bounds = np.full((len(x0), z.size), 0.0 if self._still else np.inf)
         norm = bounds[0].copy()
         for member in self.members:
-            if member.distance is None or not self._usable(member):
+            if member.deviation is None or not self._usable(member):
                 continue
             v = self._bounds(member, x0, unit, z, clock)[0] * (1 + 1e-12)
             with np.errstate(invalid="ignore", over="ignore"):
-                bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.distance.roots, v), posinf=np.inf))
-                norm = np.minimum(norm, np.nan_to_num(member.distance.norm_root * v, posinf=np.inf))
+                bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.deviation.roots, v), posinf=np.inf))
+                norm = np.minimum(norm, np.nan_to_num(member.deviation.norm_root * v, posinf=np.inf))
         size = self._sliding(z) / unit
         bounds, norm = bounds + size, norm + _column_norms(size)
-        if any(m.distance is not None for m in self.members):
+        if any(m.deviation is not None for m in self.members):
             most = self._largest_deviation(x0) / unit * (1 + 1e-15)
             bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
         return bounds, norm
@@ -332,7 +332,7 @@ class SlidingEnvelope(Envelope):
         start = [as_exact(x) for x in x0]
         final, _ = self._influence.apply([x - sigma for x, sigma in zip(start, self.sigma0, strict=True)])
         gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
-        return float_above(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
+        return float_up(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
 
     def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.

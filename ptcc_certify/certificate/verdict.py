@@ -19,21 +19,18 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lmi.exact.rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.certificate.content import Content
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_bounds import PrescribedGain, Starts, root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.theorems.lemmas import EXACT_NODES
-
-if TYPE_CHECKING:
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.saved import SavedCertificate
 
 #: What became of an expectation.
 MET, REFUTED, OPEN = "met", "refuted", "left open"
@@ -45,40 +42,9 @@ _LARGEST_CLOCK = 1e12
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 
-OK, VIOLATED, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 3, 4
-
-
-@dataclass(frozen=True)
-class Expectations:
-    """What is asked of a certificate besides.
-
-    Attributes
-    ----------
-    behaviour : str or None
-        As :attr:`ptcc_certify.graphs.structure.Claim.behaviour` or one of its special cases.
-    min_rate : Fraction or None
-        A proved rate of at least so much, per unit of the stretched clock.
-    max_input : Fraction or None
-        A proved peak of every ``|u_k|`` of at most so much, in units of the input.
-
-    References
-    ----------
-    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances, say which behaviour follows.
-
-    Examples
-    --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
-    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
-    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
-    refuted: rate >= 5 (none exceeds 4, proved); certified; met: bipartite consensus
-    """
-
-    behaviour: str | None = None
-    min_rate: Fraction | None = None
-    max_input: Fraction | None = None
+CERTIFIED, UNDECIDED = "certified", "undecided"
+#: Exit codes.
+OK, VIOLATED, REFUTED_EXPECTATION, NOTHING_DECIDED = 0, 1, 3, 4
 
 
 @dataclass(frozen=True)
@@ -178,6 +144,17 @@ class Assessment:
         return "; ".join(parts)
 
 
+def verdict_of(report: CheckReport | None) -> str:
+    """Return ``certified`` if rate and outcome were proved and the independent check accepts it, else ``undecided``.
+
+    Examples
+    --------
+    >>> verdict_of(None)
+    'undecided'
+    """
+    return report.verdict if report is not None and report.accepted else UNDECIDED
+
+
 def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
     """Return the exit code: 1 violated, 3 refuted, 4 undecided or left open, 0 otherwise; the first that holds.
 
@@ -186,7 +163,7 @@ def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
     >>> exit_code(False, True, True), exit_code(False, False, False)
     (3, 0)
     """
-    return VIOLATED if violated else REFUTED_EXPECTATION if refuted else UNDECIDED if left_open else OK
+    return VIOLATED if violated else REFUTED_EXPECTATION if refuted else NOTHING_DECIDED if left_open else OK
 
 
 def worst_code(codes: Iterable[int]) -> int:
@@ -198,15 +175,17 @@ def worst_code(codes: Iterable[int]) -> int:
     (3, 0)
     """
     found = set(codes)
-    return exit_code(VIOLATED in found, REFUTED_EXPECTATION in found, UNDECIDED in found)
+    return exit_code(VIOLATED in found, REFUTED_EXPECTATION in found, NOTHING_DECIDED in found)
 
 
-def assess(certificate: Certificate | SavedCertificate) -> Assessment:
-    """Return the graded verdict of a certificate, made or read back, and of what was expected of it.
+def assess(certificate: Content, report: CheckReport | None) -> Assessment:
+    """Return the graded verdict of a certificate, and of what was expected of it.
 
     Parameters
     ----------
-    certificate : Certificate or SavedCertificate
+    certificate : Certificate
+    report : CheckReport or None
+        What the independent check says of it; None if nothing was proved.
 
     Returns
     -------
@@ -217,10 +196,10 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
     >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
-    >>> print(assess(certify(pair, weak, [3, 1], simulation=False)).text)
+    >>> print(certify(pair, weak, [3, 1], simulation=False).assessment.text)
     certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
 --rho2 0.286 (rho2 kappa 0.286) leaves 1 %
-    >>> found = assess(certify(pair, strong, [3, 1], simulation=False))
+    >>> found = certify(pair, strong, [3, 1], simulation=False).assessment
     >>> found.useful, found.exit_code
     (True, 0)
     """
@@ -230,8 +209,9 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
     answers += [] if asked.max_input is None else [judge_input(certificate, asked.max_input)]
     answers += judge_limits(certificate)
     useful, said, advice = None, "", ""
-    if certificate.verdict != "certified":
-        said = _next_step(certificate)
+    verdict = verdict_of(report)
+    if verdict != CERTIFIED:
+        said = _next_step(certificate, report)
     elif certificate.constant:
         useful, said = True, "nothing to decay"
     else:
@@ -239,7 +219,7 @@ def assess(certificate: Certificate | SavedCertificate) -> Assessment:
         useful, said, advice = (_limited_usefulness if limited else _usefulness)(certificate)
         said += "" if certificate.delta is None else ", without disturbances"
     violated = seen is not None and seen.violated
-    return Assessment(certificate.verdict, violated, useful, said, advice, tuple(answers))
+    return Assessment(verdict, violated, useful, said, advice, tuple(answers))
 
 
 # ---------------------------------------------------------------------- expectations
@@ -253,7 +233,7 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
     return Answer(REFUTED, expected, f"it is {claims[0].behaviour}" if len(claims) == 1 else "not in every component")
 
 
-def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> Answer:
+def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
     if certificate.constant or (rate is not None and rate >= least):
@@ -264,7 +244,7 @@ def judge_rate(certificate: Certificate | SavedCertificate, least: Fraction) -> 
     return Answer(OPEN, what, proved if bound is None else f"{proved}, at most {up(bound, 8)} can be")
 
 
-def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> Answer:
+def judge_input(certificate: Content, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
     effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
     if certificate.constant:
@@ -282,7 +262,7 @@ def judge_input(certificate: Certificate | SavedCertificate, most: Fraction) -> 
     return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
 
 
-def input_range(certificate: Certificate | SavedCertificate) -> tuple[Fraction | float, Fraction | None]:
+def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None]:
     """Return proved bounds of the largest ``|u_k|`` over all agents, starts, noise and disturbances asked about.
 
     Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
@@ -311,7 +291,7 @@ def input_range(certificate: Certificate | SavedCertificate) -> tuple[Fraction |
     return least, most
 
 
-def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
+def judge_limits(certificate: Content) -> list[Answer]:
     """Tell which of the limits, noise and disturbances that were asked for are not certified."""
     effort, found = certificate.effort, []
     residual = () if effort is None else effort.residual
@@ -330,7 +310,7 @@ def judge_limits(certificate: Certificate | SavedCertificate) -> list[Answer]:
 # ---------------------------------------------------------------------- use
 
 
-def _usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str, str]:
+def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return whether the bound is useful, what it says, and which gains would make it so."""
     envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
     span = p.T if direct or not isinstance(p, SlidingModeProtocol) else p.T_s
@@ -354,7 +334,7 @@ def _usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str,
     return False, said, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
 
 
-def _limited_usefulness(certificate: Certificate | SavedCertificate) -> tuple[bool, str, str]:
+def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
     effort, start, way = certificate.effort, certificate.start, certificate.longest_way
     residual = () if effort is None else effort.residual
@@ -399,9 +379,8 @@ def _useful_rho2(envelope: Envelope, fixed: float, kappa: Fraction) -> Fraction 
 # ---------------------------------------------------------------------- what to try next
 
 
-def _next_step(certificate: Certificate | SavedCertificate) -> str:
+def _next_step(certificate: Content, report: CheckReport | None) -> str:
     """Tell why nothing was decided, and what to try."""
-    report = certificate.checked
     if report is not None and not report.accepted:
         return f"the independent check rejects {report.rejected}; please report this graph"
     method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import GraphError, NumberError
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 
@@ -90,7 +91,7 @@ class Weights:
 _HASHED = 65_536
 
 
-class SignedDigraph:
+class SignedDigraph(Shown):
     """A signed digraph with exact weights.
 
     Build one with :meth:`from_edges`, :meth:`from_matrix`, :meth:`from_networkx` or
@@ -552,11 +553,6 @@ class SignedDigraph:
 
     def __hash__(self) -> int:
         return hash(self.sha256)
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import graph_html
-
-        return graph_html(self)
 
     def __repr__(self) -> str:
         negative = int((self.sign < 0).sum())

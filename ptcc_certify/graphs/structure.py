@@ -12,10 +12,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from functools import cached_property
+from importlib import import_module
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ptcc_certify.display import Shown
 from ptcc_certify.graphs.digraph import SignedDigraph
 
 STABILITY = "stability"
@@ -26,19 +29,18 @@ CONSENSUS = "consensus"
 SIGNED_AVERAGE_CONSENSUS = "signed-average consensus"
 CONTAINMENT = "containment"
 
-#: What each behaviour implies besides itself (Definitions 3 to 5: each contains the one before).
-_IMPLIES: dict[str, tuple[str, ...]] = {
-    STABILITY: (),
-    CONSENSUS: (BIPARTITE_CONSENSUS, CONTAINMENT),
-    SIGNED_AVERAGE_CONSENSUS: (BIPARTITE_CONSENSUS,),
-    BIPARTITE_CONSENSUS: (INTERVAL_BIPARTITE_CONSENSUS,),
-    INTERVAL_BIPARTITE_CONSENSUS: (BIPARTITE_CONTAINMENT,),
-    CONTAINMENT: (BIPARTITE_CONTAINMENT,),
-    BIPARTITE_CONTAINMENT: (),
-}
-BEHAVIOURS = tuple(_IMPLIES)
+BEHAVIOURS = (
+    STABILITY,
+    CONSENSUS,
+    SIGNED_AVERAGE_CONSENSUS,
+    BIPARTITE_CONSENSUS,
+    INTERVAL_BIPARTITE_CONSENSUS,
+    CONTAINMENT,
+    BIPARTITE_CONTAINMENT,
+)
 
 Edge = tuple[int, int]
+_CLAIMS = "ptcc_certify.theorems.claims"
 
 
 @dataclass(frozen=True)
@@ -75,71 +77,6 @@ class ClosedComponent:
     negative_cycle: tuple[Edge, ...] | None
 
 
-@dataclass(frozen=True)
-class Claim:
-    """What Theorems 1 to 3 say about one weakly connected graph.
-
-    Attributes
-    ----------
-    theorem : str
-        ``"1.1"`` .. ``"3.2"``.
-    behaviour : str
-        ``stability``, ``bipartite consensus``, ``interval bipartite consensus`` or ``bipartite containment``.
-    corollaries : tuple of str
-        Those whose hypotheses hold, e.g. ``("1.1", "2")``.
-    special : tuple of str
-        Sharper behaviours that the corollaries give, e.g. ``("consensus",)``.
-
-    References
-    ----------
-    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
-
-    Examples
-    --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> claim = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])).claim
-    >>> claim.theorem, claim.behaviour, claim.special
-    ('1.1', 'bipartite consensus', ('signed-average consensus', 'consensus'))
-    """
-
-    theorem: str
-    behaviour: str
-    corollaries: tuple[str, ...]
-    special: tuple[str, ...]
-
-    def holds(self, behaviour: str) -> bool:
-        """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.
-
-        Parameters
-        ----------
-        behaviour : str
-            ``stability``, ``bipartite-consensus``, ... or a special case such as ``consensus``.
-
-        Returns
-        -------
-        bool
-
-        Raises
-        ------
-        ValueError
-            No behaviour is called so.
-
-        Examples
-        --------
-        >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).holds("bipartite-consensus")
-        True
-        """
-        wanted, reached, todo = behaviour_name(behaviour), set(), [self.behaviour, *self.special]
-        while todo:
-            word = todo.pop()
-            if word not in reached:
-                reached.add(word)
-                todo.extend(_IMPLIES[word])
-        return wanted in reached
-
-
 def behaviour_name(text: str) -> str:
     """Return the behaviour that ``text`` names, blanks and hyphens alike.
 
@@ -170,7 +107,10 @@ class WeakComponent:
     connectivity : {"strong", "quasi-strong", "weak"}
     closed : tuple of int
         Indices of its closed strong components among ``closed_components`` of the graph.
-    claim : Claim
+    leaders_balanced : bool
+        Whether some of these are balanced.
+    balanced, all_positive, undirected : bool
+        As of :class:`Structure`, of the component by itself.
 
     References
     ----------
@@ -189,11 +129,19 @@ class WeakComponent:
     nodes: tuple[int, ...]
     connectivity: str
     closed: tuple[int, ...]
-    claim: Claim
+    leaders_balanced: bool
+    balanced: bool
+    all_positive: bool
+    undirected: bool
+
+    @cached_property
+    def claim(self) -> Any:
+        """What the theorems say of it (:mod:`ptcc_certify.theorems.claims`, which is loaded when this is asked)."""
+        return import_module(_CLAIMS).claim_of(self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure:
+class Structure(Shown):
     """The structure of a signed digraph; made by :func:`analyse`.
 
     Attributes
@@ -255,7 +203,7 @@ class Structure:
         return self.gauge is not None
 
     @property
-    def claim(self) -> Claim | None:
+    def claim(self) -> Any:
         """The claim of a weakly connected graph; None if disconnected (see ``components``)."""
         return self.components[0].claim if len(self.components) == 1 else None
 
@@ -268,7 +216,7 @@ class Structure:
         Parameters
         ----------
         behaviour : str
-            As in :meth:`Claim.holds`.
+            As in :meth:`ptcc_certify.theorems.claims.Claim.holds`.
 
         Returns
         -------
@@ -282,7 +230,11 @@ class Structure:
         wanted = behaviour_name(behaviour)
         return all(
             component.claim.holds(wanted)
-            or (wanted == SIGNED_AVERAGE_CONSENSUS and component.claim.theorem == "1.1" and self._even(component))
+            or (
+                wanted == SIGNED_AVERAGE_CONSENSUS
+                and component.claim.behaviour == BIPARTITE_CONSENSUS
+                and self._even(component)
+            )
             for component in self.components
         )
 
@@ -295,11 +247,6 @@ class Structure:
             surplus[int(self.graph.target[edge])] += weight
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import structure_html
-
-        return structure_html(self)
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
@@ -473,49 +420,18 @@ def _weak_components(
     result = []
     for number, members in enumerate(_groups(weak, n_weak)):
         connectivity = "strong" if n_strong[number] == 1 else "quasi-strong" if len(held[number]) == 1 else "weak"
-        claim = _claim(
-            connectivity,
-            any(closed[i].balanced for i in held[number]),
-            balanced=bool(flags.balanced[number]),
-            all_positive=bool(flags.all_positive[number]),
-            undirected=bool(flags.undirected[number]),
+        result.append(
+            WeakComponent(
+                tuple(members.tolist()),
+                connectivity,
+                tuple(held[number]),
+                any(closed[i].balanced for i in held[number]),
+                bool(flags.balanced[number]),
+                bool(flags.all_positive[number]),
+                bool(flags.undirected[number]),
+            )
         )
-        result.append(WeakComponent(tuple(members.tolist()), connectivity, tuple(held[number]), claim))
     return tuple(result)
-
-
-def _claim(
-    connectivity: str, some_csc_balanced: bool, *, balanced: bool, all_positive: bool, undirected: bool
-) -> Claim:
-    """Apply Theorems 1 to 3 and Corollaries 1 to 5."""
-    corollaries: list[str] = []
-    special: list[str] = []
-    if connectivity == "strong":
-        if some_csc_balanced:
-            if undirected:
-                corollaries.append("1.1")
-                special.append(SIGNED_AVERAGE_CONSENSUS)
-            if all_positive:
-                corollaries.append("2")
-                special.append(CONSENSUS)
-            return Claim("1.1", BIPARTITE_CONSENSUS, tuple(corollaries), tuple(special))
-        return Claim("1.2", STABILITY, ("1.2",) if undirected else (), ())
-    if connectivity == "quasi-strong":
-        if some_csc_balanced:
-            if balanced:
-                corollaries.append("3")
-                special.append(BIPARTITE_CONSENSUS)
-            if all_positive:
-                corollaries.append("4")
-                special.append(CONSENSUS)
-            return Claim("2.1", INTERVAL_BIPARTITE_CONSENSUS, tuple(corollaries), tuple(special))
-        return Claim("2.2", STABILITY, (), ())
-    if some_csc_balanced:
-        if all_positive:
-            corollaries.append("5")
-            special.append(CONTAINMENT)
-        return Claim("3.1", BIPARTITE_CONTAINMENT, tuple(corollaries), tuple(special))
-    return Claim("3.2", STABILITY, (), ())
 
 
 def _mutual_edges(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray]:

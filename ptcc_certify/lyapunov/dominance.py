@@ -20,7 +20,6 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -30,10 +29,11 @@ import lmi
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.numbers import round_to_bits
 from lmi.iterative import FILL_ROWS, SparseHMatrix, fill_core
-from lmi.sparse_witness import SparseDefinitenessProof, prove_sparse_positive_definite
+from lmi.sparse_witness import prove_sparse_positive_definite
 from lmi.witness import prove_generalized_margin
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 from ptcc_certify.theorems.lemmas import EXACT_NODES, dyadic_left_vector, gauge, left_vector
 
@@ -50,70 +50,7 @@ _LARGEST_CONDITION = 1e6
 _GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
-@dataclass(frozen=True, eq=False)
-class GroupProof:
-    """The decay of a leader group by itself.
-
-    Attributes
-    ----------
-    weights : (n,) array
-        ``P_k``, each of at most 40 significant bits.
-    rate : Fraction
-        ``g_k``.
-    factor : SparseDefinitenessProof or None
-        What proves it for a group of more than ``EXACT_NODES`` nodes: of ``L_k`` over ``2^shift``.
-    shift : int
-    parents : (n,) int array or None
-        A spanning tree, -1 at its root, whose differences are the basis of the form that was factored; without one
-        that of a balanced group is the columns of ``L_k`` but the first.
-    """
-
-    weights: np.ndarray
-    rate: Fraction
-    factor: SparseDefinitenessProof | None = None
-    shift: int = 0
-    parents: np.ndarray | None = None
-
-    @property
-    def power(self) -> int:
-        """The form that was factored is that of the graph's own ``L_k`` times ``2^power``."""
-        basis = self.factor is not None and self.parents is None and self.factor.order.size < self.weights.size
-        return -self.shift * (3 if basis else 1)
-
-
-@dataclass(frozen=True, eq=False)
-class DominantMember:
-    """A diagonal Lyapunov matrix whose rate follows row by row.
-
-    Attributes
-    ----------
-    nodes : (n,) int array
-        The rows of ``E`` that move, leader groups first.
-    weights, vector : (n,) arrays
-        ``w`` and ``d``; every entry is the dyadic number that it is, of at most 40 significant bits.
-    rate : Fraction
-    groups : tuple of GroupProof
-        Of every leader group that moves.
-    """
-
-    nodes: np.ndarray
-    weights: np.ndarray
-    vector: np.ndarray
-    rate: Fraction
-    groups: tuple[GroupProof, ...]
-
-    @property
-    def lowest(self) -> Fraction:
-        """Smallest weight."""
-        return Fraction(float(self.weights.min()))
-
-    @property
-    def highest(self) -> Fraction:
-        """Largest weight."""
-        return Fraction(float(self.weights.max()))
-
-
-def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, search: int = 0) -> list[DominantMember]:
+def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, search: int = 0) -> list[LyapunovFunction]:
     """Return Lyapunov functions from the fastest to the one of the smallest prefactor.
 
     Leader groups of more than ``EXACT_NODES`` nodes, up to ``search``, take the best diagonal matrix in place of the
@@ -135,10 +72,10 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, sea
     if not structure.graph.n_edges:
         return []
     problem = _Composite(structure, search)
-    found: list[DominantMember] = []
+    found: list[LyapunovFunction] = []
     for loss in losses:
         try:
-            found.append(problem.member(loss))
+            found.append(problem.member(loss, "lmi" if search else "perron"))
         except LMIError:
             continue
     if not found:
@@ -160,7 +97,7 @@ class _Composite:
         self.pull: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
         self.followers = SparseHMatrix(rows[:, self.F]) if self.F.size else None
         self.smallest = self.followers.smallest() if self.followers is not None else np.inf
-        self.nodes = np.concatenate([self.K, self.F])
+        self.nodes = (*self.K.tolist(), *self.F.tolist())
         proofs = []
         several = structure.graph.subgraph(self.K) if self.K.size else structure.graph
         first = 0
@@ -174,7 +111,7 @@ class _Composite:
         if not min(2 * self.smallest, self.g.min(initial=np.inf)) > 0:
             raise NoCertificate("a block has no positive rate in floating point")
 
-    def member(self, loss: float) -> DominantMember:
+    def member(self, loss: float, kind: str) -> LyapunovFunction:
         """Return the composite whose followers are taken at ``(1 - loss)`` times their smallest eigenvalue."""
         p = self.p
         if self.followers is None:
@@ -204,10 +141,15 @@ class _Composite:
         if not (np.isfinite(w).all() and np.isfinite(d).all() and w.min() > 1e-280 and d.min() > 1e-280):
             raise NoCertificate("the weights span more than float64 holds")
         w, d = round_array(w), round_array(d)
-        rate = self._rate(w, d)
-        if not rate > 0:
+        found = self._rate(w, d)
+        if not found > 0:
             raise NoCertificate("no positive rate is left")
-        return DominantMember(self.nodes, w, d, round_to_bits(rate * (1 - _SLACK), 53), self.proofs)
+        block = LyapunovBlock("P", self.nodes, dyadic=w)
+        rate = round_to_bits(found * (1 - _SLACK), 53)
+        firsts = np.cumsum([0, *(proof.weights.size for proof in self.proofs)])
+        scales = tuple(float(w[i] / proof.weights[0]) for i, proof in zip(firsts, self.proofs, strict=False))
+        proof = Dominance(d, self.proofs, scales)
+        return LyapunovFunction(kind, "E", (block,), rate=rate, numerical_rate=float(rate), dominance=proof)
 
     def _rate(self, w: np.ndarray, d: np.ndarray) -> float:
         """Return the largest ``b`` for which every row of the inequality holds."""

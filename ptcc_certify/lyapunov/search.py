@@ -29,9 +29,10 @@ from lmi.matrices import block_columns
 from lmi.witness import prove_generalized_margin
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.dominance import DominantMember, dominant_members
+from ptcc_certify.lyapunov.dominance import dominant_members
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
-from ptcc_certify.theorems.base import BITS, Matrix, diagonal_matrix
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
+from ptcc_certify.theorems.base import BITS, diagonal_matrix
 from ptcc_certify.theorems.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
 
 METHODS = ("paper", "perron", "lmi", "full", "best")
@@ -81,52 +82,13 @@ class Candidate:
         return (math.log(self.condition) - self.rate * clock) / 2
 
 
-@dataclass(frozen=True, eq=False)
-class SharpMember:
-    """A proved Lyapunov function ``V = E' P E`` on the rows ``nodes`` of ``E``.
-
-    Attributes
-    ----------
-    kind : str
-        Class: ``perron``, ``lmi`` or ``full``.
-    nodes : tuple of int
-    diagonal : tuple of Fraction or None
-        Of a diagonal ``P`` that is proved as a whole.
-    matrix : rows of Fractions or None
-        Of a full ``P``.
-    rate : Fraction
-        ``P A + A' P > rate P`` on the error's subspace; negative rates, which bound the growth, occur too.
-    lowest, highest : Fraction
-        ``lowest I <= P <= highest I``.
-    numerical_rate : float
-        The rate of the matrix before it was rounded, in floating point.
-    dominance : DominantMember or None
-        Of a large graph: the diagonal ``P``, and what proves the rate row by row.
-    """
-
-    kind: str
-    nodes: tuple[int, ...]
-    diagonal: tuple[Fraction, ...] | None
-    matrix: Matrix | None
-    rate: Fraction
-    lowest: Fraction
-    highest: Fraction
-    numerical_rate: float
-    dominance: DominantMember | None = None
-
-    @property
-    def prefactor(self) -> Fraction:
-        """``highest / lowest``, which multiplies the squared norm."""
-        return self.highest / self.lowest
-
-
 @dataclass(frozen=True)
 class Sharpening:
     """What was tried, what was taken, and how far the diagonal class reaches.
 
     Attributes
     ----------
-    members : tuple of SharpMember
+    members : tuple of LyapunovFunction
         Proved.
     tried : dict of str to float
         Largest rate found of each class at any prefactor, in floating point.
@@ -138,7 +100,7 @@ class Sharpening:
         What the time limit ended.
     """
 
-    members: tuple[SharpMember, ...] = ()
+    members: tuple[LyapunovFunction, ...] = ()
     tried: dict[str, float] = field(default_factory=dict)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
@@ -198,8 +160,8 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
         for kind, rate in tried.items():
             if not any(c.rate > 0 for c in candidates if c.kind == kind):
                 notes.append(f"class {kind}: the rate {rate:.4g} needs a prefactor above {_HOPELESS:.0e}")
-        proved: list[SharpMember] = []
-        extra: SharpMember | None = None
+        proved: list[LyapunovFunction] = []
+        extra: LyapunovFunction | None = None
         with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
             chosen = choose(candidates, wanted)
             for candidate in chosen:
@@ -210,14 +172,15 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
                 else:
                     proved.append(member)
             checkpoint()
-            near = _for_deviations(system, candidates, chosen, wanted) if any(m.rate > 0 for m in proved) else None
+            decays = any(V.proved_rate > 0 for V in proved)
+            near = _for_deviations(system, candidates, chosen, wanted) if decays else None
             extra = None if near is None else prove_member(system, near)
     limit = min((c.upper for c in every), default=math.inf)
-    members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate))
+    members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
     if extra is not None:  # the largest rate, and its prefactor, stay those of a member that is small in E
-        fastest = max(members, key=lambda m: (m.rate, -m.prefactor))
-        if extra.rate < fastest.rate or extra.prefactor >= fastest.prefactor:
-            members.append(replace(extra, rate=min(extra.rate, fastest.rate)))
+        fastest = max(members, key=lambda m: (m.proved_rate, -m.prefactor))
+        if extra.proved_rate < fastest.proved_rate or extra.prefactor >= fastest.prefactor:
+            members.append(replace(extra, rate=min(extra.proved_rate, fastest.proved_rate)))
     least = limit if math.isfinite(limit) else None
     return Sharpening(tuple(members), tried, least, tuple(notes), tuple(cut_off))
 
@@ -235,7 +198,11 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
     clocks : sequence of float
         See :func:`sharpen`.
     """
-    members: dict[Candidate, SharpMember] = {}
+    if method not in (*DIAGONAL, "best"):
+        n = structure.graph.n_nodes
+        note = f"above {EXACT_NODES} nodes only the classes perron and lmi are proved; the graph has {n}"
+        return Sharpening(notes=(note,))
+    members: dict[Candidate, LyapunovFunction] = {}
     notes: list[str] = []
     tried: dict[str, float] = {}
     groups = [len(c.nodes) for c in structure.closed_components]
@@ -247,19 +214,17 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
         notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
     cut_off: list[str] = []
     for kind, search in searches.items():
-        found: Sequence[DominantMember] = ()
+        found: Sequence[LyapunovFunction] = ()
         try:
             with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
                 found = list(apart(partial(dominant_members, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue
-        for m in found:
-            nodes, low, high = tuple(m.nodes.tolist()), m.lowest, m.highest
-            candidate = Candidate(kind, float(m.rate), float(high / low))
-            members[candidate] = SharpMember(kind, nodes, None, None, m.rate, low, high, float(m.rate), m)
+        rates = [float(V.proved_rate) for V in found]
+        members.update((Candidate(kind, r, float(V.prefactor)), V) for r, V in zip(rates, found, strict=True))
         if found:
-            tried[kind] = max(float(m.rate) for m in found)
+            tried[kind] = max(rates)
     chosen = sorted(choose(list(members), clocks), key=lambda c: c.rate)
     return Sharpening(tuple(members[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
 
@@ -305,22 +270,23 @@ def _fastest(candidates: Sequence[Candidate]) -> Candidate:
     return min((c for c in candidates if c.rate >= top - _SAME_RATE * abs(top)), key=lambda c: c.condition)
 
 
-def _without_hair_splitting(members: list[SharpMember]) -> list[SharpMember]:
+def _without_hair_splitting(members: list[LyapunovFunction]) -> list[LyapunovFunction]:
     """Lower rates that are larger by rounding alone to that of the member with the smaller prefactor.
 
     A smaller rate is proved with the larger one. The largest rate then comes with a prefactor that is worth it.
     """
     result = []
     for member in members:
-        near = [m.rate for m in members if m.prefactor < member.prefactor and 0 < m.rate < member.rate]
-        close = [rate for rate in near if member.rate - rate <= Fraction(_SAME_RATE) * rate]
+        slower = (m.proved_rate for m in members if m.prefactor < member.prefactor)
+        near = [rate for rate in slower if 0 < rate < member.proved_rate]
+        close = [rate for rate in near if member.proved_rate - rate <= Fraction(_SAME_RATE) * rate]
         if close:
             member = replace(member, rate=max(close))
         result.append(member)
     return result
 
 
-def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | None:
+def prove_member(system: ErrorSystem, candidate: Candidate) -> LyapunovFunction | None:
     """Round a candidate to rationals and prove its rate and prefactor in exact arithmetic; None if a step fails."""
     n = len(system.nodes)
     if candidate.log_weights is not None:
@@ -330,9 +296,8 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
         rate = system.prove_rate(diagonal_matrix(weights), candidate.rate)
         if rate is None:
             return None
-        return SharpMember(
-            candidate.kind, system.nodes, weights, None, rate, min(weights), max(weights), candidate.rate
-        )
+        block = LyapunovBlock("P", system.nodes, weights)
+        return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, numerical_rate=candidate.rate)
     assert candidate.matrix is not None
     P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
     rate = system.prove_rate(P, candidate.rate)
@@ -344,7 +309,8 @@ def prove_member(system: ErrorSystem, candidate: Candidate) -> SharpMember | Non
     negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
     if lowest is None or lowest <= 0 or negated is None:
         return None
-    return SharpMember(candidate.kind, system.nodes, None, P, rate, lowest, -negated, candidate.rate)
+    block, ends = LyapunovBlock("P", system.nodes, matrix=P), (lowest, -negated)
+    return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, ends=ends, numerical_rate=candidate.rate)
 
 
 # ---------------------------------------------------------------------- deviations

@@ -1,6 +1,6 @@
 """A certificate as something to send to a person: one page of HTML, or a statement in LaTeX.
 
-Both are made from a file that the independent check accepts (:mod:`ptcc_certify.certificate.saved`). What was
+Both are made from a file that the independent check accepts (:mod:`ptcc_certify.certificate.certificate`). What was
 proved is told apart from what is numerical: a simulated run, repeated for the figures. The page is
 one file that loads nothing and runs no script; every text that stands in the certificate is shown as text, whatever
 it holds.
@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate, read_certificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.report.figures import INPUT_NODES, draw
@@ -120,7 +120,7 @@ def write_report(
     return saved.verdict
 
 
-def _with_run(saved: SavedCertificate, simulation: bool | None) -> tuple[SavedCertificate, str]:
+def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate, str]:
     """Repeat the run, if there is one to repeat; return why there is none."""
     n = saved.graph.n_nodes
     if simulation is False:

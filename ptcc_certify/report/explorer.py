@@ -21,7 +21,8 @@ import numpy as np
 
 from lmi.exact.rounding import down
 from ptcc_certify.bounds.final_state import exact_start, outcome
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.graphs.rationals import as_fraction
@@ -33,7 +34,6 @@ from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.theorems import theorem_for
 
 if TYPE_CHECKING:
     from ipywidgets import VBox
@@ -254,20 +254,12 @@ class Explorer:
         more: dict[str, Any] = {}
         if isinstance(protocol, SlidingModeProtocol):
             sigma0 = exact_start(structure, drawn[1] if settings.reaching else [0] * n)
-            theorem, V = theorem_for(structure, protocol.kind), base.lyapunov
-            base = replace(
-                base,
-                theorem=theorem,
-                lyapunov=None if V is None else replace(V, theorem=theorem.number),
-                sigma0=tuple(sigma0),
-                reaching=certified_reaching_times(protocol, sigma0),
-            )
+            base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(protocol, sigma0))
             more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, protocol, n)}
         run = simulate(base.graph, protocol, [float(x) for x in start], samples=_SAMPLES, **more)
         gone = base.sigma0 or (Fraction(0),) * n
         moved = [x - s for x, s in zip(start, gone, strict=True)]
-        return replace(
-            base,
+        return base.changed(
             protocol=protocol,
             start=tuple(start),
             outcome=outcome(structure, moved, matrix=base.influence),
@@ -304,7 +296,7 @@ class Explorer:
             unit = float(base.upper_bound or 1)
             found = sharpen(ErrorSystem(base.structure), method, [x / unit for x in _CLOCKS])
             notes = (*base.notes, *found.notes)
-            self._proved[graph, method] = replace(base, sharpening=found, method=method, notes=notes)
+            self._proved[graph, method] = base.changed(sharpening=found, method=method, notes=notes)
         return self._proved[graph, method]
 
 

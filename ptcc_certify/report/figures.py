@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 INPUT_NODES = 100
 
 
-def draw(saved: SavedCertificate, wanted: Sequence[str]) -> dict[str, Figure]:
+def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:
     """Draw those of the wanted figures for which there is something to draw."""
     run, n = saved.trajectory, saved.graph.n_nodes
     figures: dict[str, Any] = {}

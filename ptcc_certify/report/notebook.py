@@ -1,7 +1,7 @@
 """What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
 
-The classes call these functions for ``_repr_html_``. Everywhere else their plain ``repr`` is shown. Labels are escaped,
-figures are inline SVG images with a text in their place for those who do not see them.
+Registered with :mod:`ptcc_certify.display`, which calls them for ``_repr_html_``; elsewhere the plain ``repr`` is
+shown. Labels are escaped, figures are inline SVG images with a text in their place for those who do not see them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,10 @@ import html
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.display import shows
+from ptcc_certify.gain_design import Design
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
 from ptcc_certify.report.screen import certificate_lines, structure_lines
@@ -19,9 +23,6 @@ from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.gain_design import Design
-    from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: Largest graph that is drawn unasked: a layout takes seconds above.
 SHOWN_NODES = 120
@@ -29,17 +30,20 @@ SHOWN_NODES = 120
 _HEAD = 11
 
 
+@shows(SignedDigraph)
 def graph_html(graph: SignedDigraph) -> str:
     """Show a graph: its size, how it was read, its nodes, and a drawing of up to 120 of them."""
     lines = structure_lines(analyse(graph), "signed digraph")
     return _page([line for line in lines if line.startswith(("graph", "read", "nodes"))], _graph_figure(graph))
 
 
+@shows(Structure)
 def structure_html(structure: Structure) -> str:
     """Show a structure: the screen of ``ptcc classify``, and a drawing of up to 120 nodes."""
     return _page(structure_lines(structure, "signed digraph"), _graph_figure(structure.graph, structure))
 
 
+@shows(Certificate)
 def certificate_html(certificate: Certificate) -> str:
     """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound."""
 
@@ -53,6 +57,7 @@ def certificate_html(certificate: Certificate) -> str:
     return _page(certificate_lines(certificate, "signed digraph"), [(draw, alt)] if drawable else [])
 
 
+@shows(Trajectory)
 def trajectory_html(trajectory: Trajectory) -> str:
     """Show a trajectory: what its ``repr`` says, and the states (and sliding variables) of one start over time."""
     structure = analyse(trajectory.graph)
@@ -65,6 +70,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
     return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], [(draw, f"states{also} over time")] if drawable else [])
 
 
+@shows(Design)
 def design_html(found: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
 

@@ -12,8 +12,8 @@ from itertools import islice
 from lmi.exact.rounding import up
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.input import Effort
-from ptcc_certify.certificate.document import producer
-from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
+from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
@@ -55,14 +55,14 @@ from ptcc_certify.theorems import THEOREMS
 ROWS, GROUPS = 200, 40
 
 
-def report_html(saved: SavedCertificate, *, no_run: str = "no run was asked for") -> str:
+def report_html(saved: Certificate, *, no_run: str = "no run was asked for") -> str:
     """Return a certificate as one page of HTML that loads nothing and runs no script.
 
     Parameters
     ----------
-    saved : SavedCertificate
-        As :func:`ptcc_certify.certificate.saved.read_certificate` reads it; with a trajectory
-        (:meth:`SavedCertificate.with_simulation`) there are figures of bound and input.
+    saved : Certificate
+        As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it; with a trajectory
+        (:meth:`Certificate.with_simulation`) there are figures of bound and input.
     no_run : str
         Why there is no trajectory, for the page.
 
@@ -91,7 +91,7 @@ def rejected_html(error: RejectedCertificate) -> str:
     Parameters
     ----------
     error : RejectedCertificate
-        What :func:`ptcc_certify.certificate.saved.read_certificate` raised.
+        What :func:`ptcc_certify.certificate.certificate.read_certificate` raised.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def rejected_html(error: RejectedCertificate) -> str:
 class _Page:
     """The sections of one page."""
 
-    def __init__(self, saved: SavedCertificate, no_run: str):
+    def __init__(self, saved: Certificate, no_run: str):
         self.saved, self.no_run = saved, no_run
         self.graph, self.structure, self.protocol = saved.graph, saved.structure, saved.protocol
         self.sliding = isinstance(saved.protocol, SlidingModeProtocol)
@@ -373,7 +373,7 @@ class _Page:
             head = ["Instant", f"\u2016{z}(t)\u2016 at most (numerical, rounded up)"]
             bounds = saved.norm_bound([float(1 - f) for f, _ in instants]).tolist()
         columns = [[above(x, 2) for x in bounds]]
-        if saved.start is not None and any(m.distance is not None for m in saved.envelope.members):
+        if saved.start is not None and any(m.deviation is not None for m in saved.envelope.members):
             numerical = "" if saved.direct else " (numerical, rounded up)"
             head.append(f"Distance of any agent to its outcome at most{numerical}")
             worst = saved.outcome_distance([float(1 - f) for f, _ in instants]).max(axis=0)

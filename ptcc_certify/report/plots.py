@@ -261,7 +261,7 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
 
     Parameters
     ----------
-    certificate : Certificate or SavedCertificate
+    certificate : Certificate or Certificate
         With a trajectory and a proved rate.
     ax : Axes, optional
     axis : {"left", "time", "clock"}
@@ -658,9 +658,9 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
     for kind, (colour, marker) in CLASS_MARKERS.items():
         own = [m for m in members if m.kind == kind]
         if own:
-            points = [m.prefactor for m in own], [m.rate for m in own]
+            points = [m.prefactor_above for m in own], [m.rate_below for m in own]
             ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
-    rates = [m.rate for m in members]
+    rates = [m.rate_below for m in members]
     if certificate.upper_bound is not None:
         limit = float_up(certificate.upper_bound)
         ax.axhline(limit, color="#7F7F7F", linewidth=2.2, alpha=0.6, label="no rate exceeds (proved)")

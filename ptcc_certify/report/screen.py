@@ -12,8 +12,9 @@ import numpy as np
 
 from lmi.exact.enclosure import LARGEST_PUSH
 from lmi.exact.rounding import down, near, up
-from ptcc_certify.graphs.structure import Claim, Structure
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
+from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -78,8 +79,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     if certificate.outcome is not None:
         ends = certificate.outcome.final_state
         kind = "exact" if certificate.outcome.exact else "floating point"
-        if certificate.enclosed is not None and certificate.enclosed.radius is not None:
-            widest = Fraction(float(certificate.enclosed.radius.max())) * certificate.enclosed.unit
+        if certificate.outcome.radius is not None:
+            widest = max(certificate.outcome.radius)
             kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
         if kind != "floating point" and any(Fraction(_digits(x)) != x for x in ends[:100]):
             kind += "; here to 5 digits"
@@ -136,14 +137,14 @@ def _class_lines(certificate: Certificate) -> list[str]:
         limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
         lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit}{time})"))
-        taken = [f"{m.kind} {down(m.rate, 4)} (prefactor {up(m.prefactor, 2)})" for m in found.members]
+        taken = [f"{V.kind} {down(V.proved_rate, 4)} (prefactor {up(V.prefactor, 2)})" for V in found.members]
         lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
     return lines
 
 
 def _distance_lines(certificate: Certificate) -> list[str]:
     """Tell how far from its outcome the farthest agent may be, and every agent at the instant asked for."""
-    if certificate.start is None or not any(m.distance for m in certificate.envelope.members):
+    if certificate.start is None or not any(V.deviation for V in certificate.functions):
         return []
     labels = certificate.graph.labels
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]

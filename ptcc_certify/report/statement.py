@@ -7,8 +7,8 @@ from collections import Counter
 from fractions import Fraction
 
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.certificate.document import producer
-from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.format import producer
 from ptcc_certify.protocols.latex import symbol_latex
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.screen import structure_text
@@ -28,13 +28,13 @@ from ptcc_certify.report.texts import (
 )
 
 
-def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None) -> str:
+def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> str:
     r"""Return a certificate as a statement in LaTeX, to be read by ``\input``; it needs amsmath and graphicx.
 
     Parameters
     ----------
-    saved : SavedCertificate
-        As :func:`ptcc_certify.certificate.saved.read_certificate` reads it.
+    saved : Certificate
+        As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it.
     figures : mapping of {"graph", "decay"} to str, optional
         Names of the files that are included.
 
@@ -90,14 +90,14 @@ def report_latex(saved: SavedCertificate, figures: dict[str, str] | None = None)
     return "\n".join(parts) + "\n"
 
 
-def _head(saved: SavedCertificate) -> str:
+def _head(saved: Certificate) -> str:
     """Call a certified statement a proposition, and no other."""
     return (
         "Proposition (certified)." if saved.verdict == "certified" else "Verified statements (certificate undecided)."
     )
 
 
-def _claims(saved: SavedCertificate, T: str) -> list[str]:
+def _claims(saved: Certificate, T: str) -> list[str]:
     """Return what the theorems say of the graph, claimed only where it is certified."""
     counted = sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem)
     if saved.constant:
@@ -118,7 +118,7 @@ def _claims(saved: SavedCertificate, T: str) -> list[str]:
     return lines
 
 
-def _decay(saved: SavedCertificate, T: str) -> list[str]:
+def _decay(saved: Certificate, T: str) -> list[str]:
     """Return the inequality of the decay, and what may be left before the deadline, rounded to the safe side."""
     if saved.rate is None or saved.prefactor is None:
         return []
@@ -158,7 +158,7 @@ def _decay(saved: SavedCertificate, T: str) -> list[str]:
     return lines
 
 
-def _input(saved: SavedCertificate) -> list[str]:
+def _input(saved: Certificate) -> list[str]:
     """Return whether the input stays finite, and how large it gets."""
     effort = saved.effort
     if effort is None or saved.constant or effort.bounded is None:
@@ -179,7 +179,7 @@ def _input(saved: SavedCertificate) -> list[str]:
     return lines
 
 
-def _limits(saved: SavedCertificate) -> list[str]:
+def _limits(saved: Certificate) -> list[str]:
     """Return what limits of the gain, noise and disturbances of the nominal protocol leave."""
     effort, lines = saved.effort, []
     for entry in () if effort is None else effort.residual:
@@ -207,7 +207,7 @@ def _limits(saved: SavedCertificate) -> list[str]:
     return lines
 
 
-def _states(saved: SavedCertificate) -> list[str]:
+def _states(saved: Certificate) -> list[str]:
     """Return the table of starts and final states."""
     if saved.start is None:
         return []
@@ -249,7 +249,7 @@ def _figures(figures: dict[str, str], stem: str) -> list[str]:
     ]
 
 
-def _source(saved: SavedCertificate) -> list[str]:
+def _source(saved: Certificate) -> list[str]:
     """Return where the theorems are from, and which file proves the numbers."""
     breakable = r"\allowbreak{}".join(saved.sha256[i : i + 8] for i in range(0, 64, 8))
     return [

@@ -14,10 +14,11 @@ from fractions import Fraction
 
 from lmi.exact.rounding import down, up
 from ptcc_certify.bounds.input import Limited, Starts
-from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
-from ptcc_certify.graphs.structure import Claim, ClosedComponent
+from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.theorems.claims import Claim
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
@@ -118,7 +119,7 @@ def subscripts(text: str) -> str:
 # ---------------------------------------------------------------------- words
 
 
-def coordinates(saved: SavedCertificate) -> str:
+def coordinates(saved: Certificate) -> str:
     """Return the letter of what decays: the error, or the deviation from the weighted signed mean."""
     return "E" if saved.envelope.coordinates == "E" else "\u03b5"
 
@@ -136,7 +137,7 @@ def claim_text(claim: Claim) -> str:
     return f"{claim.behaviour.capitalize()}{special}{by}"
 
 
-def agent_parts(saved: SavedCertificate) -> list[str]:
+def agent_parts(saved: Certificate) -> list[str]:
     """Say of every agent which part of the graph it is in."""
     parts = ["follower"] * saved.graph.n_nodes
     groups = saved.structure.closed_components
@@ -161,7 +162,7 @@ def balance_text(component: ClosedComponent, labels: Sequence[str]) -> str:
     return f"balanced; {'camps' if camps[1] else 'one camp'} {said}"
 
 
-def kinds_text(saved: SavedCertificate) -> str:
+def kinds_text(saved: Certificate) -> str:
     """Count the Lyapunov functions by their class."""
     names = {"paper": "the article's", "perron": "Perron vectors", "lmi": "best diagonal", "full": "full matrices"}
     counted = Counter(m.kind for m in saved.envelope.members)
@@ -197,7 +198,7 @@ def limited_text(entry: Limited) -> str:
     return "; ".join(said)
 
 
-def caveats(saved: SavedCertificate, no_run: str) -> list[str]:
+def caveats(saved: Certificate, no_run: str) -> list[str]:
     """Say what a reader might take for proved and is not, for this certificate."""
     effort, sliding = saved.effort, isinstance(saved.protocol, SlidingModeProtocol)
     residual = () if effort is None else effort.residual

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ RESOLVED = 100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory:
+class Trajectory(Shown):
     """The states of N agents at M instants.
 
     Attributes
@@ -191,11 +192,6 @@ class Trajectory:
 
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
         return []
-
-    def _repr_html_(self) -> str:
-        from ptcc_certify.report.notebook import trajectory_html
-
-        return trajectory_html(self)
 
     def __repr__(self) -> str:
         runs = f" x {self.states.shape[1]} columns" if self.states.ndim == 3 else ""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.theorems.base import LyapunovBlock, LyapunovFunction, Obligation, RateProof, Theorem
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
+from ptcc_certify.theorems.base import Obligation, RateProof, Theorem
+from ptcc_certify.theorems.claims import sliding_claim
 from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
-from ptcc_certify.theorems.sliding_mode import SlidingMode, sliding_claim
+from ptcc_certify.theorems.sliding_mode import SlidingMode
 from ptcc_certify.theorems.strong import BalancedStrong, UnbalancedStrong
 from ptcc_certify.theorems.weak import BalancedWeak, UnbalancedWeak
 

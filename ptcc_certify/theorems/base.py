@@ -15,45 +15,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import lmi
 from lmi.exact.numbers import round_to_bits
 from lmi.witness import prove_generalized_margin, prove_margin, prove_positive_definite
 from ptcc_certify.checker import Statement
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction, Matrix
 from ptcc_certify.theorems.lemmas import EXACT_NODES, algebraic_connectivity, exact_left_vector, left_vector
 
 if TYPE_CHECKING:
     import flint
 
-Matrix = list[list[Fraction]]
 #: Significant bits to which the search's floats are rounded before anything is proved about them.
 BITS = 40
 #: A left null vector is kept exact when its entries are shorter than this, otherwise rounded to it.
 EXACT_VECTOR_BITS = 64
 #: The objective where there is nothing to decrease.
 KEPT = "none: every agent keeps its state"
-
-
-@dataclass(frozen=True)
-class LyapunovBlock:
-    """One diagonal block of a Lyapunov matrix, exact.
-
-    Attributes
-    ----------
-    name : str
-        The paper's letter: ``P``, ``Omega``, ``Xi_L``, ``Xi_F``, ``H_2``, ``H_F``, ``Theta_L1``, ``Theta_F``.
-    nodes : tuple of int
-    diagonal : tuple of Fraction
-        Positive, without the factor ``rho``.
-    times_rho : bool
-        Whether the block enters the Lyapunov matrix multiplied by ``rho``.
-    """
-
-    name: str
-    nodes: tuple[int, ...]
-    diagonal: tuple[Fraction, ...]
-    times_rho: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,52 +44,6 @@ class ExactInterval:
 
     printed: Fraction | None
     exact: Fraction | None
-
-
-@dataclass(frozen=True)
-class LyapunovFunction:
-    """``V = z' diag(blocks) z`` of a theorem row, in the coordinates ``z`` of its proof.
-
-    Attributes
-    ----------
-    theorem : str
-    objective : str
-        The quotient that the paper's rate is, in its letters.
-    coordinates : {"E", "eps"}
-        ``E``: the rows ``nodes`` of ``E = -L X``. ``eps``: the deviation of ``X`` from its weighted signed mean,
-        ``eps = X - (p'GX / p'1) G1``.
-    blocks : tuple of LyapunovBlock
-    rho : Fraction or None
-    interval : RhoInterval or None
-        Numerical ends of the admissible ``rho``.
-    """
-
-    theorem: str
-    objective: str
-    coordinates: str
-    blocks: tuple[LyapunovBlock, ...]
-    rho: Fraction | None = None
-    interval: lmi.RhoInterval | None = None
-
-    @property
-    def nodes(self) -> tuple[int, ...]:
-        """The nodes whose coordinates enter ``V``, block after block."""
-        return tuple(v for block in self.blocks for v in block.nodes)
-
-    @property
-    def weights(self) -> tuple[Fraction, ...]:
-        """The diagonal of the Lyapunov matrix, ``rho`` included, in the order of ``nodes``."""
-        return tuple(
-            w * (self.rho if block.times_rho and self.rho is not None else 1)
-            for block in self.blocks
-            for w in block.diagonal
-        )
-
-    @property
-    def prefactor(self) -> Fraction:
-        """``lmax / lmin`` of the Lyapunov matrix, which multiplies the squared norm."""
-        weights = self.weights
-        return max(weights) / min(weights) if weights else Fraction(1)
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ import numpy as np
 
 import lmi
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import (
-    LyapunovBlock,
-    LyapunovFunction,
     RateProof,
     Theorem,
     closed_blocks,
@@ -47,13 +46,14 @@ class DiagonalComposite(Theorem):
         )
         objective = f"lmin({self.product_letter}) / lmax({self.matrix_letter})"
         if F.size == 0:
-            return LyapunovFunction(self.number, objective, "E", leaders)
+            return LyapunovFunction("paper", "E", leaders, objective=objective)
         followers = LyapunovBlock(
             self.follower_letter, follower_nodes(structure), rounded(split_rho(omega[F])[0]), True
         )
         coupling = self._coupling(L, (*leaders, followers))
         rho = rounded(np.array([coupling.best_rho()]))[0]
-        return LyapunovFunction(self.number, objective, "E", (*leaders, followers), rho, coupling.interval())
+        blocks, interval = (*leaders, followers), coupling.interval()
+        return LyapunovFunction("paper", "E", blocks, rho, objective=objective, interval=interval)
 
     def _block_by_block(self, structure: Structure, L: np.ndarray) -> np.ndarray:
         """Find each block by itself, for when the best joint rate lies below what the solver resolves."""

@@ -6,9 +6,8 @@ import numpy as np
 
 import lmi
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import (
-    LyapunovBlock,
-    LyapunovFunction,
     Obligation,
     RateProof,
     Theorem,
@@ -53,7 +52,7 @@ class BalancedQuasiStrong(Theorem):
         if len(leaders.nodes) == 1:
             found = lmi.h_matrix_lyapunov(float_block(L, F, F))
             block = LyapunovBlock("Xi_F", follower_nodes(structure), rounded(found.omega))
-            return LyapunovFunction(self.number, "lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)", "E", (block,))
+            return LyapunovFunction("paper", "E", (block,), objective="lmin(Xi_F L_F + L_F' Xi_F) / lmax(Xi_F)")
         nu = left_vector_diagonal(block_of(structure, leaders))
         decrease = connectivity_rate(block_of(structure, leaders), nu) * floats(nu)
         A_FL, A_F = float_block(L, F, leaders.nodes), float_block(L, F, F)
@@ -61,12 +60,12 @@ class BalancedQuasiStrong(Theorem):
         xi = rounded(split_rho(joint.followers)[0])
         coupling = lmi.Coupling(np.diag(decrease), floats(nu), floats(xi), A_FL, A_F)
         return LyapunovFunction(
-            self.number,
-            "lmin(Phi) / lmax(Xi)",
+            "paper",
             "E",
             (LyapunovBlock("Xi_L", leaders.nodes, nu), LyapunovBlock("Xi_F", follower_nodes(structure), xi, True)),
             rounded(np.array([coupling.best_rho()]))[0],
-            coupling.interval(),
+            objective="lmin(Phi) / lmax(Xi)",
+            interval=coupling.interval(),
         )
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:

@@ -7,38 +7,12 @@ rows; Theorem 4.1 is Theorem 1.1, and so on, Corollaries 6 to 10 are Corollaries
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from ptcc_certify.graphs.structure import Claim, Structure
-from ptcc_certify.theorems.base import LyapunovFunction, RateProof, Theorem
-
-_COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
-
-
-def sliding_number(number: str) -> str:
-    """Return the number of a nominal theorem's counterpart.
-
-    Examples
-    --------
-    >>> sliding_number("2.1")
-    '5.1'
-    """
-    family, _, part = number.partition(".")
-    return f"{int(family) + 3}.{part}"
-
-
-def sliding_claim(claim: Claim) -> Claim:
-    """Return what Theorems 4 to 6 and Corollaries 6 to 10 say where Theorems 1 to 3 say ``claim``.
-
-    Examples
-    --------
-    >>> sliding_claim(Claim("1.1", "bipartite consensus", ("1.1", "2"), ("consensus",))).corollaries
-    ('6.1', '7')
-    """
-    corollaries = tuple(_COROLLARIES[number] for number in claim.corollaries)
-    return replace(claim, theorem=sliding_number(claim.theorem), corollaries=corollaries)
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.theorems.base import RateProof, Theorem
+from ptcc_certify.theorems.claims import sliding_number
 
 
 class SlidingMode(Theorem):
@@ -55,7 +29,7 @@ class SlidingMode(Theorem):
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """Search as for the nominal row."""
-        return replace(self._nominal.lyapunov(structure), theorem=self.number)
+        return self._nominal.lyapunov(structure)
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """Return the matrix of the nominal row."""

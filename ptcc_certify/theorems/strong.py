@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import (
     KEPT,
-    LyapunovBlock,
-    LyapunovFunction,
     Obligation,
     RateProof,
     Theorem,
@@ -43,9 +42,10 @@ class BalancedStrong(Theorem):
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """``P`` is forced by the graph: nothing is searched."""
         if structure.graph.n_nodes == 1:
-            return LyapunovFunction(self.number, KEPT, "eps", ())
-        block = LyapunovBlock("P", structure.closed_components[0].nodes, left_vector_diagonal(structure.graph))
-        return LyapunovFunction(self.number, "2 a(L)", "eps", (block,))
+            return LyapunovFunction("paper", "eps", (), objective=KEPT)
+        (whole,) = structure.closed_components
+        block = LyapunovBlock("P", whole.nodes, left_vector_diagonal(structure.graph))
+        return LyapunovFunction("paper", "eps", (block,), gauge=whole.gauge or (), objective="2 a(L)")
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """``2 a(L) P``."""
@@ -63,9 +63,7 @@ class BalancedStrong(Theorem):
         """``Z L + L'Z > b Z`` modulo ``G1``, ``Z = G (P - pp'/p'1) G``."""
         if not V.blocks:
             return RateProof(None, ())
-        gauge = structure.closed_components[0].gauge
-        assert gauge is not None
-        b = prove_weighted_deviation(structure.graph, gauge, V.weights, self.rate(structure, V))
+        b = prove_weighted_deviation(structure.graph, V.gauge, V.weights, self.rate(structure, V))
         if b is None:
             return RateProof(None, (), failed="2 a(L) is not proved positive")
         return RateProof(b, (Obligation("deviation-decrease", "paper", {"b": b}),))
@@ -91,7 +89,7 @@ class UnbalancedStrong(Theorem):
         """``Omega`` of Lemma 3.2, the one with the largest rate that the solver resolves."""
         nodes, omega = tuple(range(structure.graph.n_nodes)), unbalanced_diagonal(structure.graph)
         block = LyapunovBlock("Omega", nodes, rounded(omega))
-        return LyapunovFunction(self.number, "lmin(Omega L + L' Omega) / lmax(Omega)", "E", (block,))
+        return LyapunovFunction("paper", "E", (block,), objective="lmin(Omega L + L' Omega) / lmax(Omega)")
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """``Omega L + L' Omega > m I``."""

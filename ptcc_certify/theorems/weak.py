@@ -12,10 +12,9 @@ import numpy as np
 import lmi
 from lmi.witness import prove_margin
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import (
     KEPT,
-    LyapunovBlock,
-    LyapunovFunction,
     Matrix,
     Obligation,
     RateProof,
@@ -65,10 +64,10 @@ class BalancedWeak(Theorem):
         components = _several_nodes(structure)
         if not components:
             if F.size == 0:
-                return LyapunovFunction(self.number, KEPT, "E", ())
+                return LyapunovFunction("paper", "E", (), objective=KEPT)
             found = lmi.h_matrix_lyapunov(float_block(L, F, F))
             block = LyapunovBlock("H_F", follower_nodes(structure), rounded(found.omega))
-            return LyapunovFunction(self.number, "lmin(H_F L_F + L_F' H_F) / lmax(H_F)", "E", (block,))
+            return LyapunovFunction("paper", "E", (block,), objective="lmin(H_F L_F + L_F' H_F) / lmax(H_F)")
         K = [v for _, c in components for v in c.nodes]
         fixed: dict[int, tuple[Fraction, ...]] = {}
         leaders: list[lmi.FixedLeader | lmi.FreeLeader] = []
@@ -87,11 +86,11 @@ class BalancedWeak(Theorem):
         ]
         objective = "lmin(Pi) / lmax(H)"
         if F.size == 0:
-            return LyapunovFunction(self.number, objective, "E", tuple(blocks))
+            return LyapunovFunction("paper", "E", tuple(blocks), objective=objective)
         blocks.append(LyapunovBlock("H_F", follower_nodes(structure), rounded(split_rho(joint.followers)[0]), True))
         coupling = self._coupling(structure, tuple(blocks))
         rho = rounded(np.array([coupling.best_rho()]))[0]
-        return LyapunovFunction(self.number, objective, "E", tuple(blocks), rho, coupling.interval())
+        return LyapunovFunction("paper", "E", tuple(blocks), rho, objective=objective, interval=coupling.interval())
 
     def _coupling(self, structure: Structure, blocks: tuple[LyapunovBlock, ...]) -> lmi.Coupling:
         """Return the composite in floats; without followers its follower block is empty."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -12,9 +13,9 @@ import pytest
 from balls import BITS, ball, clock, form_value, states, value
 from generators import all_classes, random_graph
 
-from ptcc_certify.bounds.envelope import Envelope, Member
-from ptcc_certify.certificate.certificate import Certificate, certify
-from ptcc_certify.certificate.saved import read_certificate
+from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
@@ -49,7 +50,7 @@ def proved_forms(cert: Certificate) -> list[tuple[Fraction, Callable[[list[flint
     if (V := cert.lyapunov) is not None and V.blocks and cert.proof.rate is not None:
         forms.append((cert.proof.rate, lambda X: value(graph, V, gauge, X)))
     for m in cert.sharpening.members:
-        forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.diagonal, m.matrix, X)))
+        forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.weights or None, m.matrix, X)))
     return forms
 
 
@@ -176,7 +177,7 @@ def pair_envelope(rate: float) -> tuple[Envelope, NominalProtocol, SignedDigraph
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol, [3, 1], simulation=False)
     assert cert.lyapunov is not None
-    member = Member.of(cert.structure, cert.lyapunov, rate)
+    member = replace(cert.lyapunov, rate=rate)
     return Envelope(cert.structure, protocol.gain, (member,)), protocol, graph
 
 
@@ -256,10 +257,8 @@ def test_the_residual_is_what_the_bound_leaves():
 
 def test_more_members_make_the_envelope_the_pointwise_best():
     envelope, _, _ = pair_envelope(1.0)
-    from dataclasses import replace
-
     slow = envelope.members[0]
-    fast = replace(slow, rate=2.0, prefactor=100.0)
+    fast = replace(slow, rate=Fraction(2), ends=(slow.lowest, 100 * slow.lowest))
     both = replace(envelope, members=(slow, fast))
     for s in (0.0, 1.0, 5.0, 50.0):
         alone = [replace(envelope, members=(m,)).norm_factor(s) for m in (slow, fast)]

@@ -17,8 +17,8 @@ from generators import all_classes, random_graph
 
 from lmi.exact.definite import NUMPY_ROWS, Flint, Standard
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.certificate.certificate import Certificate, certify
-from ptcc_certify.certificate.saved import read_certificate
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check, digest
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

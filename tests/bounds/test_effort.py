@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from typing import Any, NamedTuple
@@ -27,7 +26,8 @@ from ptcc_certify.bounds.input import (
     starts_within,
     worst_start,
 )
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
@@ -166,7 +166,7 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
         protocol = protocol_at(rng, graph, over)
         motion = Motion(graph, protocol.gain)
         for starts in [None, *sets(rng, graph)]:
-            effort = replace(proved, protocol=protocol, starts=starts).effort
+            effort = proved.changed(protocol=protocol, starts=starts).effort
             assert effort is not None
             if proved.constant:
                 assert effort.bounded and effort.peak is effort.energy is effort.path_length is None
@@ -253,7 +253,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
     # From x(0) = sigma(0) it is the sliding variables alone that move the agents.
     for sigma0, begin in ((push, x0), (push, push), ([F(0)] * n, x0)):
         for starts in (None, Starts(begin, [F(1)] * n)):
-            cert = replace(proved, start=tuple(begin), sigma0=tuple(sigma0), reaching=None, starts=starts)
+            cert = proved.changed(start=tuple(begin), sigma0=tuple(sigma0), reaching=None, starts=starts)
             effort = cert.effort
             assert effort is not None and effort.sliding is not None and effort.path_length is not None
             assert effort.bounded
@@ -280,7 +280,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
                     assert (u.max(axis=1) <= floats(effort.peak.agents) * SLACK).all()
                     assert np.linalg.norm(u, axis=0).max() <= float(effort.peak.norm) * SLACK
         if not any(sigma0):  # then x moves as under the nominal protocol, whatever the disturbance
-            effort = replace(proved, sigma0=tuple(sigma0), reaching=None).effort
+            effort = proved.changed(sigma0=tuple(sigma0), reaching=None).effort
             seen = Motion(graph, protocol.gain).seen(floats(x0)[:, None])
             assert effort is not None and effort.peak is not None
             assert_holds(effort, seen, [])
@@ -299,7 +299,7 @@ def test_the_energy_of_one_start_is_at_most_twice_what_is_spent(name: str):
     proved = certify(graph, NominalProtocol(1, 1, 1, 1), x0, simulation=False)
     for over, share in product((F(3, 5), F(1), F(3)), (F(1, 100), F(1), F(10))):
         k = over / F(slowest(graph)).limit_denominator(10**6)
-        cert = replace(proved, protocol=NominalProtocol(1, share * k, k, 1))
+        cert = proved.changed(protocol=NominalProtocol(1, share * k, k, 1))
         assert cert.effort is not None and isinstance(cert.effort.energy, EnergyIntegral)
         spent = Motion(graph, cert.protocol.gain).seen(floats(x0)[:, None]).energy[0]
         assert spent <= float(cert.effort.energy.value) * SLACK
@@ -362,7 +362,7 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
     assert proved.effort is not None and proved.effort.residual == ()
     longest = proved.effort.longest_period
     assert longest is not None and F(1, 1000) < longest < F(1, 10)
-    again = replace(proved, limits=(Limits(None, None, longest),))
+    again = proved.changed(limits=(Limits(None, None, longest),))
     assert again.effort is not None and again.effort.residual[0].norm <= F(size) * F(SLACK)
     assert again.verdict == "certified"
     line = f"not certified with this period; with {float(longest):.4g} it is"
@@ -420,7 +420,7 @@ def test_certificates_tell_the_threshold_too(seed: int):
     proved = certify(graph, NominalProtocol(1, 1, 1, 1), simulation=False)
     for over, bounded in ((0.9, False), (1.1, True)):
         protocol = NominalProtocol(1, 1, F(over / least).limit_denominator(10**6), 1)
-        effort = replace(proved, protocol=protocol).effort
+        effort = proved.changed(protocol=protocol).effort
         assert effort is not None and effort.bounded is bounded
         low, high = effort.threshold
         assert low is None or float(low) <= over * (1 + 1e-5)
@@ -474,7 +474,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
     proved = certify(graph, protocol, x0, simulation=False, limits=some_limits(rng, protocol))
     assert proved.verdict == "certified", proved.notes
     L = graph.laplacian().toarray()
-    for cert, x in ((proved, floats(x0)), (replace(proved, starts=box), draw(rng, box, 2)[:, seed % 2])):
+    for cert, x in ((proved, floats(x0)), (proved.changed(starts=box), draw(rng, box, 2)[:, seed % 2])):
         assert cert.effort is not None
         final = outcome(cert.structure, x.tolist()).values
         unsampled = [limits for limits in proved.limits if limits.sample_period is None]
@@ -540,7 +540,7 @@ def test_disturbances_add_no_more_than_certified(name: str):
     proved = certify(graph, protocol_at(rng, graph, F(2)), x0, simulation=False, delta=delta)
     for over in (F(5, 4), F(5, 2)):
         protocol = protocol_at(rng, graph, over)
-        cert = replace(proved, protocol=protocol)
+        cert = proved.changed(protocol=protocol)
         assert cert.verdict == "certified", cert.notes
         assert cert.effort is not None and cert.outcome is not None and cert.rate is not None
         assert (cert.effort.disturbed is not None) == (cert.rate * protocol.rho2 > 1)
@@ -689,7 +689,7 @@ def test_a_set_of_one_start_is_that_start(name: str):
     alone = certify(graph, protocol, x0, simulation=False)
     assert alone.effort is not None and alone.effort.peak is not None
     for starts in (Starts(x0), Starts(x0, [F(0)] * graph.n_nodes), ellipsoid(x0, [[0] * graph.n_nodes])):
-        cert = replace(alone, starts=starts)
+        cert = alone.changed(starts=starts)
         assert cert.effort is not None and cert.effort.peak is not None
         assert cert.effort.peak.largest >= alone.effort.peak.largest
         report = cert.checked

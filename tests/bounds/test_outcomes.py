@@ -23,7 +23,7 @@ from ptcc_certify.bounds.final_state import (
     outcome,
 )
 from ptcc_certify.bounds.input import box, ellipsoid
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse

@@ -25,11 +25,12 @@ from hypothesis import strategies as st
 
 from lmi.exact.rounding import float_up
 from ptcc_certify.batch import certify_many
-from ptcc_certify.certificate import certificate
-from ptcc_certify.certificate.certificate import SEARCH_NODES, Certificate, certify
-from ptcc_certify.certificate.document import exact_or_ball, structure_document
-from ptcc_certify.certificate.saved import read_certificate
-from ptcc_certify.certificate.verdict import Expectations
+from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.format_graph import structure_document
+from ptcc_certify.certificate.procedure import SEARCH_NODES, certify
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.vectors import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select
@@ -1095,7 +1096,7 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
 
 def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytest.MonkeyPatch):
     """A search or a proof that is wrong leaves the verdict undecided, and the step is named."""
-    graph, search = load_graph("fig3a"), certificate._search_and_prove
+    graph, search = load_graph("fig3a"), procedure._search_and_prove
     assert certify(graph, PROTOCOL, simulation=False, method="paper").verdict == "certified"
 
     def too_fast(*args: Any) -> Any:
@@ -1108,7 +1109,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
         ]
         return V, replace(proof, rate=proof.rate * more, obligations=tuple(steps)), numerical
 
-    monkeypatch.setattr(certificate, "_search_and_prove", too_fast)
+    monkeypatch.setattr(procedure, "_search_and_prove", too_fast)
     cert = certify(graph, PROTOCOL, simulation=False, method="paper")
     assert cert.verdict == cert.to_dict()["verdict"] == "undecided"
     assert cert.checked is not None and not cert.checked.accepted and cert.checked.rejected == "margin of paper"
@@ -1408,11 +1409,11 @@ def same_members(first: Certificate, second: Certificate, order: np.ndarray, sca
     """Member by member equal, node ``v`` of the first being ``order[v]`` of the second."""
     assert len(first.sharpening.members) == len(second.sharpening.members)
     for a, b in zip(first.sharpening.members, second.sharpening.members, strict=True):
-        assert a.kind == b.kind and a.diagonal is not None and b.diagonal is not None
+        assert a.kind == b.kind and a.matrix is None and b.matrix is None
         assert float(b.rate) == pytest.approx(float(a.rate) * scale, rel=1e-6)
         assert float(b.prefactor) == pytest.approx(float(a.prefactor), rel=1e-3)
-        weights = {int(order[v]): float(w) for v, w in zip(a.nodes, a.diagonal, strict=True)}
-        assert dict(zip(b.nodes, map(float, b.diagonal), strict=True)) == pytest.approx(weights, rel=1e-3)
+        weights = {int(order[v]): float(w) for v, w in zip(a.nodes, a.weights, strict=True)}
+        assert dict(zip(b.nodes, map(float, b.weights), strict=True)) == pytest.approx(weights, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", ["perron", "best"])
@@ -1636,8 +1637,8 @@ def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int
     assert row["optimality_ratio"] == saved.optimality_ratio == cert.optimality_ratio
     assert Fraction(cert.optimality_ratio or 2) <= cert.rate / cert.upper_bound <= 1
     for asked, code in ((cert.rate, 0), (cert.upper_bound, 4), (cert.upper_bound + Fraction(1, 10**30), 3)):
-        assert replace(cert, expectations=Expectations(min_rate=asked)).assessment.exit_code == code
-        assert replace(saved, expectations=Expectations(min_rate=asked)).assessment.exit_code == code
+        assert cert.changed(expectations=Expectations(min_rate=asked)).assessment.exit_code == code
+        assert saved.changed(expectations=Expectations(min_rate=asked)).assessment.exit_code == code
 
 
 def test_of_one_mode_the_mean_eigenvalue_is_the_upper_bound():

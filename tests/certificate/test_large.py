@@ -14,17 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 from generators import all_classes, random_graph
+from lmi.exact.sparse import residual_definite
 from mutations import Json, changed, resealed
 from scipy.linalg import expm
 from scipy.sparse.linalg import eigs
 
 from lmi.errors import NoCertificate
-from lmi.exact.sparse import residual_definite
 from lmi.iterative import SparseHMatrix
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.final_state import outcome
-from ptcc_certify.certificate import certificate as certificate_module
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -44,7 +45,7 @@ CLASSES = dict(all_classes())
 @pytest.fixture
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Treat every graph as a large one."""
-    monkeypatch.setattr(certificate_module, "EXACT_NODES", 0)
+    monkeypatch.setattr(procedure, "EXACT_NODES", 0)
     monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
 
 
@@ -191,9 +192,9 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     assert float(cert.rate) <= cert.spectral_rate * (1 + 1e-9)
     # The end from the long run of the state itself.
     end = expm(-40.0 / float(cert.rate) * graph.dense_laplacian()) @ start
-    assert cert.enclosed is not None and cert.enclosed.middle is not None and cert.enclosed.radius is not None
-    assert (np.abs(end - cert.enclosed.middle) <= cert.enclosed.radius + 1e-6).all()
-    assert cert.enclosed.radius.max() < 1e-8
+    assert cert.outcome is not None and cert.outcome.radius is not None
+    assert (np.abs(end - cert.outcome.values) <= np.array(cert.outcome.radius, float) + 1e-6).all()
+    assert max(cert.outcome.radius) < 1e-8
 
 
 @pytest.mark.parametrize("balanced", [True, False])

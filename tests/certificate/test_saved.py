@@ -17,9 +17,9 @@ from generators import all_classes, random_graph, sparse_digraph
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.input import effort_section
-from ptcc_certify.certificate import document
-from ptcc_certify.certificate.document import structure_document
-from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate, read_certificate
+from ptcc_certify.certificate import vectors
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.format_graph import structure_document
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
@@ -55,12 +55,12 @@ def certified(name: str, **options: Any) -> ptcc.Certificate:
     return ptcc.certify(graph, protocol, start, simulation=False, **options)
 
 
-def written(certificate: ptcc.Certificate, folder: Path) -> SavedCertificate:
+def written(certificate: ptcc.Certificate, folder: Path) -> Certificate:
     certificate.save(folder / "c.json")
     return read_certificate(folder / "c.json")
 
 
-def agree(saved: SavedCertificate, made: ptcc.Certificate) -> None:
+def agree(saved: Certificate, made: ptcc.Certificate) -> None:
     """Everything that a file states is what the certificate has."""
     assert saved.graph == made.graph and saved.graph.labels == made.graph.labels
     assert structure_document(saved.structure) == structure_document(made.structure)
@@ -71,10 +71,10 @@ def agree(saved: SavedCertificate, made: ptcc.Certificate) -> None:
     assert type(saved.envelope) is type(made.envelope)
     assert len(saved.envelope.members) == len(made.envelope.members)
     for own, other in zip(saved.envelope.members, made.envelope.members, strict=True):
-        assert (own.kind, own.coordinates, own.exact_weights) == (other.kind, other.coordinates, other.exact_weights)
+        assert (own.kind, own.coordinates, own.weights) == (other.kind, other.coordinates, other.weights)
         assert (own.rate, own.prefactor, own.lowest) == (other.rate, other.prefactor, other.lowest)
-        assert own.distance == other.distance
-        assert np.array_equal(own.nodes, other.nodes) and np.array_equal(own.weights, other.weights)
+        assert own.deviation == other.deviation and own.name == other.name
+        assert own.nodes == other.nodes and own.gauge == other.gauge and np.array_equal(own.array, other.array)
     labels = made.graph.labels
     assert effort_section(saved.effort, labels, format_exact) == effort_section(made.effort, labels, format_exact)
     if made.effort is not None and saved.effort is not None:
@@ -174,13 +174,13 @@ def float_ball(x: Fraction) -> flint.arb:
 
 
 def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "LONG", 50)
+    monkeypatch.setattr(vectors, "LONG", 50)
     graph = sparse_digraph(np.random.default_rng(4), 200, 3.0)
     made = ptcc.certify(graph, NOMINAL, [Fraction(k, 8) for k in range(200)], simulation=False)
     saved = written(made, tmp_path)
     assert list(tmp_path.glob("*-source.npy")) and list(tmp_path.glob("*-diagonal.npy"))
     agree(saved, made)
-    assert made.enclosed is not None and made.enclosed.middle is not None and saved.final_state is not None
+    assert made.outcome is not None and made.outcome.radius is not None and saved.final_state is not None
     for (middle, radius), value in zip(saved.final_state, made.outcome.values.tolist(), strict=True):
         assert abs(middle - Fraction(value)) <= radius + Fraction(1, 10**12)
     assert np.array_equal(saved.norm_bound(REMAINING), made.norm_bound(REMAINING))
@@ -242,7 +242,7 @@ def test_an_undecided_certificate_says_so(tmp_path: Path):
     assert made.verdict == "undecided" and made.final_state is None and made.rate is not None
 
 
-def replace_outcome(made: ptcc.Certificate, folder: Path) -> SavedCertificate:
+def replace_outcome(made: ptcc.Certificate, folder: Path) -> Certificate:
     """Take the outcome out of a certificate: what is left proves the decay, and decides nothing."""
     made.save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())

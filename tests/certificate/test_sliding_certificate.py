@@ -16,7 +16,8 @@ from generators import all_classes, random_graph
 
 from ptcc_certify.bounds.final_state import outcome
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import SLIDING_BOUND, SLIDING_CLOCK, digest
 from ptcc_certify.checker import check as independent_check
 from ptcc_certify.errors import ParameterError
@@ -279,7 +280,7 @@ def test_a_rate_that_is_too_high_is_seen_as_violated():
     protocol = SlidingModeProtocol("0.1", 1, 1, 1, 2, 200, 1, 1, 0)
     cert = certify(graph, protocol, [3, 1], sigma0=["0.01", 0])
     assert cert.comparison is not None and not cert.comparison.violated and cert.trajectory is not None
-    wrong = replace(cert.envelope, members=(replace(cert.envelope.members[0], rate=6.0),))
+    wrong = replace(cert.envelope, members=(replace(cert.envelope.members[0], rate=Fraction(6)),))
     assert wrong.compare(cert.trajectory).violated
 
 

@@ -20,7 +20,7 @@ import lmi
 from lmi.apart import apart
 from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify import NominalProtocol, ParameterError, SignedDigraph, certify, check, simulate
-from ptcc_certify.certificate.certificate import STEPS
+from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.examples import load_graph
 from ptcc_certify.lyapunov import search as sharpen
 from ptcc_certify.lyapunov.error_system import ErrorSystem

@@ -33,9 +33,10 @@ from lmi.exact.definite import SparseFactor
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.input import box, ellipsoid
-from ptcc_certify.certificate import certificate as certificate_module
-from ptcc_certify.certificate import document
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate import procedure, vectors
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.format import certificate_document
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import UnreadableError, check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.checker.digraph import numbered
@@ -163,7 +164,7 @@ def judged(graph: SignedDigraph, rng: np.random.Generator, slides: bool) -> Cert
 
 def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):
     """A wrong claim that slips in anywhere before the JSON ends as undecided, with a note."""
-    honest = document.certificate_document
+    honest = certificate_document
 
     def lying(certificate: Any, verdict: str, files: bool = False) -> tuple[Json, Any]:
         data, written = honest(certificate, verdict, files)
@@ -189,7 +190,7 @@ def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
 @pytest.mark.parametrize("slides", [False, True])
 def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
-    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__(name, 5, slides)
     assert data["verdict"] == "certified"
     accepted(data)
@@ -230,7 +231,7 @@ def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monke
 
 
 def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "LONG", 5)
+    monkeypatch.setattr(vectors, "LONG", 5)
     for k, name in enumerate(("fig1a", "fig3b")):
         graph = load_graph(name)
         if k:  # floats
@@ -651,7 +652,7 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
 def large(name: str, seed: int = 3, slides: bool = False) -> Json:
     """The JSON of a certificate of a small graph that is treated as a large one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(certificate_module, "EXACT_NODES", 0)
+        patch.setattr(procedure, "EXACT_NODES", 0)
         patch.setattr(outcomes, "EXACT_NODES", 0)
         return made.__wrapped__(name, seed, slides)
 

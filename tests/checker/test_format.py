@@ -20,9 +20,8 @@ from side_files import with_factors, with_side_files
 
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as outcomes
-from ptcc_certify.certificate import certificate as certificate_module
-from ptcc_certify.certificate import document
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate import procedure, vectors
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -124,14 +123,14 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
     assert isinstance(data["components"], dict) and data["outcome"]["influence"]["followers"] is None
     for key in data["components"]:
         assert not valid(changed(data, ("components", key), data["components"][key][:MANY_COMPONENTS]))
-    monkeypatch.setattr(document, "writable", lambda x: 10**60 % x.denominator == 0)
+    monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__("3.1 no single")
     VALIDATOR.validate(data)
     assert data["proof"][2]["witness"] is not None
 
 
 def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(document, "LONG", 1)
+    monkeypatch.setattr(vectors, "LONG", 1)
     certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, simulation=False).save(tmp_path / "c.json")
     data = checker.read(tmp_path / "c.json")
     VALIDATOR.validate(data)
@@ -141,7 +140,7 @@ def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(certificate_module, "EXACT_NODES", 0)
+    monkeypatch.setattr(procedure, "EXACT_NODES", 0)
     monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
     data, _ = with_side_files(with_factors(made.__wrapped__("3.1 mixed", True, "best")))
     VALIDATOR.validate(data)

@@ -35,8 +35,8 @@ from side_files import with_factors, with_side_files
 import ptcc_certify
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.input import box, ellipsoid
-from ptcc_certify.certificate import certificate as certificate_module
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -77,7 +77,7 @@ def made(name: str, seed: int, slides: bool = False, large: bool = False, **opti
         start = None
     with pytest.MonkeyPatch.context() as patch:
         if large:
-            patch.setattr(certificate_module, "EXACT_NODES", 0)
+            patch.setattr(procedure, "EXACT_NODES", 0)
             patch.setattr(outcomes, "EXACT_NODES", 0)
         certificate = certify(graph, protocol, start, simulation=False, **options)
         return {**json.loads(certificate.to_json()), "unverified": {}}

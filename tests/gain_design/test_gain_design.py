@@ -3,7 +3,6 @@
 import functools
 import json
 import math
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,7 +13,7 @@ from scipy.linalg import expm
 from ptcc_certify import gain_design
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.input import Starts, box, ellipsoid
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bounds, design, least_peak, peak_factor
@@ -57,7 +56,7 @@ def _certify_once(monkeypatch):
         if starts is not None:
             starts = tuple(map(tuple, (starts.center, starts.radius, starts.axes)))
         first = gain_design._first_protocol(analyse(graph))
-        return replace(certified(graph, first, x0, starts), protocol=protocol, limits=tuple(limits))
+        return certified(graph, first, x0, starts).changed(protocol=protocol, limits=tuple(limits))
 
     monkeypatch.setattr(gain_design, "certify", again)
 

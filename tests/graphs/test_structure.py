@@ -17,7 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.structure import BEHAVIOURS, Claim, Structure, WeakComponent, analyse, behaviour_name
+from ptcc_certify.graphs.structure import BEHAVIOURS, Structure, WeakComponent, analyse, behaviour_name
+from ptcc_certify.theorems.claims import Claim
 
 Pair = tuple[int, int]
 Weighted = dict[Pair, Fraction]  # (source, target) -> weight

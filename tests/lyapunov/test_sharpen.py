@@ -12,9 +12,9 @@ from generators import all_classes, random_graph
 
 import lmi
 from ptcc_certify import NominalProtocol, SignedDigraph, SlidingModeProtocol, analyse, certify
-from ptcc_certify.bounds.deviation import root_above
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.function import root_above
 from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, Candidate, choose, prove_member, sharpen
 
 P = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -238,8 +238,8 @@ def holds_in_balls(graph: SignedDigraph, seed: int) -> str:
         s = clock(P, q)
         X = states(graph, s, x0)
         for member in cert.sharpening.members:
-            V0 = form_value(graph, member.nodes, member.diagonal, member.matrix, start)
-            V = form_value(graph, member.nodes, member.diagonal, member.matrix, X)
+            V0 = form_value(graph, member.nodes, member.weights or None, member.matrix, start)
+            V = form_value(graph, member.nodes, member.weights or None, member.matrix, X)
             bound = (-ball(member.rate) * s).exp() * V0
             assert not bound < V, (member.kind, q)
         for k in range(graph.n_nodes):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
 from ptcc_certify.graphs.digraph import SignedDigraph

@@ -17,7 +17,8 @@ from matplotlib.patches import FancyArrowPatch
 from scipy.integrate import quad
 
 import ptcc_certify
-from ptcc_certify.certificate.certificate import Certificate, certify
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
@@ -307,7 +308,7 @@ def test_frontiers_hold_every_proved_member(name: str) -> None:
     shown, members = labelled(ax), cert.envelope.members
     assert {m.kind for m in members} == set(shown) & set(CLASS_MARKERS)
     found = sorted((label, *point) for label in set(shown) & set(CLASS_MARKERS) for point in shown[label].get_xydata())  # type: ignore[attr-defined]
-    assert found == sorted((m.kind, m.prefactor, m.rate) for m in members)
+    assert found == sorted((m.kind, m.prefactor_above, m.rate_below) for m in members)
     for label, rate in (
         ("no rate exceeds (proved)", cert.upper_bound),
         ("spectral rate (numerical)", cert.spectral_rate),
@@ -360,7 +361,7 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
     assert np.array_equal(height, np.minimum.reduce(members))
     if axis == "clock":  # straight lines: the slope is half the rate
         for member, y in zip(cert.envelope.members, members, strict=True):
-            assert y == pytest.approx(y[0] * np.exp(-member.rate * place / 2), rel=1e-9)
+            assert y == pytest.approx(y[0] * np.exp(-member.rate_below * place / 2), rel=1e-9)
 
 
 def test_the_decay_needs_a_run_and_a_known_axis() -> None:

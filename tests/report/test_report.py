@@ -28,7 +28,7 @@ from generators import sparse_digraph
 
 import ptcc_certify
 from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
-from ptcc_certify.certificate.saved import RejectedCertificate, read_certificate
+from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph

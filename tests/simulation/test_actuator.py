@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

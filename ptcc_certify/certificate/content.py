@@ -1,0 +1,564 @@
+"""What a certificate holds: claims with their proof, what was asked, what was only observed; and what follows.
+
+Made by :func:`ptcc_certify.certify` or read from a file, it is the same class. Nothing here writes, reads or checks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from ptcc_certify.bounds.deviation import OutcomeGeometry
+from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
+from ptcc_certify.bounds.final_state import Influence, Outcome, influence
+from ptcc_certify.bounds.input import Effort, Limits, Starts, WorstStart, bound_effort, worst_start
+from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.request import Expectations, Request
+from ptcc_certify.certificate.vectors import Interval, outcome_witness
+from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.input_bounds import Form
+from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.lyapunov.rate_bound import RateLimit, optimality_ratio
+from ptcc_certify.lyapunov.search import DIAGONAL, Sharpening
+from ptcc_certify.protocols.disturbance import ExpressionDisturbance
+from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.simulation.run import simulate
+from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
+from ptcc_certify.theorems import Obligation, RateProof, Theorem, sliding_claim, theorem_for
+from ptcc_certify.theorems.claims import Claim
+from ptcc_certify.theorems.lemmas import EXACT_NODES
+
+#: What a simulated run meets under the sliding-mode protocol unless a file states an expression.
+ADVERSARY = "adversary"
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What was seen and is not claimed.
+
+    Attributes
+    ----------
+    trajectory : Trajectory or None
+        A simulated run.
+    numerical_rate : float or None
+        The paper's rate in floating point, per unit of the clock.
+    spectral_rate : float or None
+        ``2 min Re lambda`` in floating point, per unit of the clock: no certificate can reach further.
+    search : Sharpening
+        What was tried beside the paper's; the functions that were proved are apart.
+    cut_off : tuple of str
+        The searches that the time limit ended; what they had proved by then stands.
+    notes : tuple of str
+        What kept the verdict from ``certified``, and other remarks.
+    """
+
+    trajectory: Trajectory | None = None
+    numerical_rate: float | None = None
+    spectral_rate: float | None = None
+    search: Sharpening = field(default_factory=Sharpening)
+    cut_off: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The file that a certificate was read from, accepted by the independent check.
+
+    Attributes
+    ----------
+    path : Path
+    sha256 : str
+        Of the file.
+    document : mapping
+        Its JSON. What stands under ``unverified`` is the file's own word.
+    report : CheckReport
+        Of the independent check.
+    effort : Effort or None
+        What is proved about the input.
+    obligations : tuple of Obligation
+        What was proved, with witnesses as the JSON has them.
+    """
+
+    path: Path
+    sha256: str
+    document: Mapping[str, Any]
+    report: CheckReport
+    effort: Effort | None
+    obligations: tuple[Obligation, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Content:
+    """The parts of a certificate, and what follows from them."""
+
+    structure: Structure
+    protocol: Protocol
+    start: tuple[Fraction, ...] | None
+    sigma0: tuple[Fraction, ...] | None
+    reaching: tuple[ReachingTime, ...] | None
+    lyapunov: LyapunovFunction | None
+    proof: RateProof
+    sharper: tuple[LyapunovFunction, ...]
+    limit: RateLimit | None
+    outcome: Outcome | None
+    matrix: Influence | None
+    request: Request
+    observed: Observations
+    source: Source | None = None
+
+    def changed(self, **values: Any) -> Self:
+        """Return the certificate with other parts, in whichever group they are; what follows is computed anew.
+
+        Parameters
+        ----------
+        **values : Any
+            Fields of the certificate, of its ``request`` or of its ``observed``; ``sharpening`` is what a search found.
+
+        Examples
+        --------
+        >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+        >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+        >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+        >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
+        Fraction(1, 1)
+        """
+        if (found := values.pop("sharpening", None)) is not None:
+            values |= {"sharper": found.members, "search": replace(found, members=())}
+        for name in ("request", "observed"):
+            group = values.pop(name, getattr(self, name))
+            own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
+            values[name] = replace(group, **own)
+        return replace(self, **values)
+
+    # ------------------------------------------------------------------ parts by their short names
+
+    @property
+    def graph(self) -> SignedDigraph:
+        """The graph."""
+        return self.structure.graph
+
+    @property
+    def method(self) -> str:
+        """Which Lyapunov functions were searched."""
+        return self.request.method
+
+    @property
+    def at(self) -> Fraction | None:
+        """Instant for which the bound was optimised, in units of time."""
+        return self.request.at
+
+    @property
+    def starts(self) -> Starts | None:
+        """The set of starts for which the input is bounded; None: that of ``start`` alone."""
+        return self.request.starts
+
+    @property
+    def limits(self) -> tuple[Limits, ...]:
+        """Limits of the gain that are judged besides."""
+        return self.request.limits
+
+    @property
+    def delta(self) -> Fraction | None:
+        """Nominal protocol: bound of the disturbances that are judged besides, in units of the input."""
+        return self.request.delta
+
+    @property
+    def noise(self) -> Fraction | None:
+        """Nominal protocol: bound of the measurement noise that is judged under each of the limits."""
+        return self.request.noise
+
+    @property
+    def time_limit(self) -> float:
+        """Seconds that the searches were given, infinity for no limit."""
+        return self.request.time_limit
+
+    @property
+    def expectations(self) -> Expectations:
+        """What is asked besides."""
+        return self.request.expectations
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """A simulated run."""
+        return self.observed.trajectory
+
+    @property
+    def numerical_rate(self) -> float | None:
+        """The paper's rate in floating point, per unit of the clock; nothing is claimed about it."""
+        return self.observed.numerical_rate
+
+    @property
+    def spectral_rate(self) -> float | None:
+        """``2 min Re lambda`` in floating point, per unit of the clock: no certificate can reach further."""
+        return self.observed.spectral_rate
+
+    @property
+    def cut_off(self) -> tuple[str, ...]:
+        """The searches that the time limit ended."""
+        return self.observed.cut_off
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What kept the verdict from ``certified``, and other remarks."""
+        return self.observed.notes
+
+    @property
+    def sharpening(self) -> Sharpening:
+        """Sharper Lyapunov functions than the paper's, proved, and what else was tried."""
+        return replace(self.observed.search, members=self.sharper)
+
+    # ------------------------------------------------------------------ claims
+
+    @property
+    def theorem(self) -> Theorem:
+        """The theorem whose hypotheses the graph meets."""
+        return theorem_for(self.structure, self.protocol.kind)
+
+    @cached_property
+    def claims(self) -> tuple[Claim, ...]:
+        """What is claimed of each of ``structure.components``."""
+        claims = tuple(component.claim for component in self.structure.components)
+        return tuple(map(sliding_claim, claims)) if self.reaching is not None else claims
+
+    @property
+    def claim(self) -> Claim | None:
+        """What is claimed of a weakly connected graph; None if disconnected (see ``claims``)."""
+        return self.claims[0] if len(self.claims) == 1 else None
+
+    @property
+    def constant(self) -> bool:
+        """Whether every agent keeps its state, so that there is no decay to certify."""
+        return self.graph.n_edges == 0
+
+    @property
+    def direct(self) -> bool:
+        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
+        return not any(self.sigma0 or ())
+
+    # ------------------------------------------------------------------ rates
+
+    @cached_property
+    def functions(self) -> tuple[LyapunovFunction, ...]:
+        """Every proved Lyapunov function, the paper's first, with its name and its constants of deviation."""
+        found = self.sharper
+        if self.lyapunov is not None and self.lyapunov.blocks and self.lyapunov.rate is not None:
+            found = (self.lyapunov, *found)
+        if self.source is None:
+            geometry = self._geometry
+            found = tuple(replace(V, deviation=None if geometry is None else geometry.bound(V)) for V in found)
+        return tuple(replace(V, name=f"lyapunov.members[{k}]") for k, V in enumerate(found))
+
+    @cached_property
+    def _geometry(self) -> OutcomeGeometry | None:
+        """What turns Lyapunov functions into deviations; None without an exact outcome."""
+        if not self.influence.exact or outcome_witness(self.structure, self.influence) is not None:
+            return None
+        return OutcomeGeometry(self.structure, self.influence)
+
+    @property
+    def forms(self) -> list[Form | None]:
+        """The Lyapunov functions as bounds of the input take them; None for those of large graphs."""
+        return [V.form for V in self.functions]
+
+    @property
+    def _rated(self) -> list[LyapunovFunction]:
+        """The functions of a proved rate, the paper's first; as ``functions``, without what is not needed for rates."""
+        paper = () if self.lyapunov is None or self.lyapunov.rate is None else (self.lyapunov,)
+        return [*paper, *self.sharper]
+
+    @property
+    def rate(self) -> Fraction | None:
+        """The largest proved rate of all members; None if nothing decays or nothing was proved."""
+        return max((V.proved_rate for V in self._rated if V.proved_rate > 0), default=None)
+
+    @property
+    def paper_rate(self) -> Fraction | None:
+        """The rate of the paper's own certificate."""
+        return self.proof.rate
+
+    @property
+    def diagonal_rate(self) -> Fraction | None:
+        """The largest proved rate of a diagonal Lyapunov matrix of the sharper classes; None if there is none."""
+        rates = (V.proved_rate for V in self.sharper if V.kind in DIAGONAL)
+        return max((rate for rate in rates if rate > 0), default=None)
+
+    @property
+    def fastest(self) -> LyapunovFunction:
+        """The function of the largest proved rate, and of those that share it the one of the least prefactor."""
+        return max(self._rated, key=lambda V: (V.proved_rate, -V.prefactor))
+
+    @property
+    def prefactor(self) -> Fraction | None:
+        """What multiplies the squared norm at the largest proved rate."""
+        return self.fastest.prefactor if self.rate is not None else None
+
+    @property
+    def upper_bound(self) -> Fraction | None:
+        """The proved upper bound on the decay rate, per unit of the clock: no Lyapunov function exceeds it."""
+        return None if self.limit is None else self.limit.value
+
+    @property
+    def optimality_ratio(self) -> float | None:
+        """Proved rate over its proved upper bound, rounded down; at most 1."""
+        return optimality_ratio(self.rate, self.upper_bound)
+
+    @property
+    def rounding_loss(self) -> float | None:
+        """The largest relative loss of rate between what floating point found and what was proved; None without rates.
+
+        Matrices are rounded to short rationals, and their rates lowered until they prove.
+        """
+        pairs = [(V.proved_rate, V.numerical_rate) for V in self._rated]
+        losses = [float(1 - rate / Fraction(found)) * math.copysign(1, found) for rate, found in pairs if found]
+        return max(losses, default=None)
+
+    # ------------------------------------------------------------------ final state, bounds over time, input
+
+    @cached_property
+    def influence(self) -> Influence:
+        """``Q``, factored."""
+        return influence(self.structure) if self.matrix is None else self.matrix
+
+    @property
+    def final_state(self) -> tuple[Interval, ...] | None:
+        """Middle and radius of a proved interval for each agent's state at the deadline; radius 0 where it is exact."""
+        return None if self.outcome is None else self.outcome.intervals
+
+    @property
+    def degenerate(self) -> tuple[int, ...]:
+        """1-based numbers of the balanced closed components that meet at 0."""
+        return () if self.outcome is None else self.outcome.degenerate
+
+    @property
+    def longest_way(self) -> float | None:
+        """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
+        if self.start is None or self.outcome is None:
+            return None
+        return float(np.abs(np.array([float(x) for x in self.start]) - self.outcome.values).max())
+
+    @cached_property
+    def envelope(self) -> Envelope:
+        """The proved bounds over time; without members if nothing was proved."""
+        gain = self.protocol.gain
+        if isinstance(self.protocol, SlidingModeProtocol):
+            sigma0, reaching = self.sigma0 or (), self.reaching or ()
+            return SlidingEnvelope(self.structure, gain, self.functions, self.protocol, sigma0, reaching)
+        return Envelope(self.structure, gain, self.functions)
+
+    def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start.
+
+        Under the sliding-mode protocol it holds whatever the disturbance.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in [0, 1].
+
+        Returns
+        -------
+        (M,) array
+            Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start, or an instant is not from 0 to 1.
+        """
+        return self.envelope.norm_bound(remaining, self._known_start())
+
+    def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k(t) - x_k(T)|`` from the start, for every agent.
+
+        Under the sliding-mode protocol it holds whatever the disturbance.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in [0, 1].
+
+        Returns
+        -------
+        (N, M) array
+            Infinite where nothing was proved.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start, or an instant is not from 0 to 1.
+        """
+        return self.envelope.outcome_distance(remaining, self._known_start())
+
+    def _known_start(self) -> tuple[Fraction, ...]:
+        if self.start is None:
+            raise ParameterError("the certificate has no start; certify the graph with x0")
+        return self.start
+
+    def best_possible_residual(self, remaining: float) -> float | None:
+        """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical).
+
+        Raises
+        ------
+        ParameterError
+            ``remaining`` is not from 0 to 1.
+        """
+        if self.spectral_rate is None:
+            return None
+        return math.exp(-self.spectral_rate * self.protocol.gain.clock_at_remaining(remaining_part(remaining)) / 2)
+
+    @cached_property
+    def effort(self) -> Effort | None:
+        """What is proved about the input; None if no decay was proved."""
+        if self.source is not None:
+            return self.source.effort
+        if self.rate is None and not self.constant:
+            return None
+        return bound_effort(
+            self.structure,
+            self.protocol,
+            self.forms,
+            rate=self.rate,
+            limit=self.upper_bound,
+            start=self.start,
+            starts=self.starts,
+            sigma0=self.sigma0,
+            reaching=None if self.reaching is None else [r.z for r in self.reaching],
+            influence=self.influence,
+            distances=[None if V.deviation is None else V.deviation.agents for V in self.functions],
+            limits=self.limits,
+            delta=self.delta,
+            noise=self.noise,
+        )
+
+    @cached_property
+    def worst_start(self) -> WorstStart | None:
+        """The start of the set ``starts`` from which the input gets largest (numerical); None without a set."""
+        if self.starts is None or self.graph.n_nodes > EXACT_NODES:
+            return None
+        return worst_start(self.structure, self.protocol, self.starts)
+
+    # ------------------------------------------------------------------ proof
+
+    @cached_property
+    def obligations(self) -> tuple[Obligation, ...]:
+        """Everything that was proved, in the order of the JSON."""
+        if self.source is not None:
+            return self.source.obligations
+        found = [Obligation("structure", "graph"), Obligation("claim", "graph")]
+        if self.influence.exact:
+            found.append(Obligation("outcome", "graph", witness=outcome_witness(self.structure, self.influence)))
+        elif self.influence.enclosure is not None:
+            found.append(Obligation("outcome", "graph", witness=self.influence.enclosure.witness))
+        found += self.proof.obligations if self.proof.rate is not None else ()
+        for V in self.functions:
+            if V.kind != "paper":
+                kind = "rate" if V.dominance is None else "dominance"
+                found.append(Obligation(kind, V.name, {"b": V.proved_rate}, V.dominance))
+            if V.matrix is not None:
+                found.append(Obligation("prefactor", V.name, {"lowest": V.lowest, "highest": V.highest}))
+            if V.deviation is not None:
+                found.append(Obligation("distance", V.name))
+        if self.limit is not None:
+            witness = self.limit.witness(self.graph.labels)
+            found.append(Obligation(self.limit.kind, "rates", {"limit": self.limit.value}, witness))
+        if self.reaching is not None:
+            found.append(Obligation("sliding-bound", "protocol"))
+            if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
+                found.append(Obligation("reaching-time", "reaching_time"))
+        if self.effort is not None:
+            found += self.effort.obligations
+        return tuple(found)
+
+    # ------------------------------------------------------------------ simulation
+
+    @cached_property
+    def comparison(self) -> Comparison | None:
+        """The simulated run against the proved bounds; None without a run, or if nothing was proved."""
+        if self.trajectory is None or not (self.envelope.members or isinstance(self.envelope, SlidingEnvelope)):
+            return None
+        return self.envelope.compare(self.trajectory)
+
+    @property
+    def disturbance(self) -> str | None:
+        """The disturbance of a repeated run: the one written down, if it is an expression, otherwise ``adversary``.
+
+        None for the nominal protocol. No part of the claim, which holds for every disturbance within ``delta``.
+        """
+        if self.sigma0 is None:
+            return None
+        run = self.trajectory
+        said = run.source if isinstance(run, SlidingTrajectory) else None
+        if self.source is not None:
+            said = self.source.document["protocol"]["disturbance"]
+        if said is None or said == "none":
+            return said or ADVERSARY
+        try:
+            ExpressionDisturbance(said)
+        except PTCCError:
+            return ADVERSARY
+        return said
+
+    def simulate(self, **options: Any) -> Trajectory:
+        """Run the protocol again from the start with CVODES, without whatever limits of the gain were judged.
+
+        Under the sliding-mode protocol with :attr:`disturbance`; with the adversary where that exceeds ``delta``.
+
+        Parameters
+        ----------
+        **options : Any
+            ``samples`` and others of :func:`ptcc_certify.simulation.run.simulate`.
+
+        Returns
+        -------
+        Trajectory
+            The run, from 0 to the deadline.
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        SimulationError
+            The integrator failed.
+        """
+        start = [float(x) for x in self._known_start()]
+        if self.sigma0 is None:
+            return simulate(self.graph, self.protocol, start, **options)
+        options["sigma0"] = [float(x) for x in self.sigma0]
+        try:
+            return simulate(self.graph, self.protocol, start, disturbance=self.disturbance, **options)
+        except ParameterError:
+            if self.disturbance == ADVERSARY:
+                raise
+            return simulate(self.graph, self.protocol, start, disturbance=ADVERSARY, **options)
+
+    def with_simulation(self, **options: Any) -> Self:
+        """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.
+
+        Parameters
+        ----------
+        **options : Any
+            Those of :meth:`simulate`.
+
+        Returns
+        -------
+        Certificate
+
+        Raises
+        ------
+        ParameterError
+            The certificate has no start.
+        SimulationError
+            The integrator failed.
+        """
+        return self.changed(trajectory=self.simulate(**options))

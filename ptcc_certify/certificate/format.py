@@ -1,0 +1,515 @@
+"""The JSON of a certificate, schema ``ptcc-certificate/1``: written and read section by section.
+
+``FORMAT.md`` specifies it. What is read was accepted by the independent check, so that every part is there; nothing
+that is claimed is taken from the key ``unverified``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.bounds.enclosed_state import rounding_radius
+from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
+from ptcc_certify.bounds.final_state import Outcome
+from ptcc_certify.bounds.input import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
+from ptcc_certify.certificate.content import Content, Observations, Source
+from ptcc_certify.certificate.format_effort import read_effort
+from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.request import Expectations, Request
+from ptcc_certify.certificate.vectors import (
+    Interval,
+    Reader,
+    Writer,
+    exact_or_ball,
+    finite,
+    influence_balls,
+    interval_text,
+    number,
+    text,
+)
+from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
+from ptcc_certify.checker.input_bounds import Limits, Starts
+from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
+from ptcc_certify.checker.vectors import beside
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
+from ptcc_certify.lyapunov.function import DistanceBound, Dominance, LyapunovBlock, LyapunovFunction
+from ptcc_certify.lyapunov.rate_bound import RateLimit
+from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.simulation.trajectory import SlidingTrajectory
+from ptcc_certify.theorems import Obligation, RateProof
+from ptcc_certify.theorems.base import ExactInterval
+
+_LIMITS = ("gain_cap", "stop_before", "sample_period")
+
+
+def certificate_document(content: Content, verdict: str, files: bool = False) -> tuple[dict[str, Any], Writer]:
+    """Return a certificate as JSON-ready data, and what holds its side files."""
+    graph, structure = content.graph, content.structure
+    out = Writer(graph.labels, files)
+    outcome = _write_outcome(content, out)
+    final = None if outcome is None else outcome["final_state"]
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "producer": producer(),
+        "graph": graph_section(graph, out),
+        "structure": structure_section(structure, out),
+        **claim_sections(structure, content.claims, final, out),
+        "protocol": _write_protocol(content),
+        "paper": _write_paper(content),
+        "lyapunov": {"members": [_write_function(V, out) for V in content.functions]},
+        "rates": {
+            "paper": text(content.paper_rate),
+            "diagonal": text(content.diagonal_rate),
+            "certified": text(content.rate),
+            "limit": text(content.upper_bound),
+        },
+        "prefactor": _write_prefactor(content),
+        "initial_state": out.state("start", content.start),
+        "sigma0": out.state("sigma", content.sigma0),
+        "outcome": outcome,
+        "reaching_time": _write_reaching(content),
+        "effort": effort_section(content.effort, graph.labels, format_exact),
+        "proof": [_write_obligation(o, out) for o in content.obligations],
+        "verdict": verdict,
+    }
+    return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
+
+
+def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport) -> dict[str, Any]:
+    """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
+    graph = certificate_graph(document, path.parent)
+    structure, protocol, data = analyse(graph), _read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
+    proof = tuple(_read_obligation(step) for step in document["proof"])
+    steps = {(step.kind, step.of): step for step in proof}
+    paper, functions = document["paper"], document["lyapunov"]["members"]
+    members = [
+        _read_function(f"lyapunov.members[{k}]", said, structure, data, steps) for k, said in enumerate(functions)
+    ]
+    lyapunov = next((replace(V, objective=paper["objective"]) for V in members if V.kind == "paper"), None)
+    start, ends = data.state(document["initial_state"]), None
+    if paper is not None and paper["rho_interval"] is not None:
+        ends = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
+    effort = read_effort(document["effort"], start, structure, protocol, data, steps)
+    return {
+        "structure": structure,
+        "protocol": protocol,
+        "start": start,
+        "sigma0": data.state(document["sigma0"]),
+        "reaching": _read_reaching(document["reaching_time"], protocol),
+        "lyapunov": lyapunov,
+        "proof": RateProof(
+            None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), ends
+        ),
+        "sharper": tuple(V for V in members if V.kind != "paper"),
+        "limit": _read_limit(steps, data),
+        "outcome": _read_outcome(document["outcome"], structure, data),
+        "matrix": None,
+        "request": _read_request(document["unverified"], None if effort is None else effort.starts),
+        "observed": _read_observations(document["unverified"]),
+        "source": Source(path, sha256, document, report, effort, proof),
+    }
+
+
+def producer() -> str:
+    """Return the name and version of this program, as certificates tell who made them."""
+    from importlib.metadata import version
+
+    return f"ptcc-certify {version('ptcc-certify')}"
+
+
+# ---------------------------------------------------------------------- protocol
+
+
+def _write_protocol(content: Content) -> dict[str, Any]:
+    run, section = content.trajectory, content.protocol.to_dict()
+    if content.reaching is None:
+        return section
+    return {**section, "disturbance": run.source if isinstance(run, SlidingTrajectory) else None}
+
+
+def _read_protocol(said: Mapping[str, Any]) -> Protocol:
+    kind = NominalProtocol if said["kind"] == "nominal" else SlidingModeProtocol
+    return kind(**{key: exact(value) for key, value in said.items() if key not in ("kind", "disturbance")})
+
+
+def _write_reaching(content: Content) -> dict[str, Any] | None:
+    if content.reaching is None:
+        return None
+    times = {label: text(r.z) for label, r in zip(content.graph.labels, content.reaching, strict=True)}
+    return {"bound": SLIDING_BOUND, "clock": SLIDING_CLOCK, "z": times}
+
+
+def _read_reaching(said: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+    if said is None or not isinstance(protocol, SlidingModeProtocol):
+        return None
+    return tuple(ReachingTime(protocol.T_r, number(z)) for z in said["z"].values())
+
+
+# ---------------------------------------------------------------------- Lyapunov functions
+
+
+def _write_paper(content: Content) -> dict[str, Any] | None:
+    """Write the row of the theorem: its Lyapunov function, whether a rate of it was proved or not."""
+    V, interval = content.lyapunov, content.proof.interval
+    if V is None:
+        return None
+    return {
+        "theorem": content.theorem.number,
+        "objective": V.objective,
+        "coordinates": V.coordinates,
+        "blocks": [_write_block(block, Writer(content.graph.labels)) for block in V.blocks],
+        "rho": text(V.rho),
+        "rho_interval": interval and {"printed": text(interval.printed), "exact": text(interval.exact)},
+        "rate": text(V.rate),
+        "prefactor": format_exact(V.prefactor) if V.blocks else None,
+    }
+
+
+def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
+    distance = V.deviation and {
+        "agents": dict(zip(out.labels, map(format_exact, V.deviation.agents), strict=True)),
+        "norm": format_exact(V.deviation.norm),
+    }
+    return {
+        "class": V.kind,
+        "coordinates": V.coordinates,
+        "blocks": [_write_block(block, out) for block in V.blocks],
+        "rho": text(V.rho),
+        "rate": text(V.rate),
+        "prefactor": format_exact(V.prefactor),
+        "distance": distance,
+    }
+
+
+def _read_function(
+    name: str,
+    said: Mapping[str, Any],
+    structure: Structure,
+    data: Reader,
+    steps: Mapping[tuple[str, str], Obligation],
+) -> LyapunovFunction:
+    given, full, rows = said["distance"], steps.get(("prefactor", name)), steps.get(("dominance", name))
+    blocks = tuple(_read_block(block, data, rows is not None) for block in said["blocks"])
+    gauge = structure.closed_components[0].gauge if said["coordinates"] == "eps" else ()
+    return LyapunovFunction(
+        said["class"],
+        said["coordinates"],
+        blocks,
+        number(said["rho"]),
+        number(said["rate"]),
+        None if full is None else (full.numbers["lowest"], full.numbers["highest"]),
+        gauge or (),
+        dominance=None if rows is None else Dominance(data.floats(rows.witness["vector"], len(blocks[0].nodes))),
+        deviation=None if given is None else DistanceBound(data.agents(given["agents"]), exact(given["norm"])),
+        name=name,
+    )
+
+
+def _write_block(block: LyapunovBlock, out: Writer) -> dict[str, Any]:
+    section: dict[str, Any] = {"name": block.name, "nodes": out.nodes(block.nodes)}
+    if block.matrix is not None:
+        section["lower_triangle"] = [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(block.matrix)]
+    elif block.dyadic is not None:
+        section["diagonal"] = out.floats("diagonal", block.dyadic)
+    else:
+        section["diagonal"] = [format_exact(w) for w in block.diagonal]
+    return {**section, "times_rho": block.times_rho}
+
+
+def _read_block(said: Mapping[str, Any], data: Reader, large: bool) -> LyapunovBlock:
+    nodes = data.nodes(said["nodes"])
+    if "lower_triangle" in said:
+        return LyapunovBlock(said["name"], nodes, matrix=triangle(said["lower_triangle"], len(nodes)))
+    if large:
+        return LyapunovBlock(said["name"], nodes, dyadic=data.floats(said["diagonal"], len(nodes)))
+    return LyapunovBlock(said["name"], nodes, tuple(map(exact, said["diagonal"])), said["times_rho"])
+
+
+def _write_prefactor(content: Content) -> dict[str, Any] | None:
+    if content.rate is None:
+        return None
+    V = content.fastest
+    return {"value": format_exact(V.prefactor), "of": f"||{V.coordinates}||^2"}
+
+
+def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> RateLimit | None:
+    step = steps.get(("rate-limit", "rates")) or steps.get(("rate-mean", "rates"))
+    if step is None:
+        return None
+    value, said = step.numbers["limit"], step.witness
+    if "node" in said:
+        return RateLimit(value, data.nodes([said["node"]]))
+    form, vectors = triangle(said["lower_triangle"], len(said["nodes"])), said["vectors"]
+    return RateLimit(value, data.nodes(said["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
+
+
+# ---------------------------------------------------------------------- final state
+
+
+def _write_outcome(content: Content, out: Writer) -> dict[str, Any] | None:
+    """Write the outcome with the influence of every leader, exact or in balls; None if it is floating point."""
+    if content.influence.exact:
+        return _exact_outcome(content)
+    return None if content.influence.enclosure is None else _enclosed_outcome(content, out)
+
+
+def _exact_outcome(content: Content) -> dict[str, Any]:
+    matrix, structure, labels = content.influence, content.structure, content.graph.labels
+    voices, pulls = influence_balls(matrix)
+    section: dict[str, Any] = {"final_state": None, "degenerate": None}
+    if content.outcome is not None and content.start is not None:
+        gone = content.sigma0 or [Fraction(0)] * len(labels)
+        moved = [x - s for x, s in zip(content.start, gone, strict=True)]
+        final: list[Interval] = [(Fraction(0), Fraction(0))] * len(labels)
+        values = []
+        for component, voice in zip(matrix.balanced, voices, strict=True):
+            middle = sum((w * moved[v] for v, (w, _) in zip(component.nodes, voice, strict=True)), Fraction(0))
+            radius = sum((r * abs(moved[v]) for v, (_, r) in zip(component.nodes, voice, strict=True)), Fraction(0))
+            values.append((middle, radius))
+            for v, sign in zip(component.nodes, component.gauge or (), strict=True):
+                final[v] = (sign * middle, radius)
+        for v, row in zip(structure.followers.tolist(), pulls, strict=True):
+            pairs = list(zip(row, values, strict=True))
+            middle = sum((w * x for (w, _), (x, _) in pairs), Fraction(0))
+            final[v] = (middle, sum((abs(w) * s + r * abs(x) + r * s for (w, r), (x, s) in pairs), Fraction(0)))
+        section["final_state"] = {label: interval_text(x) for label, x in zip(labels, final, strict=True)}
+        section["degenerate"] = list(content.outcome.degenerate)
+    section["influence"] = {
+        "components": [
+            {"nodes": [labels[v] for v in c.nodes], "voices": [interval_text(w) for w in voice]}
+            for c, voice in zip(matrix.balanced, voices, strict=True)
+        ],
+        "followers": {
+            labels[v]: [interval_text(w) for w in row]
+            for v, row in zip(structure.followers.tolist(), pulls, strict=True)
+        },
+    }
+    return section
+
+
+def _enclosed_outcome(content: Content, out: Writer) -> dict[str, Any]:
+    """Write the outcome of a large graph: voices of leader groups, and the final state in intervals."""
+    labels, matrix, found = content.graph.labels, content.influence, content.outcome
+    assert matrix.enclosure is not None
+    final: dict[str, Any] | None = None
+    if found is not None and found.radius is not None:
+        pairs = list(zip(found.final_state, found.radius, strict=True))
+        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
+            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
+            final = {"mid": out.vector("mid", found.values), "radius": out.vector("radius", np.array(radius))}
+        else:
+            final = {label: _enclosed_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
+    groups = []
+    for k, (component, voice) in enumerate(zip(matrix.balanced, matrix.voices, strict=True)):
+        if k in matrix.enclosure.voices:
+            middles, radii = (x.tolist() for x in matrix.enclosure.voices[k])
+            voices: list[Any] = [{"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)]
+        else:
+            voices = [exact_or_ball(Fraction(w)) for w in voice]
+        if len(component.nodes) > 1:
+            groups.append({"nodes": [labels[v] for v in component.nodes], "voices": voices})
+    degenerate = None if found is None else list(found.degenerate)
+    return {"final_state": final, "degenerate": degenerate, "influence": {"components": groups, "followers": None}}
+
+
+def _enclosed_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
+    if radius == 0:
+        return exact_or_ball(Fraction(x))
+    if isinstance(x, float):
+        return {"mid": repr(x), "radius": repr(float(radius))}
+    return {"mid": format_exact(x), "radius": format_exact(radius)}
+
+
+def _read_outcome(said: Mapping[str, Any] | None, structure: Structure, data: Reader) -> Outcome | None:
+    if said is None or said["final_state"] is None:
+        return None
+    final = said["final_state"]
+    if list(final) == ["mid", "radius"] and beside(final["mid"]):
+        middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
+    else:
+        middle, radius = zip(*map(interval, final.values()), strict=True)
+    values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
+    spread = radius if any(radius) else None
+    return Outcome(structure.graph.labels, middle, tuple(values), tuple(said["degenerate"] or ()), spread)
+
+
+# ---------------------------------------------------------------------- proof
+
+
+def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
+    """Return one step of the proof."""
+    witness = obligation.witness
+    if isinstance(witness, Dominance):
+        witness = _dominance_witness(witness, out)
+    elif isinstance(witness, EnergyIntegral):
+        witness = energy_witness(witness, format_exact)
+    elif isinstance(witness, Peak):
+        witness = peak_witness(witness, out.labels, format_exact)
+    elif isinstance(witness, tuple):
+        witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
+    elif isinstance(witness, np.ndarray):
+        by_label = zip(out.labels, map(repr, witness.tolist()), strict=True)
+        witness = {"u": out.vector("u", witness) if out.aside(witness.size) else dict(by_label)}
+    return {
+        "kind": obligation.kind,
+        "of": obligation.of,
+        "statement": obligation.statement,
+        "lemma": obligation.lemma,
+        "numbers": {name: format_exact(value) for name, value in obligation.numbers.items()},
+        "witness": witness,
+    }
+
+
+def _read_obligation(said: Mapping[str, Any]) -> Obligation:
+    numbers = {name: exact(value) for name, value in said["numbers"].items()}
+    return Obligation(said["kind"], said["of"], numbers, said["witness"])
+
+
+def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
+    """Return the vector, and the proof of every leader group, each factor once."""
+    groups: list[Any] = []
+    first = 0
+    for group, scale in zip(proof.groups, proof.scales, strict=True):
+        rate = format_exact(group.rate)
+        unit = math.frexp(float(group.weights[0]))[1]
+        key = first, group.rate, np.ldexp(group.weights, -unit).tobytes()
+        told = key in out.told
+        out.told.add(key)
+        if group.factor is None or told:
+            groups.append(rate)
+        else:
+            # The factor is that of the group's own weights, of which those of the function are a power of two.
+            factor = {
+                key: out.integers(key, getattr(group.factor, key))
+                for key in ("order", "indptr", "indices", "data", "exponents")
+            }
+            weights = group.factor.weights
+            factor |= {
+                "bits": group.factor.bits,
+                "power": group.power + 1 - math.frexp(scale)[1],
+                "weights": None if weights is None else out.integers("weights", weights),
+                "parents": None if group.parents is None else out.integers("parents", group.parents),
+            }
+            groups.append({"rate": rate, "factor": factor})
+        first += group.weights.size
+    return {"vector": out.floats("vector", proof.vector), "groups": groups}
+
+
+# ---------------------------------------------------------------------- what is not verified
+
+
+def _write_unverified(content: Content) -> dict[str, Any]:
+    search, envelope = content.sharpening, content.envelope
+    remaining = (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
+    residual = {str(1 - q if q > 1e-3 else f"1-{q:g}"): q for q in remaining}
+    floats = None
+    if content.outcome is not None and not content.outcome.exact:
+        floats = dict(zip(content.graph.labels, map(finite, content.outcome.values.tolist()), strict=True))
+    return {
+        "spectral": finite(content.spectral_rate),
+        "optimality_ratio": content.optimality_ratio,
+        "paper_rate": finite(content.numerical_rate),
+        "rounding_loss": finite(content.rounding_loss),
+        "search": {
+            "method": content.method,
+            "at": None if content.at is None else float(content.at),
+            "tried": {kind: finite(rate) for kind, rate in search.tried.items()},
+            "diagonal_limit": finite(search.diagonal_limit),
+        },
+        "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
+        "final_state": floats,
+        "asked": _write_asked(content.request),
+        "simulation": _write_run(content),
+        "time_limit": finite(content.time_limit),
+        "cut_off": list(content.cut_off),
+        "notes": list(content.notes),
+    }
+
+
+def _write_run(content: Content) -> dict[str, Any] | None:
+    run, seen = content.trajectory, content.comparison
+    if seen is None:
+        return None
+    section = {
+        "worst_ratio": finite(seen.worst_ratio),
+        "floor": finite(seen.floor),
+        "resolved_until": seen.resolved_until,
+        "judged": seen.judged,
+        "ratios": {str(k): finite(v) for k, v in seen.ratios.items()},
+        "stop": seen.stop,
+        "tolerances": {"relative": seen.tolerance},
+        "distance_ratio": finite(seen.distance_ratio),
+        "deadline_resolved": seen.deadline_resolved,
+    }
+    if not isinstance(run, SlidingTrajectory):
+        return section
+    return section | {
+        "sliding_ratio": finite(seen.sliding_ratio),
+        "reaching_kept": seen.reaching_kept,
+        "reached": dict(zip(content.graph.labels, map(finite, run.reaching_z.tolist()), strict=True)),
+        "disturbance_bounded_by": run.bounded_by,
+    }
+
+
+def _read_observations(said: Mapping[str, Any]) -> Observations:
+    """Read what the file says of searches; other observations are made anew."""
+    return Observations(cut_off=_texts(said.get("cut_off")), notes=_texts(said.get("notes")))
+
+
+def _write_asked(request: Request) -> dict[str, Any]:
+    """Return what was asked; what became of it is no part of the claim, and follows from what is."""
+    asked = request.expectations
+    return {
+        "behaviour": asked.behaviour,
+        "min_rate": text(asked.min_rate),
+        "max_input": text(asked.max_input),
+        "limits": [{name: text(getattr(entry, name)) for name in _LIMITS} for entry in request.limits],
+        "delta": text(request.delta),
+        "noise": text(request.noise),
+    }
+
+
+def _read_request(unverified: Mapping[str, Any], starts: Starts | None) -> Request:
+    """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
+    asked, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
+    asked = asked if isinstance(asked, dict) else {}
+    method, behaviour = search.get("method") if isinstance(search, dict) else None, asked.get("behaviour")
+    try:
+        behaviour = behaviour_name(behaviour) if isinstance(behaviour, str) else None
+    except ValueError:
+        behaviour = None
+    entries = asked.get("limits")
+    each = [
+        [_positive(entry, key) for key in _LIMITS] for entry in (entries if isinstance(entries, list) else [])[:100]
+    ]
+    return Request(
+        method=method if method in METHODS else "best",
+        starts=starts,
+        limits=tuple(Limits(*entry) for entry in each if any(entry)),
+        delta=_positive(asked, "delta"),
+        noise=_positive(asked, "noise"),
+        time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
+        expectations=Expectations(behaviour, _positive(asked, "min_rate"), _positive(asked, "max_input")),
+    )
+
+
+def _positive(said: Any, key: str) -> Fraction | None:
+    try:
+        value = None if said.get(key) is None else exact(said[key])
+    except (AttributeError, RejectedError):
+        return None
+    return value if value is not None and value > 0 else None
+
+
+def _texts(said: Any) -> tuple[str, ...]:
+    return tuple(one for one in said if isinstance(one, str)) if isinstance(said, list) else ()

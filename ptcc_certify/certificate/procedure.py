@@ -1,0 +1,400 @@
+"""``certify``: from a graph, a protocol and an initial state to a certificate, step by step.
+
+Structure, theorem, Lyapunov functions, proved rates, upper bound, final state, and the word of the independent check.
+Every claim of a certificate outside ``unverified`` was established in exact or ball arithmetic, and verified again by
+the check; a simulation corroborates and never proves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from lmi import deadline
+from lmi.apart import apart
+from lmi.deadline import share_of_time
+from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
+from lmi.errors import LMIError, OutOfTime
+from ptcc_certify.bounds.enclosed_state import NotEnclosedError, enclose, enclosed_outcome
+from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.bounds.final_state import Influence, Outcome, influence, outcome
+from ptcc_certify.bounds.input import Limits
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.content import Observations
+from ptcc_certify.certificate.request import Expectations, Request, initial_state, read_request, refuse, sliding_start
+from ptcc_certify.certificate.verdict import MANY_DECADES
+from ptcc_certify.errors import HypothesisError, SimulationError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.lyapunov.rate_bound import RateLimit, mean_limit, prove_rate_limit
+from ptcc_certify.lyapunov.search import APART_NODES, Sharpening, sharpen, sharpen_large
+from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.simulation.filippov import rounding_slack
+from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.simulation.run import PAST, simulate
+from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems import RateProof, Theorem, theorem_for
+from ptcc_certify.theorems.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
+
+#: What :func:`certify` does, in this order.
+STEPS = (
+    "simulation",
+    "the paper's certificate",
+    "sharper certificates",
+    "limit of rates",
+    "outcome",
+    "independent check",
+)
+#: Below this time limit, in seconds, the solver is loaded before the time begins to run.
+SHORT_LIMIT = 10
+#: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
+#: of the time then left that the first of the steps may take.
+SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
+#: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
+SEARCH_NODES = 150
+#: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
+SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
+#: A simulated end state is settled when it is this near to the outcome, relative to the start.
+SETTLED = 1e-6
+
+
+def certify(
+    graph: SignedDigraph,
+    protocol: Protocol,
+    x0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    *,
+    sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    disturbance: Any = None,
+    simulation: bool | None = None,
+    method: str = "best",
+    at: Any = None,
+    starts: Any = None,
+    limits: Sequence[Actuator | Limits] = (),
+    delta: Any = None,
+    noise: Any = None,
+    time_limit: float | None = None,
+    expectations: Expectations | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Certificate:
+    """Certify what a protocol does on a signed digraph.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+        Any signed digraph, disconnected ones included.
+    protocol : NominalProtocol or SlidingModeProtocol
+        With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
+    x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        The start, in node order, or by label where there are labels. Without it there is no final state and no
+        simulation.
+    sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
+        outcome.
+    disturbance : Disturbance, str, number, callable or sequence, optional
+        Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.run.simulate`.
+    simulation : bool, optional
+        Whether to compare the proved bound with a CVODES run; by default up to 10,000 agents.
+    method : {"best", "paper", "perron", "lmi", "full"}
+        Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.lyapunov.search`.
+    at : number, optional
+        An instant before the deadline, in units of time, at which the bound should be smallest.
+    starts : Starts or positive number, optional
+        The set of starts for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
+        ``||X(0)||_inf <= R``.
+    limits : sequence of Actuator
+        Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
+    delta : number, optional
+        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
+    noise : number, optional
+        Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
+        under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    time_limit : float, optional
+        Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
+        proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
+        more for every 1,000 nodes.
+    expectations : Expectations, optional
+        What is asked besides: a behaviour, a rate, a bound of the input. It decides nothing but the ``assessment``.
+    progress : callable, optional
+        Is told each of :data:`STEPS` as it begins.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ParameterError
+        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, with other labels
+        than the nodes, beyond 1e300 or of thousands of digits, or a disturbance that exceeds ``delta``.
+
+    References
+    ----------
+    Theorems 1 to 6, Corollaries 1 to 10 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols.nominal import NominalProtocol
+    >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
+    >>> cert
+    Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified)
+    >>> cert.outcome
+    Outcome(1=-1, 2=1)
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
+    >>> cert, cert.reaching
+    (Certificate(bipartite consensus, Theorem 4.1, rate 3.99999, certified), (ReachingTime(0.43409, 0.565 before T_r), \
+ReachingTime(0, 1 before T_r)))
+    >>> cert.outcome
+    Outcome(1=-1.5, 2=1.5)
+    """
+    asked = {"method": method, "at": at, "starts": starts, "limits": limits, "delta": delta, "noise": noise}
+    refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
+    structure = analyse(graph)
+    request = read_request(structure, protocol, {**asked, "time_limit": time_limit, "expectations": expectations})
+    start = None if x0 is None else initial_state(structure, x0, "x0")
+    manifold, reaching = sliding_start(structure, protocol, sigma0)
+    case = Case(structure, protocol, request, start, manifold, progress)
+    runs = case.simulated(simulation) and start is not None
+    if not runs and disturbance is not None and isinstance(protocol, SlidingModeProtocol):
+        horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
+        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
+        source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
+    if request.time_limit < SHORT_LIMIT and graph.n_nodes <= CLARABEL_MARGIN_ROWS:
+        load_solver()
+    with deadline.time_limit(SEARCHING * request.time_limit):
+        trajectory = case.simulation(disturbance) if runs else None
+        lyapunov, proof, numerical = case.paper()
+        sharpening = case.sharper(proof)
+        limit = case.upper_bound()
+    matrix, result = case.final_state(trajectory)
+    proved = [proof.rate, *(V.rate for V in sharpening.members)]
+    certificate = Certificate(
+        structure=structure,
+        protocol=protocol,
+        start=start,
+        sigma0=manifold,
+        reaching=reaching,
+        lyapunov=lyapunov,
+        proof=proof,
+        sharper=sharpening.members,
+        limit=limit,
+        outcome=result,
+        matrix=matrix,
+        request=request,
+        observed=Observations(
+            trajectory=trajectory,
+            numerical_rate=numerical,
+            spectral_rate=_spectral_rate(structure, proved, case.notes),
+            search=replace(sharpening, members=()),
+            cut_off=tuple(case.cut_off),
+            notes=tuple(case.notes),
+        ),
+    )
+    progress(STEPS[5])
+    return _with_word_of_check(certificate)
+
+
+def _with_word_of_check(certificate: Certificate) -> Certificate:
+    """Check a certificate, and note what the check has to say besides."""
+    report = certificate.checked
+    if report is not None and report.accepted and report.memory > 1:
+        note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
+        return certificate.changed(notes=(*certificate.notes, note))
+    if report is not None and not report.accepted:
+        note = f"the independent check does not accept {report.rejected}: {report.reason}"
+        return certificate.changed(notes=(note, *certificate.notes))
+    return certificate
+
+
+# ---------------------------------------------------------------------- the steps
+
+
+@dataclass
+class Case:
+    """A graph, a protocol and what is asked, on the way to a certificate: the steps, in their order.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : NominalProtocol or SlidingModeProtocol
+    request : Request
+    start, sigma0 : tuple of N Fraction, or None
+    progress : callable
+        Is told each of :data:`STEPS` as it begins.
+    notes : list of str
+        What went wrong, and other remarks.
+    cut_off : list of str
+        What the time limit ended.
+    """
+
+    structure: Structure
+    protocol: Protocol
+    request: Request
+    start: tuple[Fraction, ...] | None
+    sigma0: tuple[Fraction, ...] | None
+    progress: Callable[[str], None]
+    notes: list[str] = field(default_factory=list)
+    cut_off: list[str] = field(default_factory=list)
+
+    def simulated(self, asked: bool | None) -> bool:
+        """Tell whether there is to be a run."""
+        n = self.structure.graph.n_nodes
+        if asked is None and n > SIMULATED_NODES:
+            self.notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
+            return False
+        return asked is not False
+
+    def simulation(self, disturbance: Any) -> Trajectory | None:
+        """Run the protocol from the start with CVODES."""
+        graph = self.structure.graph
+        self.progress(STEPS[0])
+        more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
+        if self.sigma0 is not None:
+            more |= {"sigma0": [float(x) for x in self.sigma0], "disturbance": disturbance}
+        with share_of_time(SHARES[0], STEPS[0], self.cut_off):
+            try:
+                return simulate(graph, self.protocol, [float(x) for x in self.start or ()], **more)
+            except SimulationError as error:
+                self.notes.append(f"simulation: {error}")
+        return None
+
+    def paper(self) -> tuple[LyapunovFunction | None, RateProof, float | None]:
+        """Search the Lyapunov function of the theorem and prove its rate."""
+        self.progress(STEPS[1])
+        V, proof, numerical = None, RateProof(None, ()), None
+        with share_of_time(SHARES[1], STEPS[1], self.cut_off):
+            V, proof, numerical = _search_and_prove(
+                self.structure, theorem_for(self.structure, self.protocol.kind), self.notes
+            )
+        return None if V is None else replace(V, rate=proof.rate, numerical_rate=numerical), proof, numerical
+
+    def sharper(self, paper: RateProof) -> Sharpening:
+        """Search and prove sharper Lyapunov functions."""
+        self.progress(STEPS[2])
+        found = Sharpening()
+        with share_of_time(SHARES[2], STEPS[2], self.cut_off):
+            found = _sharpen(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
+            self.cut_off += found.cut_off
+        if paper.rate is None and not any(V.proved_rate > 0 for V in found.members) and self.structure.graph.n_edges:
+            self.notes.insert(0, _precision_note(self.structure.graph))
+        return found
+
+    def upper_bound(self) -> RateLimit | None:
+        """Prove the upper bound on the decay rate."""
+        self.progress(STEPS[3])
+        mean = mean_limit(self.structure)
+        with share_of_time(SHARES[3], STEPS[3], self.cut_off):
+            return prove_rate_limit(self.structure)
+        return mean  # which stands if time ran out
+
+    def final_state(self, run: Trajectory | None) -> tuple[Influence, Outcome | None]:
+        """Compute who decides whom, and where the agents end: exactly, or enclosed."""
+        self.progress(STEPS[4])
+        structure, matrix, start = self.structure, influence(self.structure), self.start
+        gone = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
+        moved = None if start is None else [x - s if s else x for x, s in zip(start, gone, strict=True)]
+        result = None
+        if not matrix.exact:
+            try:
+                enclosed = replace(matrix, enclosure=enclose(structure, matrix))
+                result = None if moved is None else enclosed_outcome(structure, enclosed, moved)
+                matrix = enclosed
+            except NotEnclosedError as error:
+                self.notes.append(f"the outcome is floating point only: {error}")
+        if result is None and moved is not None:
+            result = outcome(structure, moved, matrix=matrix)
+        if run is not None and result is not None:
+            gap = float(np.abs(run.final_state - result.values).max())
+            if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
+                self.notes.append(
+                    f"the simulated run is still {gap:.1e} from the outcome: its slowest modes had not settled"
+                )
+        return matrix, result
+
+
+def _search_and_prove(
+    structure: Structure, theorem: Theorem, notes: list[str]
+) -> tuple[LyapunovFunction | None, RateProof, float | None]:
+    n = structure.graph.n_nodes
+    nothing = RateProof(None, ())
+    if n > SEARCH_NODES:
+        notes.append(f"the search of the paper's certificate stops at {SEARCH_NODES} nodes; the graph has {n}")
+        return None, nothing, None
+    try:
+        with np.errstate(all="ignore"):
+            search = partial(_searched, theorem, structure)
+            (V,) = apart(search) if n > APART_NODES else search()
+            numerical = theorem.rate(structure, V) if V.blocks else None
+    except OutOfTime:
+        raise
+    except (LMIError, np.linalg.LinAlgError) as error:
+        notes.append(f"no Lyapunov matrix was found: {error}")
+        return None, nothing, None
+    except (
+        HypothesisError,
+        ZeroDivisionError,
+        OverflowError,
+    ):  # the structure meets the hypotheses exactly, so it is the floats that do not
+        notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
+        return None, nothing, None
+    if n > EXACT_NODES:
+        notes.append(f"the paper's certificate is proved up to {EXACT_NODES} nodes; the graph has {n}")
+        return V, nothing, numerical
+    with np.errstate(all="ignore"):
+        proof = theorem.prove(structure, V)
+    if proof.failed:
+        notes.append(proof.failed)
+    return V, proof, numerical
+
+
+def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
+    return [theorem.lyapunov(structure)]
+
+
+def _sharpen(
+    structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
+) -> Sharpening:
+    """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
+    gain = protocol.gain
+    clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
+    own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
+    if structure.graph.n_nodes <= EXACT_NODES:
+        found = sharpen(ErrorSystem(structure), method, clocks, own)
+    else:
+        found = sharpen_large(structure, method, clocks if own is None else [*clocks, own])
+    notes.extend(found.notes)
+    return found
+
+
+def _precision_note(graph: SignedDigraph) -> str:
+    """Tell how far apart the weights lie, where no rate was proved."""
+    decades = graph.weight_decades
+    if decades < MANY_DECADES:
+        return "no rate was proved"
+    return f"no rate was proved; the weights span {decades} decades, which may be too many for float64"
+
+
+def _spectral_rate(structure: Structure, proved: Sequence[Fraction | None], notes: list[str]) -> float | None:
+    if int(np.bincount(structure.strong_component).max()) > FACTOR_NODES:
+        notes.append(f"the spectral rate is not computed for strong components above {FACTOR_NODES} nodes")
+        return None
+    try:
+        rate = laplacian_spectrum(structure).spectral_rate
+    except np.linalg.LinAlgError:
+        rate = math.nan
+    if rate is not None and not (rate > 0 and math.isfinite(rate) and max(x or 0 for x in proved) <= rate * (1 + 1e-6)):
+        notes.append("the spectral rate was not found, or is lost in the rounding of float64")
+        return None
+    return rate

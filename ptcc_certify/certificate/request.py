@@ -1,0 +1,250 @@
+"""What is asked of :func:`ptcc_certify.certify`, read and refused where it does not fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.numbers import MAX_SCALE_BITS
+from ptcc_certify.bounds.final_state import exact_start
+from ptcc_certify.bounds.input import Limits, Starts, starts_within
+from ptcc_certify.checker import REACHING_BITS
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols.gain import parameter
+from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
+from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.theorems.lemmas import EXACT_NODES
+
+#: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
+LARGEST_STATE = Fraction(10**300)
+#: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
+LONGEST_BITS = 470_000
+
+
+@dataclass(frozen=True)
+class Expectations:
+    """What is asked of a certificate besides.
+
+    Attributes
+    ----------
+    behaviour : str or None
+        As :attr:`ptcc_certify.graphs.structure.Claim.behaviour` or one of its special cases.
+    min_rate : Fraction or None
+        A proved rate of at least so much, per unit of the stretched clock.
+    max_input : Fraction or None
+        A proved peak of every ``|u_k|`` of at most so much, in units of the input.
+
+    References
+    ----------
+    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances, say which behaviour follows.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
+    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
+    refuted: rate >= 5 (none exceeds 4, proved); certified; met: bipartite consensus
+    """
+
+    behaviour: str | None = None
+    min_rate: Fraction | None = None
+    max_input: Fraction | None = None
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked of :func:`ptcc_certify.certify`, beside graph, protocol and initial state.
+
+    Attributes
+    ----------
+    method : str
+        Which Lyapunov functions are searched.
+    at : Fraction or None
+        Instant for which the bound was optimised, in units of time.
+    starts : Starts or None
+        The set of starts for which the input is bounded; None: that of the initial state alone.
+    limits : tuple of Limits
+        Limits of the gain that are judged besides.
+    delta : Fraction or None
+        Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
+    noise : Fraction or None
+        Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    time_limit : float
+        Seconds that the searches were given, infinity for no limit.
+    expectations : Expectations
+        What is asked besides; what became of it is part of ``assessment``.
+    """
+
+    method: str = "best"
+    at: Fraction | None = None
+    starts: Starts | None = None
+    limits: tuple[Limits, ...] = ()
+    delta: Fraction | None = None
+    noise: Fraction | None = None
+    time_limit: float = math.inf
+    expectations: Expectations = field(default_factory=Expectations)
+
+
+def refuse(
+    graph: SignedDigraph, protocol: Protocol, method: str, sliding: Mapping[str, Any], nominal: Sequence[Any]
+) -> None:
+    """Refuse what does not fit together."""
+    if not protocol.prescribed:
+        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    for name, value in sliding.items():
+        if value is not None and not isinstance(protocol, SlidingModeProtocol):
+            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+    if method not in METHODS:
+        raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
+    if isinstance(protocol, SlidingModeProtocol) and any(value is not None for value in nominal):
+        raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
+    _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
+
+
+def read_request(structure: Structure, protocol: Protocol, asked: Mapping[str, Any]) -> Request:
+    """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
+    seconds, n = asked["time_limit"], structure.graph.n_nodes
+    request = Request(
+        method=asked["method"],
+        at=None if asked["at"] is None else _instant(asked["at"], protocol),
+        starts=_starts(structure, asked["starts"]),
+        limits=tuple(_limits(entry, protocol) for entry in asked["limits"]),
+        time_limit=60 + n / 1000 if seconds is None else seconds,
+        expectations=asked["expectations"] or Expectations(),
+        **{name: None if asked[name] is None else parameter(name, asked[name]) for name in ("delta", "noise")},
+    )
+    if not request.time_limit > 0:
+        raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
+    return request
+
+
+def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
+    """Return limits of the gain, or refuse them."""
+    actuator = Actuator(entry.gain_cap, entry.stop_before, entry.sample_period)
+    if actuator.ideal:
+        raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
+    limits = Limits(actuator.gain_cap, actuator.stop_before, actuator.sample_period)
+    T = protocol.T
+    if limits.stop_before is not None and limits.stop_before >= T:
+        raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
+    if limits.sample_period is not None and limits.sample_period > T:
+        raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
+    return limits
+
+
+def _starts(structure: Structure, starts: Any) -> Starts | None:
+    """Return a set of starts, or refuse it."""
+    if starts is None:
+        return None
+    if not isinstance(starts, Starts):
+        return starts_within(structure, starts)
+    n = structure.graph.n_nodes
+    for name, vector in (("center", starts.center), ("radius", starts.radius or starts.center)):
+        if len(vector) != n:
+            raise ParameterError(f"{name} of the starts has {len(vector)} entries for {n} agents")
+    if any(len(axis) != n for axis in starts.axes):
+        raise ParameterError(f"an axis of the starts has another number of entries than {n} agents")
+    if starts.radius and starts.axes:
+        raise ParameterError("starts have a radius, for a box, or axes, for an ellipsoid; leave one out")
+    if any(r < 0 for r in starts.radius):
+        raise ParameterError("a radius of the starts is negative")
+    numbers = [x for vector in (starts.center, starts.radius, *starts.axes) for x in vector]
+    if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
+        raise ParameterError("the starts are beyond 1e300, or have too many digits to keep")
+    return starts
+
+
+def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
+    """Return the weights that may be long, each once."""
+    table, _ = graph.weight_table()
+    if table is None:
+        return (graph.exact_weight(i) for i in range(graph.n_edges))
+    return map(Fraction, np.unique(table).tolist()) if table.dtype.kind == "f" else ()
+
+
+def _bits(value: Fraction) -> int:
+    return value.numerator.bit_length() + value.denominator.bit_length()
+
+
+def _longest_edge(graph: SignedDigraph) -> str:
+    edge = max(range(graph.n_edges), key=lambda i: _bits(graph.exact_weight(i)))
+    ends = (graph.labels[int(part[edge])] for part in (graph.source, graph.target))
+    return " -> ".join(map(shorten, ends))
+
+
+def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[[], str]) -> None:
+    """Refuse numbers of ``n`` agents whose exact arithmetic would take long: judged over a common denominator.
+
+    Large graphs are proved row by row, in short numbers: only what their check refuses is refused.
+    """
+    most = int(LONGEST_BITS / n**1.25) if n <= EXACT_NODES else MAX_SCALE_BITS
+    common, longest = 1, 0
+    for value in values:
+        common = math.lcm(common, value.denominator)
+        longest = max(longest, value.numerator.bit_length() - value.denominator.bit_length())
+        if common.bit_length() + longest > most:
+            raise ParameterError(
+                f"{what} take more than {most:,} bits over a common denominator, too many for exact proofs of {n:,} "
+                f"agents (the longest is that of {where()}); round them, to 17 digits say"
+            )
+
+
+def initial_state(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
+    """Return ``X(0)`` or ``sigma(0)`` in rationals, or refuse it."""
+    start = tuple(exact_start(structure, values, name))
+    for label, value in zip(structure.graph.labels, start, strict=True):
+        if abs(value) > LARGEST_STATE:
+            raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
+        if not writable(value):
+            raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
+    longest = max(zip(structure.graph.labels, start, strict=True), key=lambda entry: _bits(entry[1]))[0]
+    _refuse_long(start, len(start), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
+    return start
+
+
+def sliding_start(
+    structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
+) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
+    """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
+    if not isinstance(protocol, SlidingModeProtocol):
+        return None, None
+    start = (
+        (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else initial_state(structure, sigma0, "sigma0")
+    )
+    times = certified_reaching_times(protocol, start)
+    # Whatever the check could not confirm is not claimed.
+    asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
+    pole = protocol.mu3 * protocol.kappa
+    known = decay_integrals_below(protocol.T_r, protocol.mu2, pole, asked, REACHING_BITS)
+    push = protocol.mu1 - protocol.delta
+    return start, tuple(
+        r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
+        for r, s in zip(times, start, strict=True)
+    )
+
+
+def _instant(at: Any, protocol: Protocol) -> Fraction:
+    """Read an instant before the deadline."""
+    try:
+        instant = as_fraction(at, "at")
+    except NumberError as error:
+        raise ParameterError(f"at: {error}") from None
+    if not 0 <= instant < protocol.T:
+        raise ParameterError(
+            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}"
+        )
+    return instant

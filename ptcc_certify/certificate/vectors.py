@@ -1,0 +1,218 @@
+"""Vectors and long numbers of a certificate's file: in the JSON, or beside it; exact, or as balls."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.vectors import SideFiles, beside
+from ptcc_certify.graphs.rationals import format_exact, writable
+from ptcc_certify.graphs.structure import Structure
+
+#: Vectors above this length go to side files.
+LONG = 50_000
+#: Decimals of the middle of a ball, and its radius, where an exact number would be too long.
+_DECIMALS, _RADIUS = 120, Fraction(1, 10**60)
+
+Interval = tuple[Fraction, Fraction]
+
+
+class Writer:
+    """Writes the vectors of a document: in the JSON, or the long ones to side files.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Of the nodes.
+    files : bool
+        Whether vectors of more than ``LONG`` entries go to side files.
+
+    Attributes
+    ----------
+    files : dict of str to bytes
+        Names and contents of the side files, ``.npy`` vectors of 64-bit numbers.
+    told : set of tuple
+        The proofs of leader groups that are written already: first row, rate, weights.
+    """
+
+    def __init__(self, labels: Sequence[str], files: bool = False):
+        self.labels, self._aside = labels, files
+        self.files: dict[str, bytes] = {}
+        self.told: set[tuple[int, Fraction, bytes]] = set()
+
+    def aside(self, length: int) -> bool:
+        """Tell whether a vector of this length goes to a side file."""
+        return self._aside and length > LONG
+
+    def file(self, name: str, values: np.ndarray) -> dict[str, Any]:
+        """Put int64 or float64 numbers into a side file; return its name and hash."""
+        content = io.BytesIO()
+        np.save(content, values.astype("<f8" if values.dtype.kind == "f" else "<i8"), allow_pickle=False)
+        sha256 = hashlib.sha256(content.getvalue()).hexdigest()
+        file = f"{sha256[:16]}-{name}.npy"
+        self.files[file] = content.getvalue()
+        return {"file": file, "sha256": sha256}
+
+    def vector(self, name: str, values: np.ndarray) -> dict[str, Any]:
+        """Put int64 or float64 numbers into a side file; return what stands for the vector."""
+        return {**self.file(name, values), "count": values.size}
+
+    def nodes(self, nodes: Sequence[int] | np.ndarray) -> Any:
+        """Write node indices as labels, or as a side file of indices."""
+        if self.aside(len(nodes)):
+            return self.vector("nodes", np.asarray(nodes, dtype=np.int64))
+        return [self.labels[v] for v in np.asarray(nodes, dtype=np.int64).tolist()]
+
+    def floats(self, name: str, values: np.ndarray) -> Any:
+        """Write floats as the dyadic numbers that they are."""
+        if self.aside(values.size):
+            return self.vector(name, values)
+        return [x.hex() for x in values.tolist()]
+
+    def integers(self, name: str, values: np.ndarray) -> Any:
+        """Write int64 numbers."""
+        return self.vector(name, values.astype(np.int64)) if self.aside(values.size) else values.tolist()
+
+    def state(self, name: str, state: Sequence[Fraction] | None) -> Any:
+        """Write one number of each agent: by label, or as a side file of integers over a common denominator."""
+        if state is None:
+            return None
+        if self.aside(len(state)):
+            scale = math.lcm(*{x.denominator for x in state})
+            if scale.bit_length() < 63:
+                whole = [x.numerator * (scale // x.denominator) for x in state]
+                if max(map(abs, whole)) < 2**63:
+                    return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
+        return dict(zip(self.labels, map(format_exact, state), strict=True))
+
+
+class Reader:
+    """Reads the vectors of an accepted document; the check has verified that every part is there.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Of the nodes.
+    folder : Path
+        Of the side files.
+    """
+
+    def __init__(self, labels: Sequence[str], folder: Path):
+        self.files, self._count = SideFiles(folder, None), len(labels)
+        self._index = {label: i for i, label in enumerate(labels)}
+
+    def nodes(self, said: Any) -> tuple[int, ...]:
+        """Read node indices."""
+        if beside(said):
+            return tuple(self.files.integers(said, "nodes", said["count"]))
+        return tuple(self._index[label] for label in said)
+
+    def floats(self, said: Any, length: int) -> np.ndarray:
+        """Read a vector as the floats nearest to its numbers, each rounded once."""
+        numbers = self.files.numbers(said, "a vector", length)
+        return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
+
+    def state(self, said: Any) -> tuple[Fraction, ...] | None:
+        """Read one number of each agent: by label, or from a side file."""
+        if said is None:
+            return None
+        if beside(said):
+            return tuple(self.files.numbers(said, "a vector", self._count))
+        return tuple(map(exact, said.values()))
+
+    def agents(self, said: Any) -> tuple[Fraction, ...]:
+        """Read one number of each agent, which is there."""
+        return self.state(said) or ()
+
+
+def text(value: Fraction | None) -> str | None:
+    """Write a rational, or null."""
+    return None if value is None else format_exact(value)
+
+
+def number(said: str | None) -> Fraction | None:
+    """Read what :func:`text` wrote."""
+    return None if said is None else exact(said)
+
+
+def finite(value: float | None) -> float | None:
+    """Return a float that JSON holds, or None."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+# ---------------------------------------------------------------------- balls
+
+
+def exact_or_ball(value: Fraction) -> str | dict[str, str]:
+    """Write a rational exactly, or as a ball ``{mid, radius}`` that contains it where the text would be too long.
+
+    Examples
+    --------
+    >>> exact_or_ball(Fraction(1, 3))
+    '1/3'
+    >>> sorted(exact_or_ball(Fraction(1, 3**9000)))
+    ['mid', 'radius']
+    """
+    return format_exact(value) if writable(value) else _ball_text((value, _RADIUS))
+
+
+def interval_text(interval: Interval) -> str | dict[str, str]:
+    """Write an interval: exactly if its radius is 0, otherwise as a ball that contains it."""
+    return exact_or_ball(interval[0]) if interval[1] == 0 else _ball_text(interval)
+
+
+def _ball_text(interval: Interval) -> dict[str, str]:
+    """Write an interval as a ball that contains it, with short decimals."""
+    middle, radius = interval
+    unit = 10**_DECIMALS
+    mid = round(middle * unit)
+    wide = math.ceil((radius + abs(middle - Fraction(mid, unit))) * unit)
+    return {"mid": f"{mid}e-{_DECIMALS}", "radius": f"{wide}e-{_DECIMALS}"}
+
+
+def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:
+    """Return voices and pulls as intervals: of radius 0, but for those of a component that are too long to write."""
+    voices = [_balls([Fraction(w) for w in voice]) for voice in matrix.voices]
+    rows = matrix.pulls or ()
+    columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.voices))]
+    pulls = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
+    return voices, pulls
+
+
+def _balls(values: Sequence[Fraction]) -> list[Interval]:
+    if all(map(writable, values)):
+        return [(x, Fraction(0)) for x in values]
+    unit = 10**_DECIMALS
+    return [(Fraction(round(x * unit), unit), _RADIUS) for x in values]
+
+
+def outcome_witness(structure: Structure, matrix: Influence) -> tuple[Fraction, ...] | None:
+    """Return ``u > 0`` with ``M u > 0`` on followers and on leader groups less one agent, if balls need it.
+
+    ``M`` is the comparison matrix of ``L_F``, and that of ``L_k`` transposed. From it follows how far a ball's middle
+    may be from the truth.
+    """
+    voices, pulls = influence_balls(matrix)
+    if not any(r for row in (*voices, *pulls) for _, r in row):
+        return None
+    u = np.ones(structure.graph.n_nodes)
+    L = structure.graph.laplacian().toarray()
+    M = np.diag(np.diag(L)) * 2 - np.abs(L)
+    groups = [(structure.followers.tolist(), M)]
+    for component, voice in zip(matrix.balanced, voices, strict=True):
+        top = max(range(len(voice)), key=lambda i: abs(voice[i][0]))
+        groups.append(([v for i, v in enumerate(component.nodes) if i != top], M.T))
+    for nodes, block in groups:
+        if nodes:
+            own = block[np.ix_(nodes, nodes)]
+            u[nodes] = np.abs(np.linalg.solve(own / np.diag(own)[:, None], np.ones(len(nodes))))
+    return tuple(map(Fraction, u.tolist()))
