@@ -54,8 +54,8 @@ from ptcc_certify.checker.input_bounds import BITS, InputBounds, Linear, Prescri
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.gain import parameter
-from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 if TYPE_CHECKING:

@@ -29,7 +29,16 @@ from ptcc_certify.bounds.deviation import DistanceBound, OutcomeGeometry
 from ptcc_certify.bounds.enclosed_state import EnclosedOutcome, NotEnclosedError, enclose
 from ptcc_certify.bounds.envelope import FRACTIONS, Comparison, Envelope, Member, remaining_part
 from ptcc_certify.bounds.final_state import Influence, Outcome, exact_start, influence, outcome
-from ptcc_certify.bounds.input import Effort, Limits, Starts, WorstStart, bound_effort, starts_within, worst_start
+from ptcc_certify.bounds.input import (
+    Effort,
+    InputRequest,
+    Limits,
+    Starts,
+    WorstStart,
+    bound_effort,
+    starts_within,
+    worst_start,
+)
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.document import Writer, certificate_document, outcome_witness
 from ptcc_certify.certificate.verdict import MANY_DECADES, Assessment, Expectations, assess
@@ -44,13 +53,14 @@ from ptcc_certify.graphs.structure import Claim, Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.rate_bound import RateLimit, mean_limit, optimality_ratio, prove_rate_limit
 from ptcc_certify.lyapunov.search import APART_NODES, DIAGONAL, METHODS, Sharpening, sharpen, sharpen_large
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.gain import parameter
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 from ptcc_certify.simulation.filippov import rounding_slack
-from ptcc_certify.simulation.limited import Actuator
-from ptcc_certify.simulation.run import PAST, simulate
+from ptcc_certify.simulation.instants import PAST
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems import LyapunovFunction, Obligation, RateProof, Theorem, sliding_claim, theorem_for
 from ptcc_certify.theorems.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
@@ -195,7 +205,7 @@ class Certificate:
     def claims(self) -> tuple[Claim, ...]:
         """What is claimed of each of ``structure.components``."""
         claims = tuple(component.claim for component in self.structure.components)
-        return tuple(map(sliding_claim, claims)) if isinstance(self.protocol, SlidingModeProtocol) else claims
+        return tuple(map(sliding_claim, claims)) if self.protocol.reaching else claims
 
     @property
     def rate(self) -> Fraction | None:
@@ -295,7 +305,7 @@ class Certificate:
         """What is proved about the input; None if no decay was proved."""
         if self.rate is None and not self.constant:
             return None
-        return bound_effort(
+        asked = InputRequest(
             self.structure,
             self.protocol,
             self.forms,
@@ -311,6 +321,7 @@ class Certificate:
             delta=self.delta,
             noise=self.noise,
         )
+        return bound_effort(asked)
 
     @cached_property
     def worst_start(self) -> WorstStart | None:
@@ -391,9 +402,9 @@ class Certificate:
         for sharp in self.sharpening.members:
             distance = self._distance("E", sharp.nodes, sharp.diagonal, sharp.matrix)
             members.append(Member.of_sharp(sharp, distance=distance))
-        if isinstance(self.protocol, SlidingModeProtocol):
+        if (sliding := self.protocol.reaching) is not None:
             sigma0, reaching = self.sigma0 or (), self.reaching or ()
-            return SlidingEnvelope(self.structure, self.protocol.gain, tuple(members), self.protocol, sigma0, reaching)
+            return SlidingEnvelope(self.structure, self.protocol.gain, tuple(members), sliding, sigma0, reaching)
         return Envelope(self.structure, self.protocol.gain, tuple(members))
 
     @cached_property
@@ -506,7 +517,7 @@ def certify(
     method: str = "best",
     at: Any = None,
     starts: Any = None,
-    limits: Sequence[Actuator | Limits] = (),
+    limits: Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
@@ -572,7 +583,7 @@ def certify(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.nominal import NominalProtocol
+    >>> from ptcc_certify.protocols import NominalProtocol
     >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
     >>> cert
@@ -589,7 +600,7 @@ ReachingTime(0, 1 before T_r)))
     """
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-    sliding = isinstance(protocol, SlidingModeProtocol)
+    sliding = protocol.reaching
     for name, value in (("sigma0", sigma0), ("disturbance", disturbance)):
         if value is not None and not sliding:
             raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
@@ -616,10 +627,10 @@ ReachingTime(0, 1 before T_r)))
         notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
         simulation = False
     begin = None if simulation is False else start
-    if isinstance(protocol, SlidingModeProtocol) and disturbance is not None and begin is None:
+    if sliding and disturbance is not None and begin is None:
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
-        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
-        source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
+        source = as_disturbance(disturbance, graph.n_nodes, sliding.delta, horizon)
+        source.check(sliding.delta, graph.labels, horizon, rounding_slack(sliding))
     theorem = theorem_for(structure, protocol.kind)
     V, proof, numerical, limit, sharpening = None, RateProof(None, ()), None, None, Sharpening()
     if seconds < SHORT_LIMIT and graph.n_nodes <= CLARABEL_MARGIN_ROWS:
@@ -704,12 +715,11 @@ ReachingTime(0, 1 before T_r)))
     return certificate
 
 
-def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
+def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     """Return limits of the gain, or refuse them."""
-    actuator = Actuator(entry.gain_cap, entry.stop_before, entry.sample_period)
-    if actuator.ideal:
+    limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
+    if limits.ideal:
         raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
-    limits = Limits(actuator.gain_cap, actuator.stop_before, actuator.sample_period)
     T = protocol.T
     if limits.stop_before is not None and limits.stop_before >= T:
         raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
@@ -791,15 +801,16 @@ def _reaching(
     structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
 ) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
     """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
-    if not isinstance(protocol, SlidingModeProtocol):
+    sliding = protocol.reaching
+    if sliding is None:
         return None, None
     start = (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else _start(structure, sigma0, "sigma0")
-    times = certified_reaching_times(protocol, start)
+    times = certified_reaching_times(sliding, start)
     # Whatever the check could not confirm is not claimed.
     asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
-    pole = protocol.mu3 * protocol.kappa
-    known = decay_integrals_below(protocol.T_r, protocol.mu2, pole, asked, REACHING_BITS)
-    push = protocol.mu1 - protocol.delta
+    pole = sliding.mu3 * sliding.kappa
+    known = decay_integrals_below(sliding.T_r, sliding.mu2, pole, asked, REACHING_BITS)
+    push = sliding.mu1 - sliding.delta
     return start, tuple(
         r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
         for r, s in zip(times, start, strict=True)

@@ -19,8 +19,6 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import MAX_EXPONENT, format_exact, writable
 from ptcc_certify.graphs.structure import Claim, Structure
 from ptcc_certify.lyapunov.dominance import DominantMember
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems import Obligation
 
 if TYPE_CHECKING:
@@ -353,9 +351,10 @@ def _dominance_witness(member: DominantMember, out: Writer) -> dict[str, Any]:
 
 def _protocol_section(certificate: Certificate) -> dict[str, Any]:
     run = certificate.trajectory
-    if not isinstance(certificate.protocol, SlidingModeProtocol):
+    if certificate.protocol.reaching is None:
         return certificate.protocol.to_dict()
-    return {**certificate.protocol.to_dict(), "disturbance": run.source if isinstance(run, SlidingTrajectory) else None}
+    met = None if run is None or run.sliding is None else run.sliding.source
+    return {**certificate.protocol.to_dict(), "disturbance": met}
 
 
 def _reaching_section(certificate: Certificate) -> dict[str, Any] | None:
@@ -496,8 +495,8 @@ def _asked_section(certificate: Certificate) -> dict[str, Any]:
 
 
 def _sliding_run_section(certificate: Certificate) -> dict[str, Any]:
-    run, seen = certificate.trajectory, certificate.comparison
-    if not isinstance(run, SlidingTrajectory) or seen is None:
+    seen, run = certificate.comparison, None if certificate.trajectory is None else certificate.trajectory.sliding
+    if run is None or seen is None:
         return {}
     z = run.reaching_z.tolist()
     return {

@@ -44,7 +44,7 @@ from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Claim, Structure, analyse, behaviour_name
 from ptcc_certify.lyapunov.rate_bound import optimality_ratio
 from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -225,7 +225,7 @@ class SavedCertificate:
     def claims(self) -> tuple[Claim, ...]:
         """What the theorems say of each of ``structure.components``."""
         claims = tuple(component.claim for component in self.structure.components)
-        return tuple(map(sliding_claim, claims)) if isinstance(self.protocol, SlidingModeProtocol) else claims
+        return tuple(map(sliding_claim, claims)) if self.protocol.reaching else claims
 
     @property
     def claim(self) -> Claim | None:
@@ -316,7 +316,7 @@ class SavedCertificate:
 
         None for the nominal protocol. No part of the claim, which holds for every disturbance within ``delta``.
         """
-        if not isinstance(self.protocol, SlidingModeProtocol):
+        if self.protocol.reaching is None:
             return None
         from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 
@@ -516,9 +516,9 @@ class _Reader:
         sigma0, lyapunov, reaching = self._state("sigma0"), self._paper(), None
         members = tuple(self._member(k, said, lyapunov) for k, said in enumerate(data["lyapunov"]["members"]))
         envelope = Envelope(self.structure, protocol.gain, members)
-        if isinstance(protocol, SlidingModeProtocol):
-            reaching = tuple(ReachingTime(protocol.T_r, _maybe(z)) for z in data["reaching_time"]["z"].values())
-            envelope = SlidingEnvelope(self.structure, protocol.gain, members, protocol, sigma0 or (), reaching)
+        if (sliding := protocol.reaching) is not None:
+            reaching = tuple(ReachingTime(sliding.T_r, _maybe(z)) for z in data["reaching_time"]["z"].values())
+            envelope = SlidingEnvelope(self.structure, protocol.gain, members, sliding, sigma0 or (), reaching)
         outcome = data["outcome"]
         return SavedCertificate(
             path=self.path,
@@ -568,9 +568,8 @@ class _Reader:
     # ------------------------------------------------------------------ graph, protocol, states
 
     def _protocol(self) -> Protocol:
-        said = {key: value for key, value in self.document["protocol"].items() if key not in ("kind", "disturbance")}
-        kind = NominalProtocol if self.document["protocol"]["kind"] == "nominal" else SlidingModeProtocol
-        return kind(**{key: exact(value) for key, value in said.items()})
+        said = {key: value for key, value in self.document["protocol"].items() if key != "disturbance"}
+        return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in said.items()})
 
     def _by_agent(self, said: Any) -> tuple[Fraction, ...]:
         """Read numbers by agent: an object in the order of the nodes, or a side vector."""

@@ -39,8 +39,8 @@ from ptcc_certify.certificate import certificate as certificate_module
 from ptcc_certify.certificate.certificate import certify
 from ptcc_certify.checker import check, digraph
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import Actuator
 
 CLASSES = dict(all_classes())
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))

@@ -21,7 +21,7 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bo
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols.limits import Actuator
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lmi.exact import enclosure
 from lmi.exact.definite import BITS, Factor, Flint, Standard, arithmetic
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import inverse_decay_integral
 
 
