@@ -355,11 +355,11 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
         ax.fill_between(curve.deadlines, curve.lower * 1e-3, curve.lower, color="#7F7F7F", alpha=0.3, linewidth=0)
         ax.loglog(curve.deadlines, curve.lower, color="#7F7F7F", linestyle="--", label="no gains stay below")
         ax.set_ylim(bottom=float(np.nanmin(curve.lower)) / 3)
-    ax.axhline(float(found.max_input), color="#D55E00", linewidth=0.9, linestyle=":", label="asked for")
+    ax.axhline(float(found.asked.max_input), color="#D55E00", linewidth=0.9, linestyle=":", label="asked for")
     if found.protocol is not None and found.peak:
         ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color="#0072B2", label="this design")
     ax.set_xlabel("deadline $T$")
-    ax.set_ylabel(r"peak input $\|u\|_2$" if found.input_norm == 2 else "peak input, largest $|u_k|$")
+    ax.set_ylabel(r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$")
     _legend_above(ax)
     return ax
 
