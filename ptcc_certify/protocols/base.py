@@ -58,11 +58,6 @@ class Protocol(Parameters, ABC):
         return self.rho2 > 0
 
     @property
-    def settling_time(self) -> Fraction | None:
-        """``T``, or None without a deadline."""
-        return self.T if self.prescribed else None
-
-    @property
     def span(self) -> Fraction:
         """How long the nominal phase lasts, which alone moves the agents at its end: from 0, or ``T_r``, to ``T``."""
         return self.T

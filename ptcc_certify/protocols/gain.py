@@ -137,10 +137,6 @@ class Gain(Parameters):
         """Return ``t = T (1 - e^-tau)``."""
         return -float(self.T) * np.expm1(-np.asarray(tau, dtype=float))
 
-    def clock_rate(self, tau: ArrayLike) -> np.ndarray:
-        """Return ``ds/dtau = rho1 T e^-tau + rho2 kappa``: smooth, where the gain itself has a pole."""
-        return float(self.rho1 * self.T) * np.exp(-np.asarray(tau, dtype=float)) + float(self.pole)
-
     def _remaining(self, t: ArrayLike) -> np.ndarray:
         return 1 - np.asarray(t, dtype=float) / float(self.T)
 

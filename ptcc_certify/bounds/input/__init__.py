@@ -48,30 +48,6 @@ from ptcc_certify.checker.input_bounds import (
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols import Protocol
 
-__all__ = [
-    "Disturbed",
-    "Effort",
-    "EnergyIntegral",
-    "InputRequest",
-    "Limited",
-    "Limits",
-    "Peak",
-    "SlidingPart",
-    "Starts",
-    "Witness",
-    "WorstStart",
-    "bound_effort",
-    "box",
-    "effort_section",
-    "ellipsoid",
-    "energy_witness",
-    "first_input",
-    "largest_deviation",
-    "peak_witness",
-    "starts_within",
-    "worst_start",
-]
-
 #: By how much constants of full matrices are raised, so that they are quick to prove.
 RAISE = Fraction(1, 2**30)
 
