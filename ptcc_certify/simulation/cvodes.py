@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from scipy import sparse
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.gain import Gain
 
 # Beyond this many agents the Newton steps are solved by GMRES: a sparse factor of a random graph fills up
 # (N = 1,000: 3.4 s against 0.05 s), whereas below it a factor copes with weights over many decades.
@@ -154,6 +155,20 @@ class NominalMotion(Motion):
             residual = max(float(np.abs(self.state - previous).max()), self.imbalance(self.state))
             if residual <= goal or b * tau * largest > _MAX_CLOCK or tau > _MAX_TAU:
                 return residual
+
+    def past_deadline(
+        self, gain: Gain, remaining: float, tau: np.ndarray, late: np.ndarray
+    ) -> tuple[np.ndarray, float | None]:
+        """Return the (M, N, S) states under a gain from ``remaining`` before ``T`` on, and the residual at ``T``.
+
+        Before ``T`` at instants ``tau = ln(remaining/(T - t))``, then at instants ``late``; without these no residual.
+        """
+        rho1, pole, T = float(gain.rho1), float(gain.pole), float(gain.T)
+        before = self.sample(rho1 * remaining, pole, 1.0, tau)
+        if not late.size:
+            return before, None
+        residual = self.settle(rho1 * remaining, pole, tau[-1] if tau.size else 0.0)
+        return np.concatenate([before, self.sample(0.0, rho1 * T, 0.0, np.maximum(late / T - 1, 0))]), residual
 
     def _finer(self) -> dict[str, Any]:
         """Return the options of a run that settles to within the tolerances in every agent of a large graph.

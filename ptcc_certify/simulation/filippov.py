@@ -21,7 +21,7 @@ from ptcc_certify.protocols.disturbance import TOLERANCE, Adversary, Disturbance
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
 from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
 from ptcc_certify.simulation.forced import Phase, SlidingMotion
-from ptcc_certify.simulation.instants import Instants, minus_log
+from ptcc_certify.simulation.instants import Instants, tau_before
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
@@ -206,17 +206,11 @@ class _Solver:
         self, y: np.ndarray, remaining: float, t: np.ndarray, left: np.ndarray
     ) -> tuple[np.ndarray, float | None]:
         """Return the (N, .) states on the sliding manifold, reached ``remaining`` before ``T``, and the residual."""
-        motion = NominalMotion(self.graph, y[:, None], self.tolerances)
-        before = left > 0
-        share = (t[before] - (self.T - remaining)) / remaining
-        tau = np.maximum(minus_log(left[before] * (self.T / remaining), share), 0.0)
-        parts = [motion.sample(self.rho1 * remaining, self.pole, 1.0, tau)]
-        residual = None
-        if not before.all():
-            residual = motion.settle(self.rho1 * remaining, self.pole, tau[-1] if tau.size else 0.0)
-            parts.append(motion.sample(0.0, self.rho1 * self.T, 0.0, np.maximum(t[~before] / self.T - 1, 0)))
+        motion, before = NominalMotion(self.graph, y[:, None], self.tolerances), left > 0
+        tau = tau_before(t[before], left[before], self.T, remaining)
+        states, residual = motion.past_deadline(self.protocol.gain, remaining, tau, t[~before])
         self._count(motion.stats)
-        return np.concatenate(parts)[:, :, 0].T, residual
+        return states[:, :, 0].T, residual
 
     # ------------------------------------------------------------------ the imitation
 
@@ -236,7 +230,7 @@ class _Solver:
         between = ~before & ~after
         settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, mu2=self.mu2)
         past = Phase(self.T, self.T, self.rho1, mu2=self.mu2, past=True)
-        towards_T = np.maximum(minus_log(instants.left * (self.T / self.T_s), (t - self.T_r) / self.T_s), 0.0)
+        towards_T = tau_before(t, instants.left, self.T, self.T_s)
         clocks = (
             (self.reaching, before, instants.z, _LAYER_Z),
             (settling, between, towards_T, _LAYER_Z),

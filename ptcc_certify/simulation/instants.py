@@ -110,6 +110,12 @@ def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
     return Instants(t, left(protocol.T), left(protocol.T - protocol.span))
 
 
+def tau_before(t: np.ndarray, left: np.ndarray, T: float, remaining: float) -> np.ndarray:
+    """Return ``-ln(left T/remaining)``, ``left = 1 - t/T > 0``, of instants from ``remaining`` before ``T`` on."""
+    share = (t - (T - remaining)) / remaining
+    return np.maximum(minus_log(left * (T / remaining), share), 0.0)
+
+
 def minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Return ``-ln(left)``, where ``left + share = 1``: whichever is the small one holds the digits."""
     with np.errstate(divide="ignore", invalid="ignore"):

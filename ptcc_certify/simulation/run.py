@@ -25,7 +25,7 @@ from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.limits import GainLimits
 from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
-from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
+from ptcc_certify.simulation.instants import PAST, Instants, default_instants, tau_before, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.limited import as_forcing, simulate_limited
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -180,28 +180,22 @@ def _simulate_nominal(
     columns = begin.reshape(graph.n_nodes, -1)
     scale = np.abs(columns).max(axis=0)
     scale[scale == 0] = 1
-    gain, T, t, left = protocol.gain, float(protocol.T), instants.t, instants.left
-    residual = None
+    gain, T, t = protocol.gain, float(protocol.T), instants.t
+    before = instants.left > 0
     run = NominalMotion(graph, columns / scale, tolerances)
     if protocol.prescribed:
-        before = left > 0
-        # Whichever of 1 - t/T and t is the small one holds the digits.
-        tau = np.where(left > 0.5, gain.tau(t), -np.log(np.where(before, left, 1)))[before]
-        parts = [run.sample(float(gain.rho1) * T, float(gain.pole), 1.0, tau)]
-        if not before.all():
-            residual = run.settle(float(gain.rho1) * T, float(gain.pole), tau[-1] if tau.size else 0.0)
-            parts.append(run.sample(0.0, float(gain.rho1) * T, 0.0, np.maximum(t[~before] / T - 1, 0)))
+        tau = tau_before(t[before], instants.left[before], T, T)
+        states, residual = run.past_deadline(gain, T, tau, t[~before])
         clock = np.append(gain.clock_at_tau(tau), np.full(t.size - tau.size, np.inf))
     else:
-        parts = [run.sample(0.0, float(gain.rho1) * T, 0.0, t / T)]
-        clock = gain.clock(t)
+        states, residual, clock = run.sample(0.0, float(gain.rho1) * T, 0.0, t / T), None, gain.clock(t)
     return Trajectory(
         graph=graph,
         protocol=protocol,
         t=t,
-        remaining=left,
+        remaining=instants.left,
         clock=clock,
-        states=(np.moveaxis(np.concatenate(parts), 0, -1) * scale[:, None]).reshape(*begin.shape, t.size),
+        states=(np.moveaxis(states, 0, -1) * scale[:, None]).reshape(*begin.shape, t.size),
         rtol=tolerances.rtol,
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
