@@ -1,6 +1,7 @@
 """Facts about the protocols as CasADi expressions. LaTeX of the nominal one is tried in test_latex.py."""
 
 import pickle
+from fractions import Fraction
 
 import casadi as ca
 import numpy as np
