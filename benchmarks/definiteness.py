@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 import scipy
+from lmi.exact.sparse import dense_definite, dominates, residual_definite
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 import lmi
-from lmi.exact.sparse import dense_definite, dominates, residual_definite
 from ptcc_certify import SignedDigraph, analyse, read_graph
 from ptcc_certify.theorems.lemmas import left_vector
 

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from ptcc_certify.gain_design import Design
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.structure import Structure
-    from ptcc_certify.protocols.nominal import Protocol
-    from ptcc_certify.simulation.limited import Actuator
+    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.protocols.limits import Actuator
 
 OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.certificate.verdict has them too
 INTERNAL_ERROR, INTERRUPTED = 70, 130
@@ -692,7 +692,7 @@ def _graph_file(graph: str) -> Any:
 
 def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
     """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
-    from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+    from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     if kind == "nominal":
@@ -716,21 +716,20 @@ def _protocol(kind: str, options: dict[str, Any], disturbed: tuple[str, ...] = (
 def _sliding_options(protocol: Protocol, options: dict[str, Any], seed: int, graph: SignedDigraph) -> dict[str, Any]:
     """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
     from ptcc_certify.protocols.disturbance import as_disturbance
-    from ptcc_certify.protocols.nominal import SlidingModeProtocol
 
-    if not isinstance(protocol, SlidingModeProtocol):
+    if (sliding := protocol.reaching) is None:
         return {}
     source = "adversary" if options["disturbance"] is None else options["disturbance"]
     horizon = 2 * float(protocol.T)
     return {
         "sigma0": _sigma0(options["sigma0"], seed, graph),
-        "disturbance": as_disturbance(source, graph.n_nodes, protocol.delta, horizon, seed),
+        "disturbance": as_disturbance(source, graph.n_nodes, sliding.delta, horizon, seed),
     }
 
 
 def _actuator(options: dict[str, Any]) -> Actuator | None:
     """Return the limits of the gain; None if there are none."""
-    from ptcc_certify.simulation.limited import Actuator
+    from ptcc_certify.protocols.limits import Actuator
 
     given = {name: _number(options[name], f"--{name.replace('_', '-')}") for name in _LIMITS}
     actuator = Actuator(**given)

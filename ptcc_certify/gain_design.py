@@ -37,7 +37,7 @@ bound of the input is compared with ``U`` exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -47,17 +47,20 @@ import numpy as np
 
 from lmi.exact.enclosure import rounded, sqrt
 from lmi.exact.rounding import down, float_up, up
-from ptcc_certify.bounds.input import Limits, Starts, WorstStart, starts_within, worst_start
+from ptcc_certify.bounds.input import Starts, WorstStart, starts_within, worst_start
+from ptcc_certify.bounds.input.initial_set import ways
+from ptcc_certify.bounds.input.search import decaying, log, usable_members
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.checker.input_bounds import BITS, InputBounds, Linear, PrescribedGain
+from ptcc_certify.checker.input_bounds import BITS, InputBounds, Limits, Linear
 from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.gain import parameter
-from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, Protocol
+from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 if TYPE_CHECKING:
@@ -85,6 +88,35 @@ class TradeOff(NamedTuple):
     lower: np.ndarray
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of an input.
+
+    Attributes
+    ----------
+    max_input : Fraction
+        ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input.
+    input_norm : {2, None}
+        None: of every agent's input.
+    starts : Starts
+        For all of which it is to hold.
+    deadline, residual : Fraction or None
+        In units of time and of the states; None where nothing is asked.
+    """
+
+    max_input: Fraction
+    input_norm: int | None
+    starts: Starts
+    deadline: Fraction | None
+    residual: Fraction | None
+
+    def met_by(self, fit: Fit) -> bool:
+        """Tell whether what is proved of some gains suffices."""
+        if fit.peak is None or fit.residual is None:
+            return False
+        return fit.peak <= self.max_input and fit.residual <= (self.residual or 0)
+
+
 @dataclass(frozen=True, repr=False)
 class Design(Shown):
     """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
@@ -96,22 +128,12 @@ class Design(Shown):
         certificate do not suffice, and nothing about other gains.
     binding : str
         The limit that binds, and how far off it is.
-    max_input : Fraction
-        ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input, like ``peak``.
-    input_norm : {2, None}
-        None: of every agent's input.
-    starts : Starts
-        For all of which it holds.
-    asked_deadline, asked_residual : Fraction or None
-        What was asked for, in units of time and of the states.
+    asked : Asked
+        The limit, the initial states, deadline and residual.
     deadline : Fraction or None
         ``T``, in units of time; None if none was asked for and none is certified.
-    protocol : NominalProtocol or None
-        The gains; None unless the verdict is ``met``.
-    limits : Limits or None
-        The cap of the gain that belongs to them; None if there is none.
     certificate : Certificate or None
-        What proves it.
+        What proves it; None unless the verdict is ``met``.
     peak : Fraction or None
         The certified peak of the input at ``deadline``, also if it is too large.
     residual : Fraction or None
@@ -141,14 +163,8 @@ class Design(Shown):
 
     verdict: str
     binding: str
-    max_input: Fraction
-    input_norm: int | None
-    starts: Starts
-    asked_deadline: Fraction | None
-    asked_residual: Fraction | None
+    asked: Asked
     deadline: Fraction | None = None
-    protocol: NominalProtocol | None = None
-    limits: Limits | None = None
     certificate: Certificate | None = None
     peak: Fraction | None = None
     residual: Fraction | None = None
@@ -158,14 +174,25 @@ class Design(Shown):
     repeatable: bool = False
 
     @property
+    def protocol(self) -> Protocol | None:
+        """The gains; None unless the verdict is ``met``."""
+        return None if self.certificate is None else self.certificate.protocol
+
+    @property
+    def limits(self) -> Limits | None:
+        """The cap of the gain that belongs to them; None if there is none."""
+        return None if self.certificate is None or not self.certificate.limits else self.certificate.limits[0]
+
+    @property
     def certify_options(self) -> list[str] | None:
         """Options of ``ptcc certify GRAPH`` that prove the same again, with exit code 0; None where none do.
 
         Whether every agent is within :attr:`residual` at the deadline, or the norm of the input within its limit,
         cannot be asked there: both are proved all the same.
         """
-        R = max(self.starts.radius, default=Fraction(0))
-        about_zero = not any(self.starts.center) and R > 0 and min(self.starts.radius) == R
+        starts = self.asked.starts
+        R = max(starts.radius, default=Fraction(0))
+        about_zero = not any(starts.center) and R > 0 and min(starts.radius) == R
         if not (self.repeatable and about_zero and self.protocol is not None and self.certificate is not None):
             return None
         p, effort = self.protocol, self.certificate.effort
@@ -175,19 +202,19 @@ class Design(Shown):
             agents = None if effort is None else effort.residual[0].largest
         else:
             agents = Fraction(0) if effort is None or effort.peak is None else effort.peak.largest
-        if agents is not None and agents <= self.max_input:  # of the norm too, but for what is lost in the bounds
-            options["max-input"] = self.max_input
+        if agents is not None and agents <= self.asked.max_input:  # of the norm too, but for what is lost in the bounds
+            options["max-input"] = self.asked.max_input
         return [text for name, value in options.items() for text in (f"--{name}", short_exact(value))]
 
     @property
     def shortest_possible(self) -> Fraction | None:
         """No gains of the protocol meet a shorter deadline within ``max_input``; None if nothing is known."""
-        return None if self.lower_product is None else self.lower_product / self.max_input
+        return None if self.lower_product is None else self.lower_product / self.asked.max_input
 
     @property
     def shortest_certified(self) -> Fraction | None:
         """The deadline from which on the gains found keep to ``max_input``; None if nothing is certified."""
-        return None if self.product is None else self.product / self.max_input
+        return None if self.product is None else self.product / self.asked.max_input
 
     @property
     def ratio(self) -> float | None:
@@ -199,15 +226,14 @@ class Design(Shown):
     @cached_property
     def worst(self) -> WorstStart | None:
         """The start from which the input gets largest under these gains (numerical); None without gains."""
-        if self.protocol is None or self.certificate is None:
+        if self.certificate is None:
             return None
-        structure = self.certificate.structure
+        structure, protocol, starts = self.certificate.structure, self.certificate.protocol, self.asked.starts
         if self.limits is None or self.limits.gain_cap is None:
-            return worst_start(structure, self.protocol, self.starts)
+            return worst_start(structure, protocol, starts)
         # The gain is constant, and max |e_k| never grows.
-        first = worst_start(structure, self.protocol, self.starts, samples=1)
-        share = self.limits.gain_cap / (self.protocol.rho1 + self.protocol.rho2 / self.protocol.T)
-        return replace(first, size=first.size * float(share))
+        first = worst_start(structure, protocol, starts, samples=1)
+        return replace(first, size=first.size * float(self.limits.gain_cap / protocol.gain.first))
 
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
         """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
@@ -261,19 +287,14 @@ class Design(Shown):
 
     def lines(self) -> list[str]:
         """Return what the screen shows."""
-        norm = "||u||" if self.input_norm == 2 else "max |u_k|"
-        asked = f"{norm} <= {short_exact(self.max_input)}"
-        if self.asked_deadline is None:
-            asked += ", shortest deadline"
-        else:
-            asked += f", deadline {short_exact(self.asked_deadline)}"
-        if self.asked_residual is not None:
-            asked += f", residual {short_exact(self.asked_residual)}"
+        asked = f"{'||u||' if self.asked.input_norm == 2 else 'max |u_k|'} <= {short_exact(self.asked.max_input)}"
+        deadline, residual = self.asked.deadline, self.asked.residual
+        asked += ", shortest deadline" if deadline is None else f", deadline {short_exact(deadline)}"
+        asked += "" if residual is None else f", residual {short_exact(residual)}"
         found = [("asked", asked), ("verdict", self.verdict), ("", self.binding)]
         if self.protocol is not None:
-            p = self.protocol
-            gains = ", ".join(f"{name} = {short_exact(getattr(p, name))}" for name in ("T", "rho1", "rho2", "kappa"))
-            found.append(("gains", gains))
+            gains = (f"{name} = {short_exact(value)}" for name, value in self.protocol.parameters.items())
+            found.append(("gains", ", ".join(gains)))
         if self.limits is not None and self.limits.gain_cap is not None:
             found.append(("", f"gain capped at {short_exact(self.limits.gain_cap)}, which acts from 0 on"))
         if self.peak is not None:
@@ -299,9 +320,9 @@ class Design(Shown):
         return {
             "verdict": self.verdict,
             "binding": self.binding,
-            "max_input": text(self.max_input),
-            "input_norm": self.input_norm,
-            "asked": {"deadline": text(self.asked_deadline), "residual": text(self.asked_residual)},
+            "max_input": text(self.asked.max_input),
+            "input_norm": self.asked.input_norm,
+            "asked": {"deadline": text(self.asked.deadline), "residual": text(self.asked.residual)},
             "protocol": None if self.protocol is None else self.protocol.to_dict(),
             "gain_cap": text(cap),
             "deadline": text(self.deadline),
@@ -336,7 +357,6 @@ class Fit(NamedTuple):
 
     deadline: Fraction
     certificate: Certificate
-    limits: Limits | None
     peak: Fraction | None
     residual: Fraction | None
 
@@ -404,25 +424,24 @@ one asked for)
         raise ParameterError(f"input_norm = {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
     structure = analyse(graph)
     starts = initial_bound if isinstance(initial_bound, Starts) else starts_within(structure, initial_bound)
+    asked = Asked(U, input_norm, starts, T, r)
     begin: dict[str, Any] = {"x0": starts.center} if starts.point else {"starts": starts}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
-    blank = Design(UNPROVED, "", U, input_norm, starts, T, r, deadline=T)
-    lower, why = _lower_product(base, _bounds(base, starts)[0], r)
-    blank = replace(blank, lower_product=lower, lower_by=why)
+    lower, why = _lower_product(base, asked)
+    blank = Design(UNPROVED, "", asked, T, lower_product=lower, lower_by=why)
     first = offered = None
     for _ in range(_ROUNDS):
-        reason = _unusable(base)
-        if reason is not None:
+        if (reason := _unusable(base)) is not None:
             break
-        fit, other = _search(base, starts, U, T, r, input_norm)
+        fit, other = _search(base, asked)
         first = first or other
         if fit is None:
             break
         offered = offered or fit
         own = fit.certificate
         base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
-        again = _fit_of(base, _bounds(base, starts)[0], input_norm)
-        if _meets(again, U, r) and base.verdict == "certified":
+        again = _fit_of(base, asked)
+        if asked.met_by(again) and base.verdict == "certified":
             return _met(replace(blank, verdict=MET, repeatable=True), again)
     if offered is not None:
         checked = offered.certificate.checked
@@ -437,18 +456,15 @@ one asked for)
     return _missed(replace(blank, peak=first.peak, product=first.peak * first.deadline))
 
 
-def _search(
-    base: Certificate, starts: Starts, U: Fraction, T: Fraction | None, r: Fraction | None, input_norm: int | None
-) -> tuple[Fit | None, Fit | None]:
+def _search(base: Certificate, asked: Asked) -> tuple[Fit | None, Fit | None]:
     """Return the first gains of which the functions of ``base`` prove what is asked, and the first of all."""
-    bounds, members = _bounds(base, starts)
     first = None
-    for option in _options(base, bounds, members, input_norm, r):
-        fit = _fit(base, bounds, option, U, T, input_norm)
+    for option in _options(base, asked):
+        fit = _fit(base, option, asked)
         first = first or fit
-        if _meets(fit, U, r):
+        if asked.met_by(fit):
             return fit, first
-        if T is not None and option.product > U * T * _HOPELESS:
+        if asked.deadline is not None and option.product > asked.max_input * asked.deadline * _HOPELESS:
             break
     return None, first
 
@@ -481,39 +497,28 @@ def _unusable(base: Certificate) -> str | None:
     return None
 
 
-def _bounds(base: Certificate, starts: Starts) -> tuple[InputBounds, list[int]]:
-    """Return what bounds the input, and the members of the envelope that say something of single agents."""
-    forms = base.forms
+def _bounds(base: Certificate, starts: Starts) -> InputBounds:
+    """Return what bounds the input."""
     constants = base.effort.constants if base.effort is not None else ()
-    gain = PrescribedGain(base.protocol.T, base.protocol.rho1, base.protocol.rho2)
-    bounds = InputBounds(base.graph.exact_rows(range(base.graph.n_nodes)), gain, forms, constants, starts)
-    members = []
-    for i in range(len(forms)):
-        try:
-            bounds.constant(i)
-            bounds.start(i)
-        except (ValueError, OverflowError):
-            continue
-        members.append(i)
-    return bounds, members
+    rows = base.graph.exact_rows(range(base.graph.n_nodes))
+    return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, starts)
 
 
-def _lower_product(base: Certificate, bounds: InputBounds, residual: Fraction | None) -> tuple[Fraction | None, str]:
+def _lower_product(base: Certificate, asked: Asked) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
-    best, why, labels = Fraction(0), "", base.graph.labels
-    if base.influence.exact and base.graph.n_nodes <= INPUT_NODES:
-        for v, label in enumerate(labels):
-            row = {j: -Fraction(x) for j, x in base.influence.row(v).items()}
-            row[v] = row.get(v, Fraction(0)) + 1
-            way = _largest_below(bounds.starts, row) - (residual or 0)
+    best, why, starts, graph = Fraction(0), "", asked.starts, base.graph
+    agents = [shorten(label) for label in graph.labels]
+    if base.influence.exact and graph.n_nodes <= INPUT_NODES:
+        for agent, row in zip(agents, ways(starts, base.influence), strict=True):
+            way = _largest_below(starts, row) - (asked.residual or 0)
             if way > best:
-                best, why = way, f"the way of agent {shorten(label)} to its outcome"
+                best, why = way, f"the way of agent {agent} to its outcome"
     limit = base.upper_bound
-    if residual is None and limit and _has_inner_points(bounds.starts):
-        for heard, label in zip(bounds.rows, labels, strict=True):
-            first = 2 / limit * _largest_below(bounds.starts, heard)
+    if asked.residual is None and limit and _has_inner_points(starts):
+        for agent, heard in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
+            first = 2 / limit * _largest_below(starts, heard)
             if first > best:
-                best, why = first, f"the input of agent {shorten(label)} at the start"
+                best, why = first, f"the input of agent {agent} at the start"
     return (rounded(best, _KEPT_BITS) if best > 0 else None), why
 
 
@@ -539,23 +544,23 @@ def _has_inner_points(starts: Starts) -> bool:
 # ---------------------------------------------------------------------- search
 
 
-def _options(
-    base: Certificate, bounds: InputBounds, members: Sequence[int], input_norm: int | None, residual: Fraction | None
-) -> list[Option]:
+def _options(base: Certificate, asked: Asked) -> list[Option]:
     """Return gains by increasing ``phi``: the best without a cap, and a cap for each member if a residual is allowed.
 
     In units of ``k`` and the largest ``held`` everything is free of dimensions.
     """
-    agents: list[int | None] = [None] if input_norm == 2 else [*range(len(bounds.rows))]
+    bounds, residual = _bounds(base, asked.starts), asked.residual
+    members = usable_members(bounds)
+    agents: list[int | None] = [None] if asked.input_norm == 2 else [*range(len(bounds.rows))]
     held = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
     top = max(held)
     if base.constant or top == 0 or not members:
         return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
     rates = {i: bounds.form(i).rate for i in members}
-    decay = {i: [bounds.root_constant(i, v) * bounds.start(i) for v in agents] for i in members}
+    decay = {i: [decaying(bounds, i, v) for v in agents] for i in members}
     moving = [j for j, h in enumerate(held) if h and all(decay[i][j] for i in members)]
     size = np.array([nearest_float(held[j] / top) for j in moving])
-    over = {i: np.array([_log(decay[i][j] / held[j]) for j in moving]) for i in members}
+    over = {i: np.array([log(decay[i][j] / held[j]) for j in moving]) for i in members}
     least = 2 / max(rates.values())
     best = (math.inf, 1.0, least)
     for i in members:
@@ -578,7 +583,7 @@ def _options(
             bound = base.functions[i].deviation
             if bound is None:
                 continue
-            left = max(map(_log, bound.agents)) / 2 + _log(bounds.start(i)) - _log(residual)
+            left = max(map(log, bound.agents)) / 2 + log(bounds.start(i)) - log(residual)
             clock = _decimal(Fraction(max(left, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
             options.append(Option(clock, k, clock, clock * top))
     return sorted(options, key=lambda option: option.product)
@@ -630,83 +635,61 @@ def peak_factor(a: float, clocks: np.ndarray, sizes: np.ndarray) -> float:
 # ---------------------------------------------------------------------- proof
 
 
-def _fit(
-    base: Certificate,
-    bounds: InputBounds,
-    option: Option,
-    U: Fraction,
-    deadline: Fraction | None,
-    input_norm: int | None,
-) -> Fit:
+def _fit(base: Certificate, option: Option, asked: Asked) -> Fit:
     """Return the gains at a deadline, or at the shortest one that is proved, and what is proved of them."""
+    U, deadline = asked.max_input, asked.deadline
     T = deadline if deadline is not None else _decimal(option.product / U, up=True) or Fraction(1)
-    fit = _at(base, bounds, option, T, input_norm)
+    fit = _at(base, option, T, asked)
     if deadline is None:
         for nudge in range(_NUDGES):
             if fit.peak is None or fit.peak <= U:
                 break
             T = _decimal(T * fit.peak / U * (1 + nudge * Fraction(1, 10**9)), up=True)
-            fit = _at(base, bounds, option, T, input_norm)
+            fit = _at(base, option, T, asked)
     return fit
 
 
-def _at(base: Certificate, bounds: InputBounds, option: Option, T: Fraction, input_norm: int | None) -> Fit:
-    limits: tuple[Limits, ...] = ()
-    if option.clock is None:
-        protocol = NominalProtocol(T, _decimal(option.a / T), option.k, 1)
-    else:
-        cap = _decimal(option.clock / T, up=True)
-        protocol, limits = NominalProtocol(T, cap, option.k, 1), (Limits(gain_cap=cap),)
-    return _fit_of(base.changed(protocol=protocol, limits=limits), bounds, input_norm)
+def _at(base: Certificate, option: Option, T: Fraction, asked: Asked) -> Fit:
+    rho1 = _decimal(option.a / T) if option.clock is None else _decimal(option.clock / T, up=True)
+    limits = () if option.clock is None else (GainLimits(gain_cap=rho1),)
+    return _fit_of(base.changed(protocol=NominalProtocol(T, rho1, option.k, 1), limits=limits), asked)
 
 
-def _fit_of(cert: Certificate, bounds: InputBounds, input_norm: int | None) -> Fit:
+def _fit_of(cert: Certificate, asked: Asked) -> Fit:
     """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
-    T, effort = cert.protocol.T, cert.effort
+    T, effort, by_norm = cert.protocol.T, cert.effort, asked.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
-            return Fit(T, cert, None, Fraction(0) if not any(bounds.held) else None, Fraction(0))
-        return Fit(T, cert, None, effort.peak.norm if input_norm == 2 else effort.peak.largest, Fraction(0))
-    (limits,) = cert.limits
-    assert limits.gain_cap is not None
+            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, asked.starts).held) else None, Fraction(0))
+        return Fit(T, cert, effort.peak.norm if by_norm else effort.peak.largest, Fraction(0))
+    cap = cert.limits[0].gain_cap
     entries = effort.residual if effort is not None else ()
-    if not entries or entries[0].agents is None:
-        return Fit(T, cert, limits, None, None)
-    peak = entries[0].largest if input_norm is None else limits.gain_cap * bounds.held_norm
-    return Fit(T, cert, limits, peak, max(entries[0].agents))
-
-
-def _meets(fit: Fit, U: Fraction, residual: Fraction | None) -> bool:
-    if fit.peak is None or fit.residual is None:
-        return False
-    return fit.peak <= U and fit.residual <= (residual or 0)
+    if cap is None or not entries or entries[0].agents is None:
+        return Fit(T, cert, None, None)
+    peak = cap * _bounds(cert, asked.starts).held_norm if by_norm else entries[0].largest
+    return Fit(T, cert, peak, max(entries[0].agents))
 
 
 def _met(asked: Design, fit: Fit) -> Design:
     """Return the answer with gains."""
     assert fit.peak is not None
-    cert, protocol = fit.certificate, fit.certificate.protocol
-    assert isinstance(protocol, NominalProtocol)
-    effort = cert.effort
+    cert, effort, limit = fit.certificate, fit.certificate.effort, asked.asked.max_input
     if not fit.peak:
         binding = "nothing binds: no agent moves, whatever the gains"
-    elif fit.limits is not None:
-        slack = _percent(fit.peak, asked.max_input)
-        binding = f"the capped gain times the largest error at the start, {slack}"
+    elif cert.limits:
+        binding = f"the capped gain times the largest error at the start, {_percent(fit.peak, limit)}"
     else:
         assert effort is not None and effort.peak is not None
-        agents = effort.peak.agents
+        agents, by_norm = effort.peak.agents, asked.asked.input_norm == 2
         v = max(range(len(agents)), key=agents.__getitem__)
-        how = effort.peak.norm_how if asked.input_norm == 2 else effort.peak.how[v]
-        whose = "||u||" if asked.input_norm == 2 else f"the input of agent {shorten(cert.graph.labels[v])}"
-        when = f"{nearest_float(protocol.T) * -math.expm1(-nearest_float(how.z)):.4g}"
-        binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, asked.max_input)}"
+        how = effort.peak.norm_how if by_norm else effort.peak.how[v]
+        whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph.labels[v])}"
+        when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
+        binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
     return replace(
         asked,
         binding=binding,
         deadline=fit.deadline,
-        protocol=protocol,
-        limits=fit.limits,
         certificate=cert,
         peak=fit.peak,
         residual=fit.residual,
@@ -716,7 +699,7 @@ def _met(asked: Design, fit: Fit) -> Design:
 
 def _missed(asked: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
-    U, T, shortest = asked.max_input, asked.asked_deadline, asked.shortest_possible
+    U, T, shortest = asked.asked.max_input, asked.asked.deadline, asked.shortest_possible
     if T is not None and shortest is not None and shortest > T:
         least, times = map(down, (shortest, shortest / T))
         text = f"no gains meet a deadline below {least}, {times} times the one asked for"
@@ -732,11 +715,6 @@ def _missed(asked: Design) -> Design:
 # ---------------------------------------------------------------------- numbers
 
 
-def _log(x: Fraction) -> float:
-    """Return the natural logarithm of a nonnegative rational of any size."""
-    return math.log(x.numerator) - math.log(x.denominator) if x else -math.inf
-
-
 def _decimal(x: Fraction, up: bool = False) -> Fraction:
     """Round a nonnegative rational to a few decimal digits, to nearest or upwards.
 
@@ -747,7 +725,7 @@ def _decimal(x: Fraction, up: bool = False) -> Fraction:
     """
     if not x:
         return x
-    shift = DIGITS - 1 - math.floor(_log(x) / math.log(10))
+    shift = DIGITS - 1 - math.floor(log(x) / math.log(10))
     unit = Fraction(10) ** shift
     scaled = x * unit
     return Fraction(math.ceil(scaled) if up else round(scaled)) / unit

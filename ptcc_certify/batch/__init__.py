@@ -28,7 +28,7 @@ from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.nominal import Protocol
+from ptcc_certify.protocols import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
 
@@ -130,7 +130,7 @@ def certify_many(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.nominal import NominalProtocol
+    >>> from ptcc_certify.protocols import NominalProtocol
     >>> rows = certify_many(["fig1a", "fig1b"], NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), method="perron")
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]

@@ -62,7 +62,6 @@ from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]
@@ -172,7 +171,7 @@ def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
 
 def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certificate:
     more: dict[str, Any] = {}
-    if isinstance(settings.protocol, SlidingModeProtocol):
+    if settings.protocol.reaching:
         # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
         more["sigma0"] = _start(settings.sigma0, [seed, 1], graph)
         more["disturbance"] = settings.disturbance_of(graph.n_nodes, seed)

@@ -17,8 +17,8 @@ from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
 from ptcc_certify.graphs.structure import behaviour_name
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
 
 #: What a start may be given as.
 Start = str | Sequence[Any] | Mapping[Any, Any] | None
@@ -56,7 +56,7 @@ class Settings:
         if self.method not in METHODS:
             raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
         object.__setattr__(self, "seed", whole_number(self.seed, "seed", 0))
-        sliding = isinstance(self.protocol, SlidingModeProtocol)
+        sliding = self.protocol.reaching is not None
         for name in ("x0", "sigma0"):
             start = getattr(self, name)
             if (labelled := by_label(start, name)) is not None:

@@ -36,7 +36,7 @@ from ptcc_certify.bounds.envelope import (
 from ptcc_certify.bounds.final_state import exact_start
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime, sliding_bound
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
@@ -78,7 +78,7 @@ class SlidingEnvelope(Envelope):
     True
     """
 
-    protocol: SlidingModeProtocol
+    protocol: ReachingProtocol
     sigma0: tuple[Fraction, ...]
     reaching: tuple[ReachingTime, ...]
 
@@ -178,23 +178,24 @@ class SlidingEnvelope(Envelope):
             The run is of another graph or protocol, begins later than 0, from another ``sigma(0)``, or is the
             boundary-layer imitation, of which nothing was proved.
         """
-        if not isinstance(trajectory, SlidingTrajectory) or trajectory.protocol != self.protocol:
+        run = trajectory.sliding
+        if run is None or run.protocol != self.protocol:
             raise ParameterError("the run is of another protocol than the envelope")
-        if trajectory.boundary_layer is not None:
+        if run.boundary_layer is not None:
             raise ParameterError("nothing was proved about the boundary-layer imitation; compare the true solution")
         sigma0 = np.array([float(x) for x in self.sigma0])
-        if trajectory.t[0] != 0 or (trajectory.sigma0 != sigma0).any():
+        if trajectory.t[0] != 0 or (run.sigma0 != sigma0).any():
             raise ParameterError("the run starts later than 0, or from another sigma(0) than the envelope")
         certain = np.array([np.inf if r.z is None else float(r.z) for r in self.reaching])
         late = certain * 1e-9
-        if trajectory.reads_states:  # sigma_k is known to the integrator's floor, its root to that over the slope
+        if run.reads_states:  # sigma_k is known to the integrator's floor, its root to that over the slope
             gap = float(self.protocol.mu1 - self.protocol.delta) * float(self.protocol.T_r) * np.exp(-certain)
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
-        kept = bool((trajectory.reaching_z <= certain + late).all())
-        z = self._z(trajectory)
+        kept = bool((run.reaching_z <= certain + late).all())
+        z = self._z(run)
         bound, size = self._sliding(z), np.abs(sigma0).max(initial=0.0)
-        excess = np.maximum(np.abs(trajectory.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
+        excess = np.maximum(np.abs(run.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(excess > 0, excess / bound, 0.0)
             norm = np.linalg.norm(excess / (size or 1.0), axis=0)
@@ -203,15 +204,16 @@ class SlidingEnvelope(Envelope):
 
     def histories(self, member: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of the start."""
-        assert isinstance(trajectory, SlidingTrajectory)
         if self.direct:
             return super().histories(member, trajectory)
+        run = trajectory.sliding
+        assert run is not None
         if not self._usable(member):
             return []
         own = self._unit(trajectory.states[:, 0])
-        x, y = trajectory.states / own, (trajectory.states - trajectory.sigma) / own
+        x, y = trajectory.states / own, (run.states - run.sigma) / own
         size = max(float(np.abs(part).max()) for part in (x, y))
-        v, sliding = self._bounds(member, trajectory.states[:, 0], own, self._z(trajectory), trajectory.clock)
+        v, sliding = self._bounds(member, trajectory.states[:, 0], own, self._z(run), run.clock)
         unit = float((v + sliding).max()) or 1.0
         floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
         return [
@@ -298,8 +300,9 @@ class SlidingEnvelope(Envelope):
         """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
         if self.direct:
             return super()._distance_bounds(trajectory, x, unit)
-        assert isinstance(trajectory, SlidingTrajectory)
-        bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(trajectory), trajectory.clock)
+        run = trajectory.sliding
+        assert run is not None
+        bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(run), run.clock)
         start = [as_exact(v) - sigma for v, sigma in zip(x[:, 0], self.sigma0, strict=True)]
         return np.vstack([bounds, norm]), start
 

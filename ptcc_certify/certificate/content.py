@@ -18,7 +18,7 @@ import numpy as np
 from ptcc_certify.bounds.deviation import OutcomeGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import Influence, Outcome, influence
-from ptcc_certify.bounds.input import Effort, Limits, Starts, WorstStart, bound_effort, worst_start
+from ptcc_certify.bounds.input import Effort, InputRequest, Limits, Starts, WorstStart, bound_effort, worst_start
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import Interval, outcome_witness
@@ -30,11 +30,11 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_bound import RateLimit, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Sharpening
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems import Obligation, RateProof, Theorem, sliding_claim, theorem_for
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.lemmas import EXACT_NODES
@@ -351,9 +351,9 @@ class Content:
     def envelope(self) -> Envelope:
         """The proved bounds over time; without members if nothing was proved."""
         gain = self.protocol.gain
-        if isinstance(self.protocol, SlidingModeProtocol):
+        if (sliding := self.protocol.reaching) is not None:
             sigma0, reaching = self.sigma0 or (), self.reaching or ()
-            return SlidingEnvelope(self.structure, gain, self.functions, self.protocol, sigma0, reaching)
+            return SlidingEnvelope(self.structure, gain, self.functions, sliding, sigma0, reaching)
         return Envelope(self.structure, gain, self.functions)
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -424,7 +424,7 @@ class Content:
             return self.source.effort
         if self.rate is None and not self.constant:
             return None
-        return bound_effort(
+        asked = InputRequest(
             self.structure,
             self.protocol,
             self.forms,
@@ -440,6 +440,7 @@ class Content:
             delta=self.delta,
             noise=self.noise,
         )
+        return bound_effort(asked)
 
     @cached_property
     def worst_start(self) -> WorstStart | None:
@@ -485,7 +486,7 @@ class Content:
     @cached_property
     def comparison(self) -> Comparison | None:
         """The simulated run against the proved bounds; None without a run, or if nothing was proved."""
-        if self.trajectory is None or not (self.envelope.members or isinstance(self.envelope, SlidingEnvelope)):
+        if self.trajectory is None or not (self.envelope.members or self.protocol.reaching):
             return None
         return self.envelope.compare(self.trajectory)
 
@@ -498,7 +499,7 @@ class Content:
         if self.sigma0 is None:
             return None
         run = self.trajectory
-        said = run.source if isinstance(run, SlidingTrajectory) else None
+        said = None if run is None or run.sliding is None else run.sliding.source
         if self.source is not None:
             said = self.source.document["protocol"]["disturbance"]
         if said is None or said == "none":

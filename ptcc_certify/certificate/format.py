@@ -43,9 +43,8 @@ from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
 from ptcc_certify.lyapunov.function import DistanceBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.rate_bound import RateLimit
 from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems import Obligation, RateProof
 from ptcc_certify.theorems.base import ExactInterval
 
@@ -134,12 +133,12 @@ def _write_protocol(content: Content) -> dict[str, Any]:
     run, section = content.trajectory, content.protocol.to_dict()
     if content.reaching is None:
         return section
-    return {**section, "disturbance": run.source if isinstance(run, SlidingTrajectory) else None}
+    return {**section, "disturbance": None if run is None or run.sliding is None else run.sliding.source}
 
 
 def _read_protocol(said: Mapping[str, Any]) -> Protocol:
-    kind = NominalProtocol if said["kind"] == "nominal" else SlidingModeProtocol
-    return kind(**{key: exact(value) for key, value in said.items() if key not in ("kind", "disturbance")})
+    given = {key: value for key, value in said.items() if key != "disturbance"}
+    return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in given.items()})
 
 
 def _write_reaching(content: Content) -> dict[str, Any] | None:
@@ -150,9 +149,9 @@ def _write_reaching(content: Content) -> dict[str, Any] | None:
 
 
 def _read_reaching(said: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
-    if said is None or not isinstance(protocol, SlidingModeProtocol):
+    if said is None or protocol.reaching is None:
         return None
-    return tuple(ReachingTime(protocol.T_r, number(z)) for z in said["z"].values())
+    return tuple(ReachingTime(protocol.reaching.T_r, number(z)) for z in said["z"].values())
 
 
 # ---------------------------------------------------------------------- Lyapunov functions
@@ -451,13 +450,13 @@ def _write_run(content: Content) -> dict[str, Any] | None:
         "distance_ratio": finite(seen.distance_ratio),
         "deadline_resolved": seen.deadline_resolved,
     }
-    if not isinstance(run, SlidingTrajectory):
+    if run is None or run.sliding is None:
         return section
     return section | {
         "sliding_ratio": finite(seen.sliding_ratio),
         "reaching_kept": seen.reaching_kept,
-        "reached": dict(zip(content.graph.labels, map(finite, run.reaching_z.tolist()), strict=True)),
-        "disturbance_bounded_by": run.bounded_by,
+        "reached": dict(zip(content.graph.labels, map(finite, run.sliding.reaching_z.tolist()), strict=True)),
+        "disturbance_bounded_by": run.sliding.bounded_by,
     }
 
 

@@ -36,11 +36,11 @@ from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_bound import RateLimit, mean_limit, prove_rate_limit
 from ptcc_certify.lyapunov.search import APART_NODES, Sharpening, sharpen, sharpen_large
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
 from ptcc_certify.simulation.filippov import rounding_slack
-from ptcc_certify.simulation.limited import Actuator
-from ptcc_certify.simulation.run import PAST, simulate
+from ptcc_certify.simulation.instants import PAST
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems import RateProof, Theorem, theorem_for
 from ptcc_certify.theorems.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
@@ -78,7 +78,7 @@ def certify(
     method: str = "best",
     at: Any = None,
     starts: Any = None,
-    limits: Sequence[Actuator | Limits] = (),
+    limits: Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
@@ -167,10 +167,10 @@ ReachingTime(0, 1 before T_r)))
     manifold, reaching = sliding_start(structure, protocol, sigma0)
     case = Case(structure, protocol, request, start, manifold, progress)
     runs = case.simulated(simulation) and start is not None
-    if not runs and disturbance is not None and isinstance(protocol, SlidingModeProtocol):
+    if not runs and disturbance is not None and (sliding := protocol.reaching) is not None:
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
-        source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
-        source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
+        source = as_disturbance(disturbance, graph.n_nodes, sliding.delta, horizon)
+        source.check(sliding.delta, graph.labels, horizon, rounding_slack(sliding))
     if request.time_limit < SHORT_LIMIT and graph.n_nodes <= CLARABEL_MARGIN_ROWS:
         load_solver()
     with deadline.time_limit(SEARCHING * request.time_limit):

@@ -20,10 +20,10 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.gain import parameter
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import GainLimits
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
-from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
@@ -106,11 +106,11 @@ def refuse(
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     for name, value in sliding.items():
-        if value is not None and not isinstance(protocol, SlidingModeProtocol):
+        if value is not None and not protocol.reaching:
             raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
     if method not in METHODS:
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
-    if isinstance(protocol, SlidingModeProtocol) and any(value is not None for value in nominal):
+    if protocol.reaching and any(value is not None for value in nominal):
         raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
@@ -132,12 +132,11 @@ def read_request(structure: Structure, protocol: Protocol, asked: Mapping[str, A
     return request
 
 
-def _limits(entry: Actuator | Limits, protocol: Protocol) -> Limits:
+def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     """Return limits of the gain, or refuse them."""
-    actuator = Actuator(entry.gain_cap, entry.stop_before, entry.sample_period)
-    if actuator.ideal:
+    limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
+    if limits.ideal:
         raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
-    limits = Limits(actuator.gain_cap, actuator.stop_before, actuator.sample_period)
     T = protocol.T
     if limits.stop_before is not None and limits.stop_before >= T:
         raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
@@ -220,17 +219,18 @@ def sliding_start(
     structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
 ) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
     """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
-    if not isinstance(protocol, SlidingModeProtocol):
+    sliding = protocol.reaching
+    if sliding is None:
         return None, None
     start = (
         (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else initial_state(structure, sigma0, "sigma0")
     )
-    times = certified_reaching_times(protocol, start)
+    times = certified_reaching_times(sliding, start)
     # Whatever the check could not confirm is not claimed.
     asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
-    pole = protocol.mu3 * protocol.kappa
-    known = decay_integrals_below(protocol.T_r, protocol.mu2, pole, asked, REACHING_BITS)
-    push = protocol.mu1 - protocol.delta
+    pole = sliding.mu3 * sliding.kappa
+    known = decay_integrals_below(sliding.T_r, sliding.mu2, pole, asked, REACHING_BITS)
+    push = sliding.mu1 - sliding.delta
     return start, tuple(
         r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
         for r, s in zip(times, start, strict=True)

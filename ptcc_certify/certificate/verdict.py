@@ -26,10 +26,9 @@ from lmi.exact.rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.content import Content
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.input_bounds import PrescribedGain, Starts, root_above
+from ptcc_certify.checker.input_bounds import Starts, root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: What became of an expectation.
@@ -273,9 +272,8 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
     if effort is None:
         return Fraction(0), None
-    gain = PrescribedGain(p.T, p.rho1, p.rho2 * p.kappa)
-    tops = [top for entry in certificate.limits if (top := entry.largest_gain(gain)) is not None]
-    share = min([Fraction(1), *(top / (gain.rho1 + gain.k / gain.T) for top in tops)])
+    tops = [top for entry in certificate.limits if (top := entry.largest_gain(p.gain.exact)) is not None]
+    share = min([Fraction(1), *(top / p.gain.first for top in tops)])
     least: Fraction | float = (effort.first or Fraction(0)) * share
     if certificate.noise is not None:
         rows = graph.exact_rows(range(graph.n_nodes))
@@ -313,7 +311,7 @@ def judge_limits(certificate: Content) -> list[Answer]:
 def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return whether the bound is useful, what it says, and which gains would make it so."""
     envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
-    span = p.T if direct or not isinstance(p, SlidingModeProtocol) else p.T_s
+    span = p.T if direct else p.span
     z, instant = envelope.coordinates, "0.99 T"
     begin = f"{z}(0)"
     if not direct:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 
 GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
 

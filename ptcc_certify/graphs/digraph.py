@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -450,12 +450,8 @@ class SignedDigraph(Shown):
     @property
     def edges(self) -> tuple[tuple[str, str, Fraction], ...]:
         """All edges as ``(source label, target label, exact weight)``, sorted by (target, source) index."""
-        return tuple(self._edges())
-
-    def _edges(self) -> Iterator[tuple[str, str, Fraction]]:
-        labels = self.labels
-        for i, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
-            yield labels[s], labels[t], self._weights.fraction(i)
+        pairs = enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True))
+        return tuple((self.labels[s], self.labels[t], self._weights.fraction(i)) for i, (s, t) in pairs)
 
     def adjacency(self) -> sparse.csr_array:
         """(N, N) sparse float64 matrix ``W``; rows are listeners."""
@@ -472,10 +468,7 @@ class SignedDigraph(Shown):
 
     def dense_laplacian(self) -> np.ndarray:
         """(N, N) dense float64 signed Laplacian, for small graphs."""
-        L = np.zeros((self.n_nodes, self.n_nodes))
-        L[self.target, self.source] = -self.weights
-        np.fill_diagonal(L, self.in_weight())
-        return L
+        return self.laplacian().toarray()
 
     def in_weight(self) -> np.ndarray:
         """(N,) float64 array: ``D_k = sum_l |w_kl|``, how much node k listens in total."""
@@ -483,13 +476,8 @@ class SignedDigraph(Shown):
 
     def exact_laplacian(self) -> list[list[Fraction]]:
         """Return the signed Laplacian as N rows of N rationals (small graphs)."""
-        n = self.n_nodes
-        rows = [[Fraction(0)] * n for _ in range(n)]
-        for edge, (s, t) in enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True)):
-            weight = self._weights.fraction(edge)
-            rows[t][s] = -weight
-            rows[t][t] += abs(weight)
-        return rows
+        nodes = range(self.n_nodes)
+        return [[row.get(column, Fraction(0)) for column in nodes] for row in self.exact_rows(nodes)]
 
     def exact_rows(self, nodes: Iterable[int]) -> list[dict[int, Fraction]]:
         """Return rows of the signed Laplacian as ``{column: rational}``, without zeros.

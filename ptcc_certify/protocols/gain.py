@@ -13,27 +13,27 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.checker.input_bounds import PrescribedGain
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import Exact
-from ptcc_certify.graphs.rationals import as_fraction, shorten
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.parameters import NotNegative, Parameters, Positive, parameter, refuse_out_of_range
 
 if TYPE_CHECKING:
     import casadi as ca
     from numpy.typing import ArrayLike
 
 _PARAMETERS = ("T", "rho1", "rho2", "kappa")
-_SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
-#: Bits of the longest parameter, whose products are written in certificates.
-LONGEST_BITS = 3000
 
 
-@dataclass(frozen=True, init=False, repr=False)
-class Gain:
+@dataclass(frozen=True, repr=False)
+class Gain(Parameters):
     r"""``gain(t) = rho1 + rho2 kappa/(T - t)`` before the deadline ``T``, ``rho1`` from there on.
 
     With ``rho2 = 0`` the gain is ``rho1`` for ever: the asymptotic baseline without a deadline.
@@ -64,25 +64,30 @@ class Gain:
     \begin{cases} 0.1 + \frac{0.3}{0.6 - t}, & t < 0.6 \\ 0.1, & t \ge 0.6 \end{cases}
     """
 
-    T: Fraction
-    rho1: Fraction
-    rho2: Fraction
-    kappa: Fraction
+    T: Positive = Positive()
+    rho1: Positive = Positive()
+    rho2: NotNegative = NotNegative()
+    kappa: Positive = Positive()
 
-    def __init__(self, T: Exact, rho1: Exact, rho2: Exact, kappa: Exact):
-        for name, given in (("T", T), ("rho1", rho1), ("rho2", rho2), ("kappa", kappa)):
-            object.__setattr__(self, name, parameter(name, given, zero_allowed=name == "rho2"))
-        for name, value in (("rho1 T", self.rho1 * self.T), ("rho2 kappa", self.pole), ("rho2 kappa/T", self._peak)):
-            _refuse_out_of_range(name, value)
+    def __post_init__(self) -> None:
+        size = self.pole / self.T
+        for name, value in (("rho1 T", self.rho1 * self.T), ("rho2 kappa", self.pole), ("rho2 kappa/T", size)):
+            refuse_out_of_range(name, value)
 
     @property
     def pole(self) -> Fraction:
         """``rho2 kappa``, the strength of the pole at ``T``: the two enter the gain only as this product."""
         return self.rho2 * self.kappa
 
+    @cached_property
+    def exact(self) -> PrescribedGain:
+        """The same gain as proofs enclose it, for ``rho2 > 0``."""
+        return PrescribedGain(self.T, self.rho1, self.pole)
+
     @property
-    def _peak(self) -> Fraction:
-        return self.pole / self.T
+    def first(self) -> Fraction:
+        """The gain at 0, ``rho1 + rho2 kappa/T``."""
+        return self.rho1 + self.pole / self.T
 
     # ------------------------------------------------------------------ numbers
 
@@ -100,7 +105,7 @@ class Gain:
         """Return the gain where ``1 - t/T = q``, however small; ``rho1`` where ``q <= 0``."""
         q = np.asarray(q, dtype=float)
         with np.errstate(over="ignore"):
-            return float(self.rho1) + np.where(q > 0, float(self._peak) / np.where(q > 0, q, 1), 0.0)
+            return float(self.rho1) + np.where(q > 0, float(self.pole / self.T) / np.where(q > 0, q, 1), 0.0)
 
     def clock(self, t: ArrayLike) -> np.ndarray:
         """Return ``s(t) = rho1 t + rho2 kappa ln(T/(T - t))``, infinite from ``T`` on unless ``rho2 = 0``."""
@@ -131,10 +136,6 @@ class Gain:
     def time_at_tau(self, tau: ArrayLike) -> np.ndarray:
         """Return ``t = T (1 - e^-tau)``."""
         return -float(self.T) * np.expm1(-np.asarray(tau, dtype=float))
-
-    def clock_rate(self, tau: ArrayLike) -> np.ndarray:
-        """Return ``ds/dtau = rho1 T e^-tau + rho2 kappa``: smooth, where the gain itself has a pole."""
-        return float(self.rho1 * self.T) * np.exp(-np.asarray(tau, dtype=float)) + float(self.pole)
 
     def _remaining(self, t: ArrayLike) -> np.ndarray:
         return 1 - np.asarray(t, dtype=float) / float(self.T)
@@ -197,7 +198,7 @@ class Gain:
         return to_latex(forms[of](ca.SX.sym("t"), parameters))
 
     def _numbers(self) -> dict[str, Any]:
-        return {name: float(getattr(self, name)) for name in _PARAMETERS}
+        return {name: float(value) for name, value in self.parameters.items()}
 
     def _gain(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
         import casadi as ca
@@ -216,12 +217,8 @@ class Gain:
 
         if not self.rho2:
             return p["rho1"] * t
-        return ca.if_else(
-            t < p["T"], p["rho1"] * t + p["rho2"] * p["kappa"] * ca.log(p["T"] / (p["T"] - t)), float("inf")
-        )
-
-    def __repr__(self) -> str:
-        return f"Gain({parameters_text(self, _PARAMETERS)})"
+        stretched = p["rho1"] * t + p["rho2"] * p["kappa"] * ca.log(p["T"] / (p["T"] - t))
+        return ca.if_else(t < p["T"], stretched, float("inf"))
 
 
 def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Exact, kappa: Exact) -> np.ndarray:
@@ -259,49 +256,3 @@ def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Ex
     t = np.asarray(t, dtype=float)
     q = np.maximum(1 - t / deadline, 0)
     return np.asarray(V0, dtype=float) * q ** (exponent * power) * np.exp(-decay * t)
-
-
-def parameters_text(owner: object, names: Iterable[str]) -> str:
-    """Return ``name=value, ...`` of rational attributes, for a readable ``repr``."""
-    return ", ".join(f"{name}={readable(getattr(owner, name))}" for name in names)
-
-
-def readable(value: Fraction) -> str:
-    """Write a rational as short as it can be read back exactly: a float's decimals, or ``p/q``.
-
-    Examples
-    --------
-    >>> readable(Fraction(0.6)), readable(Fraction(3, 5)), readable(Fraction(2))
-    ('0.6', '3/5', '2')
-    """
-    if value.denominator != 1 and Fraction(float(value)) == value:
-        return repr(float(value))
-    return shorten(str(value))
-
-
-def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
-    """Return a parameter as an exact rational, or refuse it by name.
-
-    Examples
-    --------
-    >>> parameter("mu1", "1.2")
-    Fraction(6, 5)
-    """
-    domain = ">= 0" if zero_allowed else "> 0"
-    try:
-        value = as_fraction(given, name)
-    except NumberError:
-        raise ParameterError(
-            f"{name} = {shorten(str(given))} is not a finite number; {name} must be a number {domain}"
-        ) from None
-    _refuse_out_of_range(name, value)
-    if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
-        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
-    if value < 0 or (value == 0 and not zero_allowed):
-        raise ParameterError(f"{name} = {readable(value)} is outside its domain; {name} must be {domain}")
-    return value
-
-
-def _refuse_out_of_range(name: str, value: Fraction) -> None:
-    if value and not _SMALLEST <= abs(value) <= _LARGEST:
-        raise ParameterError(f"{name} is not between 1e-300 and 1e300 in size; choose other units of time or weight")

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     import casadi as ca
 
 # How tightly a printed piece binds: a piece weaker than its surroundings is put in parentheses.
-_RELATION, _SUM, _PRODUCT, _POWER, _ATOM = range(5)
+_ANY = _RELATION = 0
+_SUM, _PRODUCT, _POWER, _ATOM = range(1, 5)
 
 _GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|varsigma|tau|phi|chi|psi|omega|"
@@ -24,21 +25,29 @@ _GREEK = re.compile(
 )
 _SYMBOL = re.compile(r"([A-Za-z]+)_?([A-Za-z0-9]*)")
 _FUNCTIONS = {
-    "SIN": r"\sin",
-    "COS": r"\cos",
-    "TAN": r"\tan",
-    "ASIN": r"\arcsin",
-    "ACOS": r"\arccos",
-    "ATAN": r"\arctan",
-    "SINH": r"\sinh",
-    "COSH": r"\cosh",
-    "TANH": r"\tanh",
+    **{name.upper(): rf"\{name}" for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
+    **{f"A{name}".upper(): rf"\arc{name}" for name in ("sin", "cos", "tan")},
     "LOG": r"\ln",
     "SIGN": r"\operatorname{sign}",
-    "FMIN": r"\min",
-    "FMAX": r"\max",
 }
 _RELATIONS = {"LT": "<", "LE": r"\le", "EQ": "=", "NE": r"\ne", "AND": r"\land", "OR": r"\lor"}
+# Of each operation: the text, how tightly its operands must bind there, and how tightly it binds itself.
+_FORMS: dict[str, tuple[str, tuple[int, ...], int]] = {
+    "SUB": ("{} - {}", (_SUM, _PRODUCT), _SUM),
+    "NEG": ("-{}", (_PRODUCT,), _SUM),
+    "DIV": (r"\frac{{{}}}{{{}}}", (_ANY, _ANY), _POWER),
+    "INV": (r"\frac{{1}}{{{}}}", (_ANY,), _POWER),
+    "SQ": ("{}^{{2}}", (_ATOM,), _POWER),
+    "POW": ("{}^{{{}}}", (_ATOM, _ANY), _POWER),
+    "CONSTPOW": ("{}^{{{}}}", (_ATOM, _ANY), _POWER),
+    "EXP": (r"\mathrm{{e}}^{{{}}}", (_ANY,), _POWER),
+    "SQRT": (r"\sqrt{{{}}}", (_ANY,), _POWER),
+    "FABS": (r"\left|{}\right|", (_ANY,), _POWER),
+    "FMIN": (r"\min\left({}, {}\right)", (_ANY, _ANY), _POWER),
+    "FMAX": (r"\max\left({}, {}\right)", (_ANY, _ANY), _POWER),
+    "NOT": (r"\lnot {}", (_ATOM,), _RELATION),
+    **{name: (f"{{}} {sign} {{}}", (_SUM, _SUM), _RELATION) for name, sign in _RELATIONS.items()},
+}
 _OPPOSITE = {"LT": r"\ge", "LE": ">", "EQ": r"\ne", "NE": "="}
 
 
@@ -105,34 +114,15 @@ def _walk(node: ca.SX) -> tuple[str, int]:
         # a + -6 b and a + (-b + c) read a - 6 b and a - b + c
         right = f" - {right[1:]}" if right.startswith("-") else f" + {right}"
         return _wrap(operands[0], _SUM) + right, _SUM
-    if name == "SUB":
-        return f"{_wrap(operands[0], _SUM)} - {_wrap(operands[1], _PRODUCT)}", _SUM
-    if name == "NEG":
-        return f"-{_wrap(operands[0], _PRODUCT)}", _SUM
     if name == "MUL":
         return _product(*operands)
     if name == "TWICE":
         return _times("2", _wrap(operands[0], _PRODUCT)), _PRODUCT
-    if name == "DIV":
-        return rf"\frac{{{to_latex(operands[0])}}}{{{to_latex(operands[1])}}}", _POWER
-    if name == "INV":
-        return rf"\frac{{1}}{{{to_latex(operands[0])}}}", _POWER
-    if name == "SQ":
-        return f"{_wrap(operands[0], _ATOM)}^{{2}}", _POWER
-    if name in ("POW", "CONSTPOW"):
-        return f"{_wrap(operands[0], _ATOM)}^{{{to_latex(operands[1])}}}", _POWER
-    if name == "EXP":
-        return rf"\mathrm{{e}}^{{{to_latex(operands[0])}}}", _POWER
-    if name == "SQRT":
-        return rf"\sqrt{{{to_latex(operands[0])}}}", _POWER
-    if name == "FABS":
-        return rf"\left|{to_latex(operands[0])}\right|", _POWER
     if name in _FUNCTIONS:
-        return rf"{_FUNCTIONS[name]}\left({', '.join(map(to_latex, operands))}\right)", _POWER
-    if name in _RELATIONS:
-        return f"{_wrap(operands[0], _SUM)} {_RELATIONS[name]} {_wrap(operands[1], _SUM)}", _RELATION
-    if name == "NOT":
-        return rf"\lnot {_wrap(operands[0], _ATOM)}", _RELATION
+        return rf"{_FUNCTIONS[name]}\left({to_latex(operands[0])}\right)", _POWER
+    if name in _FORMS:
+        text, needed, level = _FORMS[name]
+        return text.format(*map(_wrap, operands, needed)), level
     raise ParameterError(f"no LaTeX is known for the CasADi operation {name}")
 
 

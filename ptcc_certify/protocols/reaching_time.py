@@ -26,7 +26,7 @@ from ptcc_certify.errors import SimulationError
 from ptcc_certify.protocols.disturbance import Adversary, Disturbance
 
 if TYPE_CHECKING:
-    from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    from ptcc_certify.protocols.base import ReachingProtocol
 
 #: Beyond this z the time is T_r to the last bit of a float.
 LAST_Z = 40.0
@@ -62,7 +62,7 @@ class ReachingTime:
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3="1/2", delta=1)
     >>> small, large = certified_reaching_times(p, [Fraction(1), Fraction(100)])
     >>> small.time < 1, large.time, large.z is None  # the adversary keeps the large one away from 0 until T_r
@@ -95,7 +95,7 @@ class ReachingTime:
         return f"ReachingTime({up(Fraction(self.time))}, {down(self.remaining, 3)} before T_r)"
 
 
-def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:
+def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:
     """Prove for every agent an instant from which its sliding variable is 0, whatever the disturbance.
 
     ``|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r)`` is shown in ball arithmetic, the integral being an incomplete
@@ -119,7 +119,7 @@ def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fra
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
@@ -132,7 +132,7 @@ def certified_reaching_times(protocol: SlidingModeProtocol, sigma0: Sequence[Fra
     return tuple(ReachingTime(protocol.T_r, known[abs(value)]) for value in sigma0)
 
 
-def _least_certain(protocol: SlidingModeProtocol, size: Fraction, guess: float) -> Fraction | None:
+def _least_certain(protocol: ReachingProtocol, size: Fraction, guess: float) -> Fraction | None:
     """Return a ``z`` at which 0 is proved to be reached, as near to the guess as proves."""
     if math.isfinite(guess):
         for slack in (1e-12, 1e-9, 1e-6, 1e-3):
@@ -142,7 +142,7 @@ def _least_certain(protocol: SlidingModeProtocol, size: Fraction, guess: float) 
     return _bracket(protocol, size)
 
 
-def _bracket(protocol: SlidingModeProtocol, size: Fraction) -> Fraction | None:
+def _bracket(protocol: ReachingProtocol, size: Fraction) -> Fraction | None:
     """Return a ``z`` at which 0 is proved to be reached, too large by a tenth at most; None if none was found."""
     if not size:
         return Fraction(0)
@@ -163,7 +163,7 @@ def _bracket(protocol: SlidingModeProtocol, size: Fraction) -> Fraction | None:
     return high
 
 
-def _certainly_reached(protocol: SlidingModeProtocol, size: Fraction, z: Fraction) -> bool:
+def _certainly_reached(protocol: ReachingProtocol, size: Fraction, z: Fraction) -> bool:
     """Prove ``size <= (mu1 - delta) int dr/psi`` up to the instant ``z``; False if it is wrong or not provable."""
     import flint
 
@@ -181,7 +181,7 @@ def _certainly_reached(protocol: SlidingModeProtocol, size: Fraction, z: Fractio
     return False
 
 
-def inverse_decay_integral(protocol: SlidingModeProtocol, z: Fraction) -> Any:
+def inverse_decay_integral(protocol: ReachingProtocol, z: Fraction) -> Any:
     """Return ``int_0^t dr/psi(r)`` up to the instant ``z`` as a ball of python-flint, at its present precision.
 
     With ``m = mu3 kappa`` and ``u = T_r - r`` it is ``T_r^m e^(mu2 T_r) int u^-m e^(-mu2 u) du``, a difference of upper
@@ -223,7 +223,7 @@ class ReachingProblem:
         The disturbance varies too fast to be resolved.
     """
 
-    def __init__(self, protocol: SlidingModeProtocol, sigma0: np.ndarray, disturbance: Disturbance):
+    def __init__(self, protocol: ReachingProtocol, sigma0: np.ndarray, disturbance: Disturbance):
         self._protocol, self._disturbance = protocol, disturbance
         # Each sliding variable in units of its own start: the bracket begins at 1.
         self._unit, self._sign = np.abs(sigma0), np.sign(sigma0)
@@ -400,7 +400,7 @@ class ReachingProblem:
 
 
 def sliding_bound(
-    protocol: SlidingModeProtocol,
+    protocol: ReachingProtocol,
     sigma0: Sequence[Fraction],
     z: np.ndarray,
     reaching: Sequence[ReachingTime] | None = None,

@@ -28,8 +28,8 @@ from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import METHODS, sharpen
+from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
-from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
@@ -137,8 +137,8 @@ class Settings:
         ParameterError
             A parameter is outside its domain.
         """
-        names, make = (_NOMINAL, NominalProtocol) if self.kind == "nominal" else (_SLIDING, SlidingModeProtocol)
-        return make(**{name: _decimal(getattr(self, name)) for name in names})
+        names = _NOMINAL if self.kind == "nominal" else _SLIDING
+        return Protocol.from_dict({"kind": self.kind, **{name: _decimal(getattr(self, name)) for name in names}})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,10 +252,10 @@ class Explorer:
         drawn = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
         start = exact_start(structure, drawn[0])
         more: dict[str, Any] = {}
-        if isinstance(protocol, SlidingModeProtocol):
+        if (sliding := protocol.reaching) is not None:
             sigma0 = exact_start(structure, drawn[1] if settings.reaching else [0] * n)
-            base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(protocol, sigma0))
-            more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, protocol, n)}
+            base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(sliding, sigma0))
+            more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, sliding, n)}
         run = simulate(base.graph, protocol, [float(x) for x in start], samples=_SAMPLES, **more)
         gone = base.sigma0 or (Fraction(0),) * n
         moved = [x - s for x, s in zip(start, gone, strict=True)]
@@ -459,7 +459,7 @@ def _decimal(value: Any) -> Any:
     return f"{value:.12g}" if isinstance(value, float) else value
 
 
-def _disturbance(settings: Settings, protocol: SlidingModeProtocol, n: int) -> Disturbance:
+def _disturbance(settings: Settings, protocol: ReachingProtocol, n: int) -> Disturbance:
     """Return what the simulated run meets, scaled to ``delta``."""
     until = float(protocol.T) * 2
     if settings.disturbance == "sin":

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +26,9 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:
         return figures
     if "decay" in wanted and saved.comparison is not None and saved.envelope.members and run.error.any():
         figures["decay"] = plot_decay(saved).figure
-    if "sliding" in wanted and isinstance(run, SlidingTrajectory) and not saved.direct and n <= INPUT_NODES:
-        figures["sliding"] = plot_sliding(run, saved.reaching).figure
-    if "input" in wanted and n <= INPUT_NODES and (not saved.constant or isinstance(run, SlidingTrajectory)):
+    if "sliding" in wanted and (slid := run.sliding) is not None and not saved.direct and n <= INPUT_NODES:
+        figures["sliding"] = plot_sliding(slid, saved.reaching).figure
+    if "input" in wanted and n <= INPUT_NODES and (not saved.constant or run.sliding):
         figures["input"] = plot_input(run, saved.structure, saved).figure  # type: ignore[arg-type]
     return figures
 

@@ -10,7 +10,7 @@ import html
 import re
 from collections.abc import Sequence
 
-from ptcc_certify.protocols.nominal import Protocol
+from ptcc_certify.protocols import Protocol
 
 _LETTERS = {
     "rho": "\u03c1",

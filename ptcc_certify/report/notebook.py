@@ -18,7 +18,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
 from ptcc_certify.report.screen import certificate_lines, structure_lines
-from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
@@ -66,7 +66,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
         return plot_run(trajectory, structure)
 
     drawable = trajectory.states.ndim == 2 and trajectory.t.size > 1 and len(trajectory.labels) <= SHOWN_NODES
-    also = " and sliding variables" if isinstance(trajectory, SlidingTrajectory) else ""
+    also = " and sliding variables" if trajectory.sliding else ""
     return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], [(draw, f"states{also} over time")] if drawable else [])
 
 

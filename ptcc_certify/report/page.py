@@ -16,7 +16,6 @@ from ptcc_certify.certificate.certificate import Certificate, RejectedCertificat
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.markup import bullets, document, folded, table, verdict_box
 from ptcc_certify.report.mathml import equations, symbol
@@ -48,7 +47,6 @@ from ptcc_certify.report.texts import (
     rational,
     subscripts,
 )
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems import THEOREMS
 
 #: Rows of agents, and of leader groups, that are written out.
@@ -140,7 +138,7 @@ class _Page:
     def __init__(self, saved: Certificate, no_run: str):
         self.saved, self.no_run = saved, no_run
         self.graph, self.structure, self.protocol = saved.graph, saved.structure, saved.protocol
-        self.sliding = isinstance(saved.protocol, SlidingModeProtocol)
+        self.sliding = saved.protocol.reaching is not None
         self.deadline = "T_r + T_s" if self.sliding else "T"
         self.meaning = ", T = T<sub>r</sub> + T<sub>s</sub>" if self.sliding else ""
         self.figures = draw(saved, ("graph", "decay", "sliding", "input"))
@@ -247,7 +245,7 @@ class _Page:
 
     def protocol_words(self) -> str:
         """Say in words what agents do under the protocol."""
-        if not isinstance(self.protocol, SlidingModeProtocol):
+        if (sliding := self.protocol.reaching) is None:
             return (
                 "Agent k has the state x<sub>k</sub> and moves by x<sub>k</sub>\u2032 = u<sub>k</sub>. Its input is "
                 "the gain g times what it hears: the sum over those it listens to, l, of w<sub>kl</sub> (x<sub>l</sub> "
@@ -255,7 +253,7 @@ class _Page:
             )
         return (
             "Agent k moves by x<sub>k</sub>\u2032 = u<sub>k</sub> + d<sub>k</sub> under any disturbance with "
-            f"|d<sub>k</sub>| \u2264 \u03b4 = {rational(self.protocol.delta)}. The sliding part of its input "
+            f"|d<sub>k</sub>| \u2264 \u03b4 = {rational(sliding.delta)}. The sliding part of its input "
             "drives the sliding variable \u03c3<sub>k</sub> to 0 by T<sub>r</sub>; from then on no disturbance is "
             "felt, and the nominal part settles the agents at T<sub>r</sub> + T<sub>s</sub>."
         )
@@ -368,7 +366,7 @@ class _Page:
         elif saved.start is None:
             return ""
         else:
-            share = Fraction(self.protocol.T_r, 1) / T  # type: ignore[union-attr]
+            share = 1 - self.protocol.span / T
             instants = [(share, "T<sub>r</sub>"), *(pair for pair in instants if pair[0] > share)]
             head = ["Instant", f"\u2016{z}(t)\u2016 at most (numerical, rounded up)"]
             bounds = saved.norm_bound([float(1 - f) for f, _ in instants]).tolist()
@@ -408,7 +406,7 @@ class _Page:
     def met(self) -> str:
         """Say which disturbance a repeated run meets."""
         run = self.saved.trajectory
-        return f"d = {run.source}" if isinstance(run, SlidingTrajectory) else "none"
+        return "none" if run is None or run.sliding is None else f"d = {run.sliding.source}"
 
     # ------------------------------------------------------------------ graph, run, input
 

@@ -24,7 +24,6 @@ from ptcc_certify.report.plots import (
     plot_sliding,
     plot_trajectory,
 )
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,8 +115,8 @@ def results_csv(runs: Sequence[Run]) -> str:
 
 def reaching_times(certificate: Certificate) -> tuple[float, float, float] | tuple[str, str, str]:
     """Return when the last sliding variable was 0 in the run, when each is proved to be, and ``T_r``; texts if none."""
-    run, reaching = certificate.trajectory, certificate.reaching
-    if reaching is None or not isinstance(run, SlidingTrajectory):
+    reaching, run = certificate.reaching, None if certificate.trajectory is None else certificate.trajectory.sliding
+    if reaching is None or run is None:
         return "", "", ""
     return float(run.reaching_times.max()), max(r.time for r in reaching), float(run.protocol.T_r)
 
@@ -143,8 +142,8 @@ def _states(certificate: Certificate, ax: Axes) -> Axes:
 
 
 def _sliding(certificate: Certificate, ax: Axes) -> Axes:
-    assert isinstance(certificate.trajectory, SlidingTrajectory)
-    return plot_sliding(certificate.trajectory, certificate.reaching, ax)
+    assert certificate.trajectory is not None and certificate.trajectory.sliding is not None
+    return plot_sliding(certificate.trajectory.sliding, certificate.reaching, ax)
 
 
 def _input(certificate: Certificate, ax: Axes) -> Axes:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.gain_design import Design
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.nominal import Protocol
+    from ptcc_certify.protocols import Protocol
     from ptcc_certify.protocols.reaching_time import ReachingTime
 
 #: Matplotlib's name of the style of all figures.
@@ -198,12 +198,13 @@ def plot_run(
     from matplotlib.figure import Figure
 
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
-    if not isinstance(trajectory, SlidingTrajectory) or not trajectory.sigma0.any():
+    slid = trajectory.sliding
+    if slid is None or not slid.sigma0.any():
         return plot_trajectory(trajectory, structure, _axes(None, (width, height))).figure  # type: ignore[return-value]
     figure = Figure((width, 2 * height), layout="constrained")
     upper, lower = (new_axes(figure, (2, 1, row)) for row in (1, 2))
     plot_trajectory(trajectory, structure, upper)
-    plot_sliding(trajectory, reaching, lower)
+    plot_sliding(slid, reaching, lower)
     return figure
 
 
@@ -354,11 +355,11 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
         ax.fill_between(curve.deadlines, curve.lower * 1e-3, curve.lower, color="#7F7F7F", alpha=0.3, linewidth=0)
         ax.loglog(curve.deadlines, curve.lower, color="#7F7F7F", linestyle="--", label="no gains stay below")
         ax.set_ylim(bottom=float(np.nanmin(curve.lower)) / 3)
-    ax.axhline(float(found.max_input), color="#D55E00", linewidth=0.9, linestyle=":", label="asked for")
+    ax.axhline(float(found.asked.max_input), color="#D55E00", linewidth=0.9, linestyle=":", label="asked for")
     if found.protocol is not None and found.peak:
         ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color="#0072B2", label="this design")
     ax.set_xlabel("deadline $T$")
-    ax.set_ylabel(r"peak input $\|u\|_2$" if found.input_norm == 2 else "peak input, largest $|u_k|$")
+    ax.set_ylabel(r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$")
     _legend_above(ax)
     return ax
 
@@ -460,7 +461,7 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     proved = None if certificate is None else _certified_effort(trajectory, certificate)
     bound = None
     if proved is not None and proved.energy is not None and trajectory.actuator is None:
-        bound = None if isinstance(trajectory, SlidingTrajectory) else float(proved.energy.value)
+        bound = None if trajectory.sliding else float(proved.energy.value)
     ax, spent = _axes(ax), _energy(trajectory)
     ax.plot(trajectory.t, spent, color="#0072B2", label="simulated (CVODES)")
     if bound is not None:
@@ -743,7 +744,7 @@ def _resolved_input(trajectory: Trajectory) -> np.ndarray:
     weights = abs(trajectory.graph.laplacian())
     floor = RESOLVED_ERROR * trajectory.rtol * np.asarray(weights @ np.abs(trajectory.states))
     lost = np.abs(trajectory.error) < floor
-    if isinstance(trajectory, SlidingTrajectory):  # what answers the disturbance is resolved
+    if trajectory.sliding:  # what answers the disturbance is resolved
         u[lost] -= (trajectory.protocol.gain.value_at_remaining(trajectory.remaining) * trajectory.error)[lost]
         lost &= u == 0
     u[lost] = np.nan
@@ -796,8 +797,8 @@ def _logarithmic_mean(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _draw_deadlines(trajectory: Trajectory, ax: Axes) -> None:
     if trajectory.protocol.prescribed:
         ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
-    if isinstance(trajectory, SlidingTrajectory):
-        ax.axvline(float(trajectory.protocol.T_r), color="#7F7F7F", linewidth=0.8, linestyle="-.", label="$T_r$")
+    if (sliding := trajectory.protocol.reaching) is not None:
+        ax.axvline(float(sliding.T_r), color="#7F7F7F", linewidth=0.8, linestyle="-.", label="$T_r$")
 
 
 def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float | None:
@@ -837,10 +838,10 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     starts = [("start", certificate.start, trajectory.states[:, :1])]
     rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the start
     unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
-    if isinstance(trajectory, SlidingTrajectory):
-        sigma0 = trajectory.sigma0[:, None]
+    if (slid := trajectory.sliding) is not None:
+        sigma0 = slid.sigma0[:, None]
         starts.append(("sigma(0)", certificate.sigma0, sigma0))
-        unproved = unproved or trajectory.boundary_layer is not None
+        unproved = unproved or slid.boundary_layer is not None
         rounding = rounding + np.abs(sigma0)  # the states are sums of two parts
     for name, proved, run in starts if 0.0 in trajectory.t[:1] else ():
         at = run if proved is None else np.array([[float(x)] for x in proved])

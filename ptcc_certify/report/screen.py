@@ -13,7 +13,6 @@ import numpy as np
 from lmi.exact.enclosure import LARGEST_PUSH
 from lmi.exact.rounding import down, near, up
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
@@ -234,7 +233,7 @@ def _remedy(certificate: Certificate) -> str:
 def _sliding_share(certificate: Certificate) -> float:
     """Return ``1 - t/T`` at ``T_r``."""
     p = certificate.protocol
-    return float(p.T_s / p.T)  # type: ignore[union-attr]
+    return float(p.span / p.T)
 
 
 def _residual_lines(certificate: Certificate) -> list[str]:
@@ -279,11 +278,11 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
                 f"resolved {resolved}",
             )
         )
-    if seen is not None and isinstance(run, SlidingTrajectory) and not certificate.direct:
-        last = int(run.reaching_z.argmax())
+    if seen is not None and (slid := run.sliding) is not None and not certificate.direct:
+        last = int(slid.reaching_z.argmax())
         when = "at T_r only"
-        if math.isfinite(run.reaching_z[last]):
-            when = f"at t = {run.reaching_times[last]:.6g}, {run.reaching_left[last]:.3g} before T_r"
+        if math.isfinite(slid.reaching_z[last]):
+            when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
         kept = "kept" if seen.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
         lines.append(
@@ -332,9 +331,8 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
             agent = labels[reaching.index(last)]
             left = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
             said.append(f"{'others' if late else 'all'} by t = {up(last.time, 6)}, {left} (agent {agent})")
-        if late:
-            p = certificate.protocol
-            pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r  # type: ignore[union-attr]
+        if late and (p := certificate.protocol.reaching) is not None:
+            pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r
             why = "0 is reached nearer to T_r than can be written"
             if pole < 1:
                 why = "mu3 kappa < 1 and sigma(0) is large"
@@ -342,8 +340,8 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
                 why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
             said.append(f"only at T_r for {_listed(late, 40)}: {why}")
         lines.append(_line("sliding", f"sigma_k = 0 proved: {'; '.join(said)}"))
-    if isinstance(run, SlidingTrajectory):
-        lines.append(_line("disturbed", f"the run meets d = {run.source}; |d| <= delta: {run.bounded_by}"))
+    if run is not None and (slid := run.sliding) is not None:
+        lines.append(_line("disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"))
     return lines
 
 

@@ -10,7 +10,6 @@ from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.protocols.latex import symbol_latex
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.screen import structure_text
 from ptcc_certify.report.texts import (
     AUTHORS,
@@ -55,8 +54,7 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     {}a\_1 & leader, camp 1 & $3$ & $-1$ \\
     """
     p, graph = saved.protocol, saved.graph
-    sliding = isinstance(p, SlidingModeProtocol)
-    T = "T_{r} + T_{s}" if sliding else "T"
+    sliding, T = p.reaching, p.deadline_latex
     given = ", ".join(f"${symbol_latex(name)} = {_rational(getattr(p, name))}$" for name in parameter_names(p))
     given = given.replace(r"= \approx", r"\approx")
     parts = [
@@ -103,8 +101,7 @@ def _claims(saved: Certificate, T: str) -> list[str]:
     if saved.constant:
         kept = "its state" if saved.direct else r"$x_{k} - \sigma_{k}$"
         return [f"No agent listens to another: each keeps {kept}."]
-    sliding = isinstance(saved.protocol, SlidingModeProtocol)
-    whatever = ", whatever the disturbances" if sliding else ""
+    whatever = ", whatever the disturbances" if saved.protocol.reaching else ""
     proved = saved.verdict == "certified"
     lines = []
     for claim, count in counted:
@@ -163,7 +160,7 @@ def _input(saved: Certificate) -> list[str]:
     effort = saved.effort
     if effort is None or saved.constant or effort.bounded is None:
         return []
-    part = "nominal part of the input" if isinstance(saved.protocol, SlidingModeProtocol) else "input"
+    part = "nominal part of the input" if saved.protocol.reaching else "input"
     if not effort.bounded:
         return [f"The {part} is not bounded up to the deadline: from some starts it grows without limit."]
     lines = [f"The {part} stays bounded up to the deadline for every start."]

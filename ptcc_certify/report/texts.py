@@ -17,7 +17,7 @@ from ptcc_certify.bounds.input import Limited, Starts
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.graphs.structure import ClosedComponent
-from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.claims import Claim
 
 #: Labels of a list that are written out, and characters of a label.
@@ -200,7 +200,7 @@ def limited_text(entry: Limited) -> str:
 
 def caveats(saved: Certificate, no_run: str) -> list[str]:
     """Say what a reader might take for proved and is not, for this certificate."""
-    effort, sliding = saved.effort, isinstance(saved.protocol, SlidingModeProtocol)
+    effort, sliding = saved.effort, saved.protocol.reaching is not None
     residual = () if effort is None else effort.residual
     said = []
     if saved.verdict != "certified":

@@ -1,29 +1,23 @@
-"""CasADi's CVODES, made to fail with a cause: the motions between two events."""
+"""CasADi's CVODES, made to fail with a cause, and the nominal motion that it integrates."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 import math
 import re
-import signal
-import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lmi.deadline import checkpoint, seconds_left
-from ptcc_certify.errors import SimulationError
+from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.trajectory import RESOLVED
 
 if TYPE_CHECKING:
     from scipy import sparse
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.gain import Gain
 
 # Beyond this many agents the Newton steps are solved by GMRES: a sparse factor of a random graph fills up
 # (N = 1,000: 3.4 s against 0.05 s), whereas below it a factor copes with weights over many decades.
@@ -33,8 +27,6 @@ _KRYLOV = 30
 _MAX_STEPS = 5000
 # No tolerance is made finer than this on the way to the state at T.
 _FINEST = 1e-13
-# A disturbance may be fast: so many steps between two instants of the reaching phase.
-_MAX_SLIDING_STEPS = 500_000
 # The state at T is given up beyond this s max(D): the roundings of float64 weights act there like slow modes.
 _MAX_CLOCK = 1e13
 _MAX_TAU = 1e300
@@ -49,76 +41,35 @@ _CAUSES = {
 }
 
 
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """Let what a signal handler raises (KeyboardInterrupt, and OutOfTime at the time limit) pass.
+class Tolerances(NamedTuple):
+    """Of CVODES; ``atol`` is relative to the size of the start."""
 
-    CasADi turns it into a failure of CVODES, or loses it where it tries what type an argument has. It looks for signals
-    while it computes; where there are no timers, or in another thread than the main one, the limit waits until it ends.
-    """
-    checkpoint()
-    previous = signal.getsignal(signal.SIGINT)
-    if not callable(previous) or threading.current_thread() is not threading.main_thread():
-        yield
-        checkpoint()
-        return
-    raised: list[BaseException] = []
+    rtol: float
+    atol: float
 
-    def recorded(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
-        def handler(number: int, frame: Any) -> None:
-            try:
-                act(number, frame)
-            except BaseException as error:
-                raised.append(error)
-                raise
-
-        return handler
-
-    signal.signal(signal.SIGINT, recorded(previous))
-    said = io.StringIO()  # CasADi tells in words of its own that it was interrupted
-    try:
-        with contextlib.redirect_stderr(said), _alarm(recorded(lambda *_: checkpoint())):
-            yield
-    except Exception:
-        if raised:
-            raise raised[0] from None
-        raise
-    else:
-        if raised:
-            raise raised[0]
-    finally:
-        signal.signal(signal.SIGINT, previous)
-        if not raised and said.getvalue():
-            sys.stderr.write(said.getvalue())
+    def check(self) -> None:
+        """Refuse tolerances that CVODES cannot serve."""
+        for name, tolerance in self._asdict().items():
+            if not 1e-15 <= tolerance <= 0.1:
+                raise ParameterError(
+                    f"{name} = {tolerance} is outside its domain; {name} must be between 1e-15 and 0.1"
+                )
 
 
-@contextmanager
-def _alarm(handler: Callable[[int, Any], None]) -> Iterator[None]:
-    """Call the handler when the time limit is reached, if there is one and nobody else has set a timer."""
-    left = seconds_left()
-    if not math.isfinite(left) or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0]:
-        yield
-        return
-    previous = signal.signal(signal.SIGALRM, handler)
-    signal.setitimer(signal.ITIMER_REAL, max(left, 1e-3) + 1e-3)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, previous)
-
-
-class _Motion:
+class Motion:
     """What every motion shares: CVODES with its options, and its failures with their causes."""
 
-    def __init__(self, graph: SignedDigraph, columns: int, rtol: float, atol: float):
+    def __init__(
+        self, graph: SignedDigraph, state: np.ndarray, columns: int, tolerances: Tolerances, max_steps: int = _MAX_STEPS
+    ):
+        self.state = state
         self.laplacian = graph.laplacian()
         self.in_weight = graph.in_weight()
         self.stats = {"steps": 0, "rhs": 0}
         self._options: dict[str, Any] = {
-            "reltol": rtol,
-            "abstol": atol,
-            "max_num_steps": _MAX_STEPS,
+            "reltol": tolerances.rtol,
+            "abstol": tolerances.atol,
+            "max_num_steps": max_steps,
             "linear_solver": "csparse",
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
@@ -134,6 +85,13 @@ class _Motion:
         heard = self.in_weight > 0
         pull = np.abs(self.laplacian @ states)[heard] / (2 * self.in_weight[heard, None])
         return float(pull.max(initial=0.0))
+
+    @interruptible()
+    def _integrator(self, problem: dict[str, Any], start: float, z: np.ndarray, **options: Any) -> Any:
+        """Return CVODES for a problem on its clock, to report at increasing instants ``z > start``."""
+        import casadi as ca
+
+        return ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options | options)
 
     def _call(self, integrator: Any, state: np.ndarray, parameters: list[float], stiffness: float) -> np.ndarray:
         """Return the (entries, instants) states that an integrator reaches."""
@@ -157,12 +115,11 @@ class _Motion:
         return reached
 
 
-class NominalMotion(_Motion):
+class NominalMotion(Motion):
     """One start, or several, moved along ``dX/dz = -(a e^(-c z) + b) L X``."""
 
-    def __init__(self, graph: SignedDigraph, state: np.ndarray, rtol: float, atol: float):
-        super().__init__(graph, state.shape[1], rtol, atol)
-        self.state = state
+    def __init__(self, graph: SignedDigraph, state: np.ndarray, tolerances: Tolerances):
+        super().__init__(graph, state, state.shape[1], tolerances)
         self._leap: Any = None
 
     def sample(self, a: float, b: float, c: float, z: np.ndarray) -> np.ndarray:
@@ -171,7 +128,7 @@ class NominalMotion(_Motion):
         states = np.empty((later.size + 1, *self.state.shape))
         states[0] = self.state
         if later.size:
-            states[1:] = self._integrate(self._integrator(later, self._options), a, b, c, later[-1])
+            states[1:] = self._integrate(self._integrator(self._problem(), 0.0, later), a, b, c, later[-1])
             self.state = states[-1]
         return states[np.searchsorted(later, z, side="right")]
 
@@ -186,7 +143,7 @@ class NominalMotion(_Motion):
         while True:
             span = max(tau, 20.0)
             previous = self.state
-            self._leap = self._leap or self._integrator(np.ones(1), self._finer())
+            self._leap = self._leap or self._integrator(self._problem(), 0.0, np.ones(1), **self._finer())
             try:
                 # One unit of the integrator's clock is the whole span.
                 self.state = self._integrate(self._leap, a * math.exp(-tau) * span, b * span, span, 1.0)[0]
@@ -199,26 +156,38 @@ class NominalMotion(_Motion):
             if residual <= goal or b * tau * largest > _MAX_CLOCK or tau > _MAX_TAU:
                 return residual
 
+    def past_deadline(
+        self, gain: Gain, remaining: float, tau: np.ndarray, late: np.ndarray
+    ) -> tuple[np.ndarray, float | None]:
+        """Return the (M, N, S) states under a gain from ``remaining`` before ``T`` on, and the residual at ``T``.
+
+        Before ``T`` at instants ``tau = ln(remaining/(T - t))``, then at instants ``late``; without these no residual.
+        """
+        rho1, pole, T = float(gain.rho1), float(gain.pole), float(gain.T)
+        before = self.sample(rho1 * remaining, pole, 1.0, tau)
+        if not late.size:
+            return before, None
+        residual = self.settle(rho1 * remaining, pole, tau[-1] if tau.size else 0.0)
+        return np.concatenate([before, self.sample(0.0, rho1 * T, 0.0, np.maximum(late / T - 1, 0))]), residual
+
     def _finer(self) -> dict[str, Any]:
         """Return the options of a run that settles to within the tolerances in every agent of a large graph.
 
         CVODES bounds the root of the mean square of the errors; that of one agent can be sqrt(N) times as large.
         """
         if len(self.state) <= _DIRECT_UP_TO:
-            return self._options
-        given = {name: self._options[name] for name in ("reltol", "abstol")}
+            return {}
         share = math.sqrt(len(self.state))
-        return self._options | {name: min(tol, max(tol / share, _FINEST)) for name, tol in given.items()}
+        return {n: min(self._options[n], max(self._options[n] / share, _FINEST)) for n in ("reltol", "abstol")}
 
     @interruptible()
-    def _integrator(self, z: np.ndarray, options: dict[str, Any]) -> Any:
+    def _problem(self) -> dict[str, Any]:
         import casadi as ca
 
-        x = ca.MX.sym("x", self.state.size)
+        x, clock, p = ca.MX.sym("x", self.state.size), ca.MX.sym("z"), ca.MX.sym("p", 3)
         columns = ca.reshape(x, *self.state.shape)
-        clock, p = ca.MX.sym("z"), ca.MX.sym("p", 3)
         ode = -(p[0] * ca.exp(-p[2] * clock) + p[1]) * ca.vec(self._product(columns))
-        return ca.integrator("run", "cvodes", {"x": x, "t": clock, "p": p, "ode": ode}, 0.0, z.tolist(), options)
+        return {"x": x, "t": clock, "p": p, "ode": ode}
 
     def _integrate(self, integrator: Any, a: float, b: float, c: float, end: float) -> np.ndarray:
         """Return the (instants, N, S) states that the integrator reaches from the present one, the last at ``end``."""
@@ -226,113 +195,6 @@ class NominalMotion(_Motion):
         reached = self._call(integrator, self.state.ravel(order="F"), [a, b, c], stiffness)
         n, columns = self.state.shape
         return reached.reshape(columns, n, -1).transpose(2, 1, 0)
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A stretch of the sliding-mode motion on its own clock ``z``, on which no gain has a pole.
-
-        t = start + span (1 - e^-z),   R = dt/dz = span e^-z     towards a pole at start + span
-        t = start + span z,            R = span                  past all poles
-
-    The nominal gain times ``R`` is ``rho1 R + pole R/(gap + R)``, where ``gap + R`` is the time left to ``T``; that of
-    the sliding variables is ``mu2 R + reaching_pole``.
-    """
-
-    start: float
-    span: float
-    rho1: float
-    pole: float
-    gap: float
-    mu2: float
-    reaching_pole: float
-    past: bool = False
-
-    def rate(self, z: Any, exp: Any) -> Any:
-        """Return ``R``."""
-        return self.span if self.past else self.span * exp(-z)
-
-    def time(self, z: Any, exp: Any) -> Any:
-        """Return ``t``."""
-        return self.start + (self.span * z if self.past else self.span - self.span * exp(-z))
-
-    def nominal(self, R: Any) -> Any:
-        """Return the nominal gain times ``R``."""
-        return self.rho1 * R + (self.pole * R / (self.gap + R) if self.pole else 0)
-
-    @property
-    def end(self) -> float:
-        """The pole, or infinity past all poles."""
-        return math.inf if self.past else self.start + self.span
-
-    def clock(self, t: np.ndarray) -> np.ndarray:
-        """Return the ``z`` of instants before the pole."""
-        share = (t - self.start) / self.span
-        return share if self.past else -np.log1p(-share)
-
-
-class SlidingMotion(_Motion):
-    """One start moved along ``y' = -gain L (y + sigma)`` with its sliding variables, ``y = x - sigma``.
-
-        sigma' = -mu1 s - (reaching gain) sigma + active d
-
-    Parameters
-    ----------
-    state : (2 N,) array
-        ``y`` and ``sigma`` in units of ``unit``.
-    unit : float
-        Size of the start.
-    mu1 : float
-    disturbance : callable
-        From CasADi expressions of time, of 2 N parameters ``a, b`` and of the signs to the (N, 1) disturbances.
-    layer : float or None
-        ``s`` is ``tanh(sigma/layer)`` instead of a given sign.
-    """
-
-    def __init__(
-        self,
-        graph: SignedDigraph,
-        state: np.ndarray,
-        rtol: float,
-        atol: float,
-        *,
-        unit: float,
-        mu1: float,
-        disturbance: Callable[[Any, Any, Any], Any],
-        layer: float | None = None,
-    ):
-        super().__init__(graph, 1, rtol, atol)
-        self._options["max_num_steps"] = _MAX_SLIDING_STEPS
-        self.state = state
-        self._unit, self._mu1, self._disturbance, self._layer = unit, mu1, disturbance, layer
-
-    def advance(
-        self, phase: Phase, start: float, z: np.ndarray, signs: np.ndarray, linear: tuple[np.ndarray, np.ndarray]
-    ) -> np.ndarray:
-        """Return the (2 N, len(z)) states at increasing instants ``z > start``; the last becomes the present state.
-
-        ``signs`` are those of the sliding variables, 0 for one that stays at 0; ``linear`` holds ``a`` and ``b``.
-        """
-        import casadi as ca
-
-        n = signs.size
-        x, clock, p = ca.MX.sym("x", 2 * n), ca.MX.sym("z"), ca.MX.sym("p", 3 * n)
-        y, sigma, sign = x[:n], x[n:], p[:n]
-        R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
-        s = sign if self._layer is None else ca.tanh(sigma * (self._unit / self._layer))
-        d = self._disturbance(t, p[n:], s)
-        ode = ca.vertcat(
-            -phase.nominal(R) * self._product(y + sigma),
-            -R / self._unit * (self._mu1 * s - ca.fabs(sign) * d) - (phase.mu2 * R + phase.reaching_pole) * sigma,
-        )
-        problem = {"x": x, "t": clock, "p": p, "ode": ode}
-        with interruptible():
-            integrator = ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options)
-        weight = (phase.rho1 * phase.span + phase.pole) * self.in_weight.max()
-        stiffness = (weight + phase.mu2 * phase.span + phase.reaching_pole) * float(z[-1] - start)
-        reached = self._call(integrator, self.state, [*signs, *linear[0], *linear[1]], stiffness)
-        self.state = reached[:, -1].copy()
-        return reached
 
 
 def _product(laplacian: sparse.csr_array, columns: int) -> Any:

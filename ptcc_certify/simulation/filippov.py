@@ -12,52 +12,34 @@ root of a scalar equation, the integrator runs from event to event in ``z = ln(T
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
-from ptcc_certify.protocols.disturbance import TOLERANCE, Adversary, Disturbance, ExpressionDisturbance, StateDependent
+from ptcc_certify.protocols.disturbance import TOLERANCE, Adversary, Disturbance, StateDependent
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
-from ptcc_certify.simulation.cvodes import NominalMotion, Phase, SlidingMotion
+from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
+from ptcc_certify.simulation.forced import Phase, SlidingMotion
+from ptcc_certify.simulation.instants import Instants, tau_before
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.nominal import SlidingModeProtocol
+    from ptcc_certify.protocols import ReachingProtocol
 
 # The imitation with a boundary layer goes so far towards each pole: 1 - t/T = 1e-13.
 _LAYER_Z = 30.0
 
 
-@dataclass(frozen=True)
-class Instants:
-    """Where a run is sampled: ``t``, ``1 - t/T`` and ``1 - t/T_r``, each (M,) and accurate however small."""
-
-    t: np.ndarray
-    left: np.ndarray
-    reaching_left: np.ndarray
-
-    @property
-    def z(self) -> np.ndarray:
-        """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
-        return _minus_log(self.reaching_left, 1 - self.reaching_left)
-
-
 def simulate_sliding(
     graph: SignedDigraph,
-    protocol: SlidingModeProtocol,
+    protocol: ReachingProtocol,
     start: np.ndarray,
     sigma0: np.ndarray,
     disturbance: Disturbance,
     instants: Instants,
-    *,
-    rtol: float,
-    atol: float,
+    tolerances: Tolerances,
     boundary_layer: float | None,
 ) -> SlidingTrajectory:
     """Integrate ``x_k' = u_k + d_k`` with (48); see :func:`ptcc_certify.simulation.run.simulate`.
@@ -65,24 +47,22 @@ def simulate_sliding(
     Parameters
     ----------
     graph : SignedDigraph
-    protocol : SlidingModeProtocol
+    protocol : ReachingProtocol
     start, sigma0 : (N,) array
     disturbance : Disturbance
     instants : Instants
-    rtol, atol, boundary_layer
-        As there.
+    tolerances : Tolerances
+    boundary_layer : float or None
     """
-    began = time.perf_counter()
     slack = rounding_slack(protocol)
     bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), slack)
     unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
-    solver = _Solver(graph, protocol, disturbance, unit, rtol, atol)
+    solver = _Solver(graph, protocol, disturbance, unit, tolerances)
     if boundary_layer is None:
         z, y, sigma, residual = solver.filippov(start, sigma0, instants)
     else:
         z = np.full(start.size, np.nan)
         y, sigma, residual = solver.imitation(start, sigma0, instants, boundary_layer)
-    at_deadline = np.flatnonzero((instants.left == 0) & (instants.t == float(protocol.T)))
     with np.errstate(divide="ignore"):
         clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left) + 0.0, np.inf)
     return SlidingTrajectory(
@@ -92,11 +72,11 @@ def simulate_sliding(
         remaining=instants.left,
         clock=clock,
         states=y + sigma,
-        rtol=rtol,
-        atol=atol,
-        deadline_index=int(at_deadline[0]) if at_deadline.size else None,
+        rtol=tolerances.rtol,
+        atol=tolerances.atol,
+        deadline_index=instants.deadline(protocol),
         deadline_residual=residual,
-        stats=solver.stats | {"seconds": time.perf_counter() - began},
+        stats=solver.stats,
         sigma=sigma,
         disturbance=solver.disturbances(instants.t, y + sigma, sigma, boundary_layer),
         sigma0=sigma0,
@@ -115,14 +95,13 @@ class _Solver:
     def __init__(
         self,
         graph: SignedDigraph,
-        protocol: SlidingModeProtocol,
+        protocol: ReachingProtocol,
         disturbance: Disturbance,
         unit: float,
-        rtol: float,
-        atol: float,
+        tolerances: Tolerances,
     ):
         self.graph, self.protocol, self.disturbance = graph, protocol, disturbance
-        self.unit, self.rtol, self.atol = unit, rtol, atol
+        self.unit, self.tolerances = unit, tolerances
         self.stats: dict[str, float] = {"steps": 0, "rhs": 0}
         self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
         self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
@@ -164,7 +143,7 @@ class _Solver:
         motion = self._motion(start, sigma0)
         sign = np.sign(sigma0)
         events = [0.0, *scalar.z[scalar.z < end], end]
-        self._stretch(motion, self.reaching, z, events, lambda at: np.where(scalar.z > at, sign, 0.0), out)
+        motion.sample(self.reaching, z, events, lambda at: np.where(scalar.z > at, sign, 0.0), out)
         self._count(motion.stats)
         # The scalar equations are solved to near machine precision.
         out[start.size :] = scalar.sigma(z) / self.unit
@@ -185,7 +164,7 @@ class _Solver:
         state = np.concatenate([start - sigma0, sigma0]) / self.unit
         # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
         sizes = np.abs(state[n:])
-        atol = self.atol * np.concatenate([np.ones(n), np.where(sizes > 0, np.maximum(sizes, 1e-250), 1.0)])
+        atol = self.tolerances.atol * np.concatenate([np.ones(n), np.where(sizes > 0, np.maximum(sizes, 1e-250), 1.0)])
 
         def motion(z: float, v: np.ndarray) -> np.ndarray:
             R, t = float(phase.rate(z, math.exp)), float(phase.time(z, math.exp))
@@ -197,7 +176,7 @@ class _Solver:
             return np.concatenate([-phase.nominal(R) * (L @ (y + sigma)), rate])
 
         while signs.any() and now < end:
-            solver = LSODA(motion, now, state, end, rtol=self.rtol, atol=atol)
+            solver = LSODA(motion, now, state, end, rtol=self.tolerances.rtol, atol=atol)
             watched = np.flatnonzero(signs).tolist()
             hit: list[int] = []
             while not hit and solver.status == "running":
@@ -227,17 +206,11 @@ class _Solver:
         self, y: np.ndarray, remaining: float, t: np.ndarray, left: np.ndarray
     ) -> tuple[np.ndarray, float | None]:
         """Return the (N, .) states on the sliding manifold, reached ``remaining`` before ``T``, and the residual."""
-        motion = NominalMotion(self.graph, y[:, None], self.rtol, self.atol)
-        before = left > 0
-        share = (t[before] - (self.T - remaining)) / remaining
-        tau = np.maximum(_minus_log(left[before] * (self.T / remaining), share), 0.0)
-        parts = [motion.sample(self.rho1 * remaining, self.pole, 1.0, tau)]
-        residual = None
-        if not before.all():
-            residual = motion.settle(self.rho1 * remaining, self.pole, tau[-1] if tau.size else 0.0)
-            parts.append(motion.sample(0.0, self.rho1 * self.T, 0.0, np.maximum(t[~before] / self.T - 1, 0)))
+        motion, before = NominalMotion(self.graph, y[:, None], self.tolerances), left > 0
+        tau = tau_before(t[before], left[before], self.T, remaining)
+        states, residual = motion.past_deadline(self.protocol.gain, remaining, tau, t[~before])
         self._count(motion.stats)
-        return np.concatenate(parts)[:, :, 0].T, residual
+        return states[:, :, 0].T, residual
 
     # ------------------------------------------------------------------ the imitation
 
@@ -255,9 +228,9 @@ class _Solver:
         motion = self._motion(start, sigma0, width)
         before, after = instants.reaching_left > 0, instants.left == 0
         between = ~before & ~after
-        settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, 0.0, self.mu2, 0.0)
-        past = Phase(self.T, self.T, self.rho1, 0.0, 0.0, self.mu2, 0.0, past=True)
-        towards_T = np.maximum(_minus_log(instants.left * (self.T / self.T_s), (t - self.T_r) / self.T_s), 0.0)
+        settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, mu2=self.mu2)
+        past = Phase(self.T, self.T, self.rho1, mu2=self.mu2, past=True)
+        towards_T = tau_before(t, instants.left, self.T, self.T_s)
         clocks = (
             (self.reaching, before, instants.z, _LAYER_Z),
             (settling, between, towards_T, _LAYER_Z),
@@ -269,68 +242,14 @@ class _Solver:
                 residual = motion.imbalance((motion.state[:n] + motion.state[n:])[:, None])
             if (t >= phase.start).any():
                 z = np.where(here, clock, np.nan)
-                self._stretch(motion, phase, z, [0.0, end], lambda _: np.ones(n), out)
+                motion.sample(phase, z, [0.0, end], lambda _: np.ones(n), out)
                 out[:, here & (clock >= end)] = motion.state[:, None]
         self._count(motion.stats)
         return out[:n] * self.unit, out[n:] * self.unit, residual
 
-    # ------------------------------------------------------------------ from event to event
-
     def _motion(self, start: np.ndarray, sigma0: np.ndarray, layer: float | None = None) -> SlidingMotion:
-        return SlidingMotion(
-            self.graph,
-            np.concatenate([start - sigma0, sigma0]) / self.unit,
-            self.rtol,
-            self.atol,
-            unit=self.unit,
-            mu1=self.mu1,
-            disturbance=self._expression(),
-            layer=layer,
-        )
-
-    def _stretch(
-        self,
-        motion: SlidingMotion,
-        phase: Phase,
-        z: np.ndarray,
-        events: list[float],
-        signs: Callable[[float], np.ndarray],
-        out: np.ndarray,
-    ) -> None:
-        """Move from event to event of one phase, jumps of the disturbance among them; fill ``out`` where ``z`` lies."""
-        n, first, last = self.graph.n_nodes, events[0], events[-1]
-        jumps = self.disturbance.breaks(phase.end)
-        jumps = phase.clock(jumps[jumps > phase.start])
-        stops = np.unique(np.concatenate([events, jumps[(jumps > first) & (jumps < last)]]))
-        for a, b in pairwise(stops.tolist()):
-            sign = signs(a)
-            motion.state[n:][sign == 0] = 0
-            inside = np.flatnonzero((z >= a) & (z < b))
-            out[:, inside[z[inside] == a]] = motion.state[:, None]
-            inside = inside[z[inside] > a]
-            reached = motion.advance(phase, a, np.append(z[inside], b), sign, self._linear(phase, a, b, sign))
-            out[:, inside] = reached[:, :-1]
-
-    def _linear(self, phase: Phase, a: float, b: float, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (N,) coefficients of a disturbance that is linear in time between two events."""
-        n = signs.size
-        times = float(phase.time(a, math.exp)), float(phase.time(b, math.exp))
-        found = self.disturbance.linear(*times, np.arange(n), signs.astype(int))
-        return (np.zeros(n), np.zeros(n)) if found is None else found
-
-    def _expression(self) -> Callable[[Any, Any, Any], Any]:
-        """Return ``t, (a, b), sign -> d`` for the integrator."""
-        import casadi as ca
-
-        n, disturbance = self.graph.n_nodes, self.disturbance
-        if isinstance(disturbance, Adversary):
-            return lambda t, p, sign: float(disturbance.delta) * sign
-        if not isinstance(disturbance, ExpressionDisturbance):
-            return lambda t, p, sign: p[:n] + p[n:] * t
-        instant = ca.SX.sym("t")
-        values = ca.vertcat(*(disturbance.casadi(instant, k) for k in range(n)))  # type: ignore[arg-type]
-        function = ca.Function("d", [instant], [values])
-        return lambda t, p, sign: function(t)
+        state = np.concatenate([start - sigma0, sigma0]) / self.unit
+        return SlidingMotion(self.graph, self.protocol, self.disturbance, state, self.unit, self.tolerances, layer)
 
     def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray, layer: float | None) -> np.ndarray:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
@@ -350,7 +269,7 @@ class _Solver:
             self.stats[key] += stats[key]
 
 
-def rounding_slack(protocol: SlidingModeProtocol) -> float:
+def rounding_slack(protocol: ReachingProtocol) -> float:
     """Return by how much a float disturbance may exceed ``delta``, relatively; never as far as ``mu1``."""
     gap = (protocol.mu1 - protocol.delta) / (2 * protocol.delta) if protocol.delta else 0
     return min(TOLERANCE, float(gap))
@@ -366,9 +285,3 @@ def _root(dense: Any, row: int, sign: float, low: float, high: float) -> float:
     if size(high) > 0:
         return math.inf
     return low if size(low) <= 0 else float(brentq(size, low, high, xtol=1e-300, rtol=4e-16 * 4))
-
-
-def _minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return ``-ln(left)``, where ``left + share = 1``: whichever is the small one holds the digits."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(share < 0.5, -np.log1p(-share), -np.log(left))

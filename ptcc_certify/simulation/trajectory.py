@@ -15,8 +15,8 @@ from ptcc_certify.errors import ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.nominal import Protocol, SlidingModeProtocol
-    from ptcc_certify.simulation.limited import Actuator
+    from ptcc_certify.protocols import Protocol, ReachingProtocol
+    from ptcc_certify.protocols.limits import GainLimits
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.
 RESOLVED = 100
@@ -48,7 +48,7 @@ class Trajectory(Shown):
         actuator bounds the gain, the former alone, at the first instant from ``T`` on.
     stats : mapping
         ``steps``, ``rhs`` (evaluations of the right-hand side, and of its derivatives in GMRES), ``seconds``.
-    actuator : Actuator or None
+    actuator : GainLimits or None
         What limits the nominal protocol's input; None if nothing does.
     forcing : str or None
         Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
@@ -82,7 +82,7 @@ class Trajectory(Shown):
     deadline_index: int | None
     deadline_residual: float | None
     stats: Mapping[str, float]
-    actuator: Actuator | None = field(default=None, kw_only=True)
+    actuator: GainLimits | None = field(default=None, kw_only=True)
     forcing: str | None = field(default=None, kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
 
@@ -90,6 +90,11 @@ class Trajectory(Shown):
         for array in (self.t, self.remaining, self.clock, self.states, self.held_input):
             if array is not None:
                 array.flags.writeable = False
+
+    @property
+    def sliding(self) -> SlidingTrajectory | None:
+        """The trajectory, if it has sliding variables; None otherwise."""
+        return None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -172,7 +177,7 @@ class Trajectory(Shown):
         Examples
         --------
         >>> from ptcc_certify.graphs.digraph import SignedDigraph
-        >>> from ptcc_certify.protocols.nominal import NominalProtocol
+        >>> from ptcc_certify.protocols import NominalProtocol
         >>> from ptcc_certify.simulation.run import simulate
         >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
         >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_csv()
@@ -251,7 +256,7 @@ class SlidingTrajectory(Trajectory):
     (True, 0.0)
     """
 
-    protocol: SlidingModeProtocol
+    protocol: ReachingProtocol
     sigma: np.ndarray
     disturbance: np.ndarray
     sigma0: np.ndarray
@@ -266,6 +271,11 @@ class SlidingTrajectory(Trajectory):
         super().__post_init__()
         for array in (self.sigma, self.disturbance, self.sigma0, self.reaching_remaining, self.reaching_z):
             array.flags.writeable = False
+
+    @property
+    def sliding(self) -> SlidingTrajectory:
+        """The trajectory itself."""
+        return self
 
     @property
     def reaching_times(self) -> np.ndarray:

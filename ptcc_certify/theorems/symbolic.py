@@ -9,8 +9,8 @@ import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.latex import to_latex
-from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.theorems import LyapunovFunction, theorem_for
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class SymbolicLyapunov:
     [64.0, -512.0]
     """
 
-    protocol: NominalProtocol
+    protocol: Protocol
     t: ca.SX
     x: ca.SX
     gain: ca.SX
@@ -137,8 +137,7 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
     import casadi as ca
 
     graph = structure.graph
-    if isinstance(protocol, SlidingModeProtocol):
-        protocol = protocol.nominal
+    protocol = protocol.nominal
     loop = protocol.closed_loop(graph)
     t, x = loop["t"], loop["x"]
     gain = protocol.gain.expression(t)

@@ -24,8 +24,8 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
 from ptcc_certify.lyapunov import search as sharpen
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import Actuator
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)

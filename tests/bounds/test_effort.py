@@ -19,6 +19,7 @@ from ptcc_certify.bounds.final_state import outcome
 from ptcc_certify.bounds.input import (
     Effort,
     EnergyIntegral,
+    InputRequest,
     Limits,
     Starts,
     bound_effort,
@@ -33,10 +34,10 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import Actuator
 from ptcc_certify.report.screen import certificate_lines
-from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
@@ -374,7 +375,7 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
 
 def decides(graph: SignedDigraph, k: Fraction) -> tuple[bool | None, str | None]:
     """What is decided without any rate."""
-    effort = bound_effort(analyse(graph), NominalProtocol(1, 1, k, 1), [], rate=None, limit=None)
+    effort = bound_effort(InputRequest(analyse(graph), NominalProtocol(1, 1, k, 1), [], rate=None, limit=None))
     return effort.bounded, effort.by
 
 

@@ -40,7 +40,7 @@ from ptcc_certify.graphs.rationals import parse_exact
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLASSES = all_classes()

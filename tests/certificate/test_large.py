@@ -33,9 +33,9 @@ from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.dominance import dominant_members
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.screen import certificate_lines
-from ptcc_certify.simulation.cvodes import interruptible
+from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)

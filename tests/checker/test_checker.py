@@ -44,8 +44,8 @@ from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import Actuator
 
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent

@@ -25,7 +25,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 FOLDER = Path(checker.__file__).parent
 FORMAT = (FOLDER / "FORMAT.md").read_text(encoding="utf-8")

@@ -40,8 +40,8 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.limits import Actuator
 
 CLASSES = dict(all_classes())
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))

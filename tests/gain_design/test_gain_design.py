@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from ptcc_certify import gain_design
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.input import Starts, box, ellipsoid
+from ptcc_certify.bounds.input.search import usable_members
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
@@ -20,7 +21,7 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bo
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.simulation.limited import Actuator
+from ptcc_certify.protocols.limits import Actuator
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -73,15 +74,17 @@ def influence_matrix(graph):
 def assert_holds_in_simulations(graph, found, R):
     """From the worst start and 20 random vertices."""
     rng = np.random.default_rng(3)
-    center, radius = (np.array([float(x) for x in part]) for part in (found.starts.center, found.starts.radius))
+    center, radius = (
+        np.array([float(x) for x in part]) for part in (found.asked.starts.center, found.asked.starts.radius)
+    )
     vertices = center[:, None] + rng.choice([-1.0, 1.0], (graph.n_nodes, 20)) * radius[:, None]
     starts = np.column_stack([found.worst.x0, vertices])
     cap = None if found.limits is None else Actuator(gain_cap=found.limits.gain_cap)
     run = simulate(graph, found.protocol, starts, actuator=cap, past=0)
     before = np.abs(run.input[..., run.t < float(found.deadline)])
-    largest = np.linalg.norm(before, axis=0).max() if found.input_norm == 2 else before.max()
+    largest = np.linalg.norm(before, axis=0).max() if found.asked.input_norm == 2 else before.max()
     assert largest <= float(found.peak) * (1 + 1e-8)
-    assert found.peak <= found.max_input
+    assert found.peak <= found.asked.max_input
     assert found.worst.size <= float(found.peak) * (1 + 1e-9)
     left = np.abs(run.final_state - influence_matrix(graph) @ starts).max()
     assert left <= float(found.residual) + 1e-6 * float(R)
@@ -119,12 +122,12 @@ def test_a_design_is_certified_and_holds_in_simulations(name, U, R, asked):
     found = designed(name, U, R, **asked)
     assert found.verdict == MET, found
     assert found.certificate.verdict == "certified"
-    assert found.deadline == found.protocol.T == found.asked_deadline or found.asked_deadline is None
-    assert found.residual <= (found.asked_residual or 0)
+    assert found.deadline == found.protocol.T == found.asked.deadline or found.asked.deadline is None
+    assert found.residual <= (found.asked.residual or 0)
     assert found.shortest_possible <= found.deadline
     assert_holds_in_simulations(graph_of(name), found, Fraction(R))
     if not asked.get("deadline"):
-        assert found.peak >= found.max_input * Fraction(999_999, 10**6)
+        assert found.peak >= found.asked.max_input * Fraction(999_999, 10**6)
 
 
 @pytest.mark.parametrize("file", ["highland_tribes", "sampson_t4", "regulatory_007", "regulatory_109", "bales"])
@@ -326,11 +329,10 @@ def test_for_one_agent_the_smallest_pole_is_best():
 def test_the_bound_scales_with_one_over_the_deadline(name):
     found = designed(name, 10, 1)
     cert = found.certificate
-    bounds, _ = _bounds(cert, cert.starts)
     p = found.protocol
     option = Option(p.rho1 * p.T, p.rho2, None, found.product)
     for T in (p.T / 1024, p.T * Fraction(3, 7), p.T * 1000):
-        fit = _at(cert, bounds, option, T, None)
+        fit = _at(cert, option, T, found.asked)
         assert float(fit.peak * T / found.product) == pytest.approx(1, abs=1e-9)
     curve = found.trade_off([1, 2, float(found.deadline)])
     np.testing.assert_allclose(curve.certified * curve.deadlines, float(found.product))
@@ -342,10 +344,11 @@ def test_the_bound_scales_with_one_over_the_deadline(name):
 def test_random_gains_are_not_certified_with_a_smaller_peak(name):
     found = designed(name, 10, 1)
     cert = found.certificate
-    bounds, members = _bounds(cert, cert.starts)
+    bounds = _bounds(cert, cert.starts)
+    members = usable_members(bounds)
     rng = np.random.default_rng(5)
     least = 2 / max(bounds.form(i).rate for i in members)
     for _ in range(12):
         a, k = (least * Fraction(float(x)) for x in np.exp([rng.uniform(-3, 2), rng.uniform(0, 1.5)]))
-        fit = _at(cert, bounds, Option(a, k, None, Fraction(1)), Fraction(1), None)
+        fit = _at(cert, Option(a, k, None, Fraction(1)), Fraction(1), found.asked)
         assert fit.peak >= found.product * Fraction(9999, 10000)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lmi.exact import enclosure
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
+from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import inverse_decay_integral
 
 

@@ -62,8 +62,6 @@ def test_the_clock_is_the_same_by_every_variable(gain, share):
     assert gain.time_at_tau(tau) == pytest.approx(instant, rel=1e-12)
     assert gain.clock_at_tau(tau) == pytest.approx(gain.clock(instant), rel=1e-12)
     assert gain.clock_at_remaining(1 - share) == pytest.approx(gain.clock(instant), rel=1e-10, abs=1e-13)
-    # ds/dtau = gain dt/dtau = gain (T - t)
-    assert gain.clock_rate(tau) == pytest.approx(gain.value(instant) * (float(gain.T) - instant), rel=1e-9)
 
 
 def test_the_clock_goes_on_where_a_float_time_has_reached_the_deadline():

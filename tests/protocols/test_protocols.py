@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.theorems.symbolic import symbolic_lyapunov, symbolic_sliding
 
 SLIDING = SlidingModeProtocol("0.5", 1, "0.1", "0.3", 2, "1.2", "0.6", "0.9", 1)
@@ -49,9 +49,7 @@ def test_an_agent_that_listens_to_nobody_has_no_input():
 def test_without_rho2_there_is_no_deadline():
     baseline = NominalProtocol(T=1, rho1=1, rho2=0, kappa=1)
     assert not baseline.prescribed
-    assert baseline.settling_time is None
     assert PROTOCOL.prescribed
-    assert PROTOCOL.settling_time == Fraction(3, 5)
 
 
 @pytest.mark.parametrize(
@@ -71,6 +69,25 @@ def test_the_dictionary_rebuilds_the_protocol_exactly():
         assert all(isinstance(value, str) for value in parameters.values())
         assert NominalProtocol(**parameters) == protocol
         assert pickle.loads(pickle.dumps(protocol)) == protocol  # noqa: S301
+
+
+@pytest.mark.parametrize("protocol", [PROTOCOL, SLIDING], ids=["nominal", "sliding-mode"])
+def test_a_protocol_is_asked_and_not_told_apart_by_its_class(protocol):
+    assert Protocol.from_dict(protocol.to_dict()) == protocol
+    assert protocol.parameters == {name: Fraction(text) for name, text in protocol.to_dict().items() if name != "kind"}
+    begin = Fraction(0) if protocol.reaching is None else protocol.reaching.T_r
+    assert begin + protocol.span == protocol.T == protocol.gain.T
+    assert protocol.nominal.reaching is None and protocol.nominal.gain == protocol.gain
+    assert protocol.gain.first == Fraction(protocol.rho1 + protocol.rho2 * protocol.kappa / protocol.T)
+
+
+def test_a_protocol_that_nobody_knows_is_refused():
+    given = PROTOCOL.to_dict()
+    for change in ({"kind": "linear"}, {"kind": None}, {"mu1": "1"}, {"T": "-1"}):
+        with pytest.raises(ParameterError):
+            Protocol.from_dict(given | change)
+    with pytest.raises(ParameterError, match="kappa"):
+        Protocol.from_dict({name: text for name, text in given.items() if name != "kappa"})
 
 
 def test_latex_is_for_small_graphs():

@@ -14,8 +14,8 @@ from scipy.integrate import quad
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import Adversary, SampledDisturbance, as_disturbance, telegraph_noise
-from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import (
     ReachingProblem,
     ReachingTime,

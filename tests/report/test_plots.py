@@ -23,7 +23,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.limits import Actuator
 from ptcc_certify.report.plots import (
     CAMP_COLOURS,
     CLASS_MARKERS,
@@ -45,7 +46,6 @@ from ptcc_certify.report.plots import (
     plot_trajectory,
     save_figure,
 )
-from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum

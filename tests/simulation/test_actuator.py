@@ -15,10 +15,11 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.limited import Actuator, LimitedGain, as_forcing
+from ptcc_certify.protocols.limits import Actuator, LimitedGain
+from ptcc_certify.simulation.limited import as_forcing
 from ptcc_certify.simulation.run import simulate
 
 PROTOCOL = NominalProtocol("0.6", "0.1", "0.3", 1)
@@ -159,7 +160,7 @@ def test_the_input_is_the_effective_one_and_the_run_names_its_actuator():
     run = simulate(TRIO, PROTOCOL, X0, actuator=actuator, times=[0, "0.3", "0.588", "0.59", "0.6", 1])
     np.testing.assert_allclose(run.input, np.array([0.6, 1.1, 20, 0, 0, 0]) * run.error, rtol=1e-12)
     assert run.actuator == actuator
-    assert "Actuator(gain_cap=20, stop_before=1/100)" in repr(run)
+    assert "GainLimits(gain_cap=20, stop_before=1/100)" in repr(run)
     assert not run.deadline_resolved
     np.testing.assert_array_equal(run.states[:, 3:], run.states[:, [3]] * [1, 1, 1])
 

@@ -17,7 +17,7 @@ from test_latex import read, rows_of
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems import THEOREMS, LyapunovFunction, sliding_claim, theorem_for
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 from ptcc_certify.theorems.symbolic import symbolic_lyapunov

@@ -1,0 +1,184 @@
+"""What is proved about the input: whether it is bounded, its peak, its energy, what limits of the gain leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from ptcc_certify.checker.input_bounds import Limits, Rows, Starts
+from ptcc_certify.theorems import Obligation
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A bound, and what proves it: a member of the envelope and an instant ``z = ln(T/(T - t))``."""
+
+    value: Fraction
+    member: int
+    z: Fraction
+
+
+@dataclass(frozen=True)
+class EnergyIntegral:
+    """A bound of the energy from two Lyapunov equations, ``L'W + W L - c W >= m I`` with ``c = 0`` and ``c = 1/k``.
+
+    ``p`` says how the gain is split between them, see :func:`ptcc_certify.checker.input_bounds.integral_above`;
+    ``matrices`` are the two ``W``, in integers, and ``least`` the two ``m``.
+    """
+
+    value: Fraction
+    p: Fraction
+    matrices: tuple[Rows, Rows]
+    least: tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """``sup |u_k|`` of every agent, and of the norm ``||u||_2``."""
+
+    agents: tuple[Fraction, ...]
+    how: tuple[Witness, ...]
+    norm: Fraction
+    norm_how: Witness
+
+    @property
+    def largest(self) -> Fraction:
+        """``sup max_k |u_k|``."""
+        return max(self.agents)
+
+
+@dataclass(frozen=True)
+class SlidingPart:
+    """The sliding part of the input: bounded for every start iff ``mu3 kappa >= 1``, and its bound for every agent."""
+
+    bounded: bool
+    agents: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Limited:
+    """What is left at the deadline under limits of the gain: ``||E||``, and each agent's distance to its outcome.
+
+    ``largest`` bounds ``max_k |u_k|``; None if the input is held. With measurement noise ``|n_k| <= noise``,
+    ``u = -gain L (X + n)``, ``noisy_norm`` bounds ``||E||`` at the deadline and ``noisy_largest`` every ``|u_k|``.
+    """
+
+    limits: Limits
+    clock: Fraction
+    member: int
+    growth: Fraction
+    norm: Fraction
+    agents: tuple[Fraction, ...] | None
+    largest: Fraction | None
+    noise: Fraction | None = None
+    noise_member: int | None = None
+    noisy_norm: Fraction | None = None
+    noisy_largest: Fraction | None = None
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """What disturbances ``|d_k| <= delta`` of the nominal protocol add to the inputs, and to where the agents end."""
+
+    delta: Fraction
+    member: int
+    inputs: tuple[Fraction, ...]
+    drift: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is proved about the input.
+
+    Attributes
+    ----------
+    bounded : bool or None
+        Whether ``u`` (the nominal part, under the sliding-mode protocol) stays bounded up to the deadline for every
+        start; None: undecided.
+    by : {"rate", "limit", "spectrum"} or None
+        What decides it: a proved rate, a proved limit of rates, or the exact location of the spectrum.
+    threshold : pair of Fraction or None
+        Proved bounds of ``rho2 kappa min Re lambda``; the input is bounded from 1 on.
+    starts : Starts or None
+        The set of starts that the bounds are for; None: the start of the certificate.
+    constants : tuple of (tuple of Fraction or None)
+        ``c_k`` of every member with a full matrix, ``e_k^2 <= c_k V``.
+    peak : Peak or None
+        None: not bounded, or not proved.
+    energy : EnergyIntegral, Witness or None
+        Bound of ``int ||u||^2 dt`` (of the nominal part).
+    path_length : Witness or None
+        Bound of ``int ||u|| dt`` (of the nominal part).
+    sliding : SlidingPart or None
+        Bounds of the sliding part of the input; None under the nominal protocol, or if ``sigma(0)`` is not known.
+    residual : tuple of Limited
+        Of those limits under which something is certified.
+    longest_period : Fraction or None
+        Where sampling is not certified, ``||E||`` being proved to be no larger at the deadline than at first: a period
+        with which it would be, near to the longest one.
+    disturbed : Disturbed or None
+        What disturbances within ``delta`` add under the nominal protocol; None if none was given.
+    first : Fraction or None
+        Nominal protocol: ``sup max_k |u_k(0)|`` over the starts, exactly, which no peak falls below; None for an
+        ellipsoid.
+
+    Notes
+    -----
+    ``u(t) = -gain(t) L e^(-L s(t)) X(0)`` before the deadline, and ``gain e^(-lambda s)`` stays bounded iff
+    ``rho2 kappa Re lambda >= 1``: hence the threshold, where eigenvalues on that line must be semisimple. The bounds
+    follow from ``V <= e^(-rate s) V(0)`` and ``e_k^2 <= c_k V``.
+
+    References
+    ----------
+    The protocols (4) and (48) of Zhu et al., Robust prescribed-time coordination control of
+    cooperative-antagonistic networks with disturbances.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> effort = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False).effort
+    >>> effort.bounded, [float(bound) >= 1 for bound in effort.threshold], float(effort.first)
+    (True, [True, True], 8.0)
+    """
+
+    bounded: bool | None
+    by: str | None
+    threshold: tuple[Fraction | None, Fraction | None]
+    starts: Starts | None
+    constants: tuple[tuple[Fraction, ...] | None, ...]
+    peak: Peak | None = None
+    energy: Witness | EnergyIntegral | None = None
+    path_length: Witness | None = None
+    sliding: SlidingPart | None = None
+    residual: tuple[Limited, ...] = ()
+    longest_period: Fraction | None = None
+    disturbed: Disturbed | None = None
+    first: Fraction | None = None
+
+    @property
+    def obligations(self) -> list[Obligation]:
+        """What the independent check verifies, in its order."""
+        found = [Obligation("input-threshold", "effort", witness=self.by)] if self.bounded is not None else []
+        found += [
+            Obligation("input-constants", f"lyapunov.members[{k}]")
+            for k, c in enumerate(self.constants)
+            if c is not None
+        ]
+        if self.sliding is not None and self.sliding.agents is not None:
+            found.append(Obligation("input-sliding", "effort"))
+        if self.peak is not None:
+            found.append(Obligation("input-peak", "effort", {"z": self.peak.norm_how.z}, self.peak))
+        for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
+            if isinstance(bound, EnergyIntegral):
+                numbers = {"p": bound.p, "m0": bound.least[0], "m1": bound.least[1]}
+                found.append(Obligation(kind, "effort", numbers, bound))
+            elif bound is not None:
+                found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
+        for k, entry in enumerate(self.residual):
+            witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
+            found.append(Obligation("limited-gain", f"effort.residual[{k}]", {"growth": entry.growth}, witness))
+        if self.disturbed is not None:
+            numbers = {"delta": self.disturbed.delta}
+            found.append(Obligation("nominal-disturbed", "effort", numbers, self.disturbed.member))
+        return found

@@ -1,0 +1,170 @@
+"""Sets of initial states: boxes and ellipsoids, and how far from their final states agents are at first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.checker.input_bounds import Linear, Starts
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import by_label, in_node_order
+from ptcc_certify.graphs.rationals import as_fraction
+from ptcc_certify.graphs.structure import Structure
+
+
+def starts_within(structure: Structure, bound: Any) -> Starts:
+    """Return all starts with ``||X(0)||_inf <= bound``.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of N agents.
+    bound : int, float, str or Fraction
+        Positive, at most 1e300.
+
+    Returns
+    -------
+    Starts
+        A box about 0.
+
+    Raises
+    ------
+    ParameterError
+        The bound is not a positive number.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> starts_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
+    (Fraction(1, 2), Fraction(1, 2))
+    """
+    try:
+        R = as_fraction(bound, "the bound of starts")
+    except NumberError as error:
+        raise ParameterError(f"the bound of starts: {error}") from None
+    if not 0 < R <= 10**300:
+        raise ParameterError("the bound of starts is outside its domain; it must be positive, and at most 1e300")
+    n = structure.graph.n_nodes
+    return Starts((Fraction(0),) * n, (R,) * n)
+
+
+def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
+    """Return all starts with ``low_k <= x_k(0) <= high_k``.
+
+    Parameters
+    ----------
+    low, high : sequences of N numbers, mappings of label to number or pandas Series
+        Ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
+
+    Returns
+    -------
+    Starts
+
+    Raises
+    ------
+    ParameterError
+        The lengths differ, a lower end exceeds its upper end, or labels are not those of the nodes.
+    NumberError
+        An end is not a number of the exact grammar.
+
+    Examples
+    --------
+    >>> box([0, 1], [2, 1])
+    Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
+    True
+    """
+    low, high = _unlabelled(low, graph, "low"), _unlabelled(high, graph, "high")
+    if len(low) != len(high):
+        raise ParameterError(f"a box of {len(low)} lower and {len(high)} upper ends; give one of each for every agent")
+    ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
+    if any(a > b for a, b in ends):
+        raise ParameterError("a box whose lower end exceeds its upper end")
+    return Starts(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
+
+
+def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> Starts:
+    """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
+
+    Parameters
+    ----------
+    center : sequence of N numbers, mapping of label to number or pandas Series
+    axes : sequence of vectors like ``center``
+        One semi-axis or more; they need not be orthogonal.
+    graph : SignedDigraph, optional
+        Needed where there are labels: it has the order of the nodes.
+
+    Returns
+    -------
+    Starts
+
+    Raises
+    ------
+    ParameterError
+        There is no axis, one of another length than ``center``, or labels are not those of the nodes.
+    NumberError
+        A number is not of the exact grammar.
+
+    Examples
+    --------
+    >>> ellipsoid([0, 0], [[1, 0], [0, 2]]).axes
+    ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
+    """
+    if by_label(axes, "axes") is not None:
+        raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
+    middle = tuple(as_fraction(x, "center") for x in _unlabelled(center, graph, "center"))
+    vectors = tuple(tuple(as_fraction(x, "axes") for x in _unlabelled(axis, graph, "axes")) for axis in axes)
+    if not vectors or any(len(axis) != len(middle) for axis in vectors):
+        raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
+    return Starts(middle, axes=vectors)
+
+
+def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
+    if graph is not None:
+        return in_node_order(values, graph, name)
+    if by_label(values, name) is not None:
+        raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
+    return values
+
+
+def ways(starts: Starts, influence: Influence) -> list[Linear]:
+    """Return the rows of ``I - Q``: from its initial to its final state, each agent's way."""
+    rows: list[Linear] = []
+    for v in range(len(starts.center)):
+        row = {j: -Fraction(x) for j, x in influence.row(v).items()}
+        rows.append(row | {v: row.get(v, Fraction(0)) + 1})
+    return rows
+
+
+def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+
+    Parameters
+    ----------
+    starts : Starts
+    influence : Influence
+        ``Q`` in rationals.
+
+    Returns
+    -------
+    Fraction
+        Exact for a point or a box, rounded up for an ellipsoid.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.digraph import SignedDigraph
+    >>> from ptcc_certify.bounds.final_state import influence
+    >>> from ptcc_certify.graphs.structure import analyse
+    >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
+    >>> largest_deviation(Starts([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
+    Fraction(2, 1)
+    """
+    return max(map(starts.largest, ways(starts, influence)))

@@ -1,0 +1,108 @@
+"""Free parameters of the bounds of the input: which Lyapunov function, and from which instant on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from fractions import Fraction
+from functools import partial
+from typing import Any, TypeVar
+
+from ptcc_certify.bounds.input.effort import Witness
+from ptcc_certify.checker.input_bounds import InputBounds, Of, rounded
+from ptcc_certify.graphs.rationals import nearest_float, writable
+
+#: Bits of the bounds that are written, and of the instants that witness them.
+KEPT_BITS, INSTANT_BITS = 40, 24
+#: Beyond this ``z = ln(T/(T - t))`` no bound is formed.
+LATEST = 5_000
+#: Bounds below are raised to this, so that they can be written.
+LEAST = Fraction(1, 2**1200)
+
+Found = TypeVar("Found")
+
+
+def kept(x: Fraction) -> Fraction:
+    """Round up to the bits that are written, and what is next to nothing to ``LEAST``.
+
+    Raises
+    ------
+    OverflowError
+        Too large to be written.
+    """
+    value = rounded(max(x, LEAST), KEPT_BITS, up=True) if x else x
+    if not writable(value):
+        raise OverflowError("a bound that is too large to be written")
+    return value
+
+
+def log(x: Fraction) -> float:
+    """Return the natural logarithm of a nonnegative rational of any size."""
+    return math.log(x.numerator) - math.log(x.denominator) if x else -math.inf
+
+
+def least(attempts: Iterable[Callable[[], Found | None]], size: Callable[[Found], Any]) -> Found | None:
+    """Return the least of what can be proved; None if nothing can."""
+    proved = []
+    for attempt in attempts:
+        with suppress(ValueError, OverflowError):
+            proved.append(attempt())
+    return min((found for found in proved if found is not None), key=size, default=None)
+
+
+def usable_members(bounds: InputBounds) -> list[int]:
+    """Return which Lyapunov functions decay and say something of single agents."""
+    members = []
+    for k in range(len(bounds.forms)):
+        with suppress(ValueError, OverflowError):
+            bounds.constant(k)
+            bounds.start(k)
+            members.append(k)
+    return members
+
+
+def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
+    """Return what ``|e_agent|``, or ``||E||``, is at most at first by a Lyapunov function, and decays."""
+    return bounds.root_constant(k, agent) * bounds.start(k)
+
+
+def best_bound(bounds: InputBounds, of: Of, agent: int | None, members: Sequence[int]) -> Witness | None:
+    """Return the bound of the member whose decay takes over first, which is the least peak; the least while driven."""
+    found: Witness | None = None
+    for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in members):
+        if z <= LATEST:
+            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
+            try:
+                own = Witness(kept(bounds.bound(of, agent, k, instant)), k, instant)
+            except (ValueError, OverflowError):
+                continue
+            if found is None or own.value < found.value:
+                found = own
+            if bounds.reaching is None:
+                break
+    return found
+
+
+def least_bound(bounds: InputBounds, of: Of, members: Sequence[int]) -> Witness | None:
+    """Return the least bound of the norm over some members."""
+    return least((partial(best_bound, bounds, of, None, [k]) for k in members), lambda w: w.value)
+
+
+def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
+    """Return ``z`` where what is held meets what decays, the instant that serves the bounds best; 0 while driven."""
+    if bounds.reaching is not None:
+        return 0.0
+    held = bounds.held_norm if agent is None else bounds.held[agent]
+    start = decaying(bounds, k, agent)
+    if not held or not start:
+        return 0.0
+    s = 2 * (log(start) - log(held)) / nearest_float(bounds.form(k).rate)
+    linear, pole = nearest_float(bounds.gain.rho1 * bounds.gain.T), nearest_float(bounds.gain.k)
+    low, high = 0.0, s / pole
+    if not 0 < high < math.inf:
+        return 0.0 if high <= 0 else math.inf
+    for _ in range(60):
+        z = (low + high) / 2
+        low, high = (z, high) if -linear * math.expm1(-z) + pole * z < s else (low, z)
+    return high

@@ -1,0 +1,179 @@
+"""What limits of the gain leave at the deadline, and what noise and disturbances add under the nominal protocol."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
+from ptcc_certify.bounds.input.search import decaying, kept, least, log
+from ptcc_certify.checker.input_bounds import LAST_PERIODS, InputBounds, Limits, root_above
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.limits import GainLimits
+
+#: Periods below this share of ``T`` are not tried; how often the interval of the longest one is halved, and which
+#: shares of it are proved, one after the other, until one is.
+SHORTEST_SHARE, PERIOD_STEPS, PERIOD_SHARES = 1e-12, 12, (0.999, 0.99, 0.9, 0.5)
+
+
+@dataclass(frozen=True)
+class LimitedBounds:
+    """Bounds of what is left at the deadline, from some Lyapunov functions.
+
+    Attributes
+    ----------
+    bounds : InputBounds
+    members : sequence of int
+        The Lyapunov functions that serve.
+    distances : sequence
+        Of every one, the constants from ``V`` to the distances of agents to their outcomes, or None.
+    cap : Fraction or None
+        No agent is farther from its outcome than this, the largest deviation at the start, unless the input is held.
+    peak : Peak or None
+        Of the input without limits.
+    noise : Fraction or None
+        Bound of the measurement noise.
+    """
+
+    bounds: InputBounds
+    members: Sequence[int]
+    distances: Sequence[Sequence[Fraction] | None]
+    cap: Fraction | None
+    peak: Peak | None
+    noise: Fraction | None
+
+    def left(self, limits: Limits) -> Limited | None:
+        """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
+
+        With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
+        first.
+        """
+        top = limits.largest_gain(self.bounds.gain)
+        if top is None:
+            return None
+        clock = limits.clock_below(self.bounds.gain)
+        found = least((partial(self._by, k, limits, clock, top) for k in self.members), lambda entry: entry.norm)
+        if found is None or self.noise is None or limits.sample_period is not None:
+            return found
+        noisy = least((partial(self._noisy, k, found, top) for k in self.members), lambda entry: entry.noisy_largest)
+        return noisy or found
+
+    def _by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
+        """Return what one Lyapunov function proves."""
+        bounds, held = self.bounds, limits.sample_period is not None
+        growth = step_growth(bounds, k) if held else Fraction(0)
+        if growth is None:
+            return None
+        left = bounds.share(k, limits, clock, growth) * bounds.start(k)
+        norm = kept(bounds.root_constant(k, None) * left)
+        if held and norm > bounds.first:
+            return None
+        known = self.distances[k] if k < len(self.distances) else None
+        sizes = [root_above(c) * left for c in known or ()]
+        if self.cap is not None and not held:
+            sizes = [min(x, self.cap) for x in sizes]
+        peak = [] if self.peak is None else [self.peak.largest]
+        largest = None if held else kept(min([top * max(bounds.held), *peak]))
+        return Limited(limits, clock, k, growth, norm, None if known is None else tuple(map(kept, sizes)), largest)
+
+    def _noisy(self, k: int, found: Limited, top: Fraction) -> Limited:
+        """Add the bounds under measurement noise by one Lyapunov function."""
+        noise = self.noise or Fraction(0)
+        whole, each = self.bounds.noisy(k, noise)
+        norm, most = kept(found.norm + whole), kept((found.largest or 0) + top * max(each))
+        return replace(found, noise=noise, noise_member=k, noisy_norm=norm, noisy_largest=most)
+
+    def longest_period(self, limits: Sequence[Limits], found: Sequence[Limited | None], gain: Gain) -> Fraction | None:
+        """Return a period of four digits with which all is certified that is not, near to the longest; None if none."""
+        failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
+        if not failed or any(entry.sample_period is None for entry in failed) or not self.bounds.first:
+            return None
+        growths = {k: m for k in self.members if (m := step_growth(self.bounds, k)) is not None}
+        periods = [self._longest_period(entry, gain, growths) for entry in failed]
+        return None if None in periods else min(period for period in periods if period is not None)
+
+    def _longest_period(self, limits: Limits, gain: Gain, growths: dict[int, Fraction]) -> Fraction | None:
+        T, bounds = nearest_float(gain.T), self.bounds
+        sizes = {k: log(decaying(bounds, k, None)) - log(bounds.first) for k in growths}
+
+        def excess(period: float) -> float:
+            grown = (sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items())
+            return min(grown, default=math.inf)
+
+        def proved(period: Fraction) -> bool:
+            sampled = Limits(limits.gain_cap, limits.stop_before, period)
+            with suppress(ValueError, OverflowError):
+                for k, m in growths.items():
+                    left = bounds.share(k, sampled, Fraction(0), m) * bounds.start(k)
+                    if kept(bounds.root_constant(k, None) * left) <= bounds.first:
+                        return True
+            return False
+
+        high = nearest_float(limits.sample_period or gain.T)
+        low = high / 2
+        while low >= SHORTEST_SHARE * T and excess(low) > 0:
+            high, low = low, low / 2
+        if low < SHORTEST_SHARE * T:
+            return None
+        for _ in range(PERIOD_STEPS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if excess(middle) <= 0 else (low, middle)
+        tried = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
+        return next((period for period in tried if proved(period)), None)
+
+
+def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
+    """Return the logarithm of the bound of ``sqrt(V)`` over ``sqrt(V(0))`` if the gain is held, in floating point."""
+    limited = GainLimits(limits.gain_cap, limits.stop_before).limit(gain)
+    b, m, end = map(nearest_float, (rate, growth, gain.T - (limits.stop_before or 0)))
+    count = math.ceil(end / period * (1 - 1e-12))
+    first = max(count - LAST_PERIODS, 0)
+    # Before the last periods the gain changes little from one to the next: they are counted by the thousand.
+    edges = np.unique(np.append(np.geomspace(1, first + 1, 1000).astype(np.int64), 1)) - 1 if first else np.array([0])
+    starts = np.append(first - edges[::-1], np.arange(first + 1, count))
+    times = np.diff(starts, append=count)
+    at = starts * period
+    eta = limited.value(at) * np.minimum(period, end - at)
+    with np.errstate(all="ignore"):
+        return float(np.sum(times * np.log(np.maximum(1 - eta * b + eta**2 * m, 1e-300))) / 2)
+
+
+def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
+    """Return ``m`` with ``L'P L <= m P``, in floating point and raised a little; the check proves it."""
+    form = bounds.form(k)
+    if form.coordinates != "E":
+        return None
+    A = np.array([[float(bounds.rows[v].get(w, 0)) for w in form.nodes] for v in form.nodes])
+    try:
+        with np.errstate(all="ignore"):
+            if form.diagonal is not None:
+                R = np.diag(np.sqrt([float(w) for w in form.diagonal]))
+            else:
+                R = np.linalg.cholesky(np.array([[float(x) for x in row] for row in form.matrix or ()])).T
+            size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2))
+    except (np.linalg.LinAlgError, OverflowError):
+        return None
+    return kept(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
+
+
+def disturbed(
+    bounds: InputBounds, members: Sequence[int], delta: Fraction, influence: Influence | None
+) -> Disturbed | None:
+    """Bound what disturbances add under the nominal protocol."""
+    drift = None
+    if influence is not None and influence.exact:
+        rows = (influence.row(v).values() for v in range(len(bounds.rows)))
+        drift = tuple(kept(delta * bounds.gain.T * sum(abs(Fraction(x)) for x in row)) for row in rows)
+
+    def by(k: int) -> Disturbed:
+        return Disturbed(delta, k, tuple(map(kept, bounds.disturbed(k, delta))), drift)
+
+    return least((partial(by, k) for k in members), lambda found: max(found.inputs))

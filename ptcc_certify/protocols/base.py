@@ -1,0 +1,169 @@
+"""What every protocol is asked: its gain, when its nominal phase begins and ends, its closed loop, its LaTeX.
+
+A kind of protocol is a frozen dataclass of exact parameters in a module of its own; by its ``kind`` a file names it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import format_exact, shorten
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.parameters import Parameters
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from ptcc_certify.graphs.digraph import SignedDigraph
+
+
+class Protocol(Parameters, ABC):
+    """A coordination protocol: what each agent does with what it hears.
+
+    Attributes
+    ----------
+    kind : str
+        How files name this kind of protocol.
+    T : Fraction
+        The deadline, in units of time.
+    rho1, rho2, kappa : Fraction
+        Of the gain, ``rho1 + rho2 kappa/(T - t)``.
+    """
+
+    kind: ClassVar[str]
+    deadline_latex: ClassVar[str] = "T"
+    _kinds: ClassVar[dict[str, type[Protocol]]] = {}
+    T: Fraction
+    rho1: Fraction
+    rho2: Fraction
+    kappa: Fraction
+
+    def __init_subclass__(cls) -> None:
+        if "kind" in cls.__dict__:
+            Protocol._kinds[cls.kind] = cls
+
+    @cached_property
+    def gain(self) -> Gain:
+        """The gain of the nominal input and its clock; its pole is at ``T``."""
+        return Gain(self.T, self.rho1, self.rho2, self.kappa)
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether there is a deadline: ``rho2 > 0``."""
+        return self.rho2 > 0
+
+    @property
+    def span(self) -> Fraction:
+        """How long the nominal phase lasts, which alone moves the agents at its end: from 0, or ``T_r``, to ``T``."""
+        return self.T
+
+    @property
+    def nominal(self) -> Protocol:
+        """The protocol of the nominal phase."""
+        return self
+
+    @property
+    def reaching(self) -> ReachingProtocol | None:
+        """The protocol, if sliding variables reach 0 before its nominal phase; None if that begins at 0."""
+        return None
+
+    @abstractmethod
+    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+        """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "ode"}``, with ``"p"`` for disturbances."""
+
+    @abstractmethod
+    def latex(self, graph: SignedDigraph | None = None) -> str:
+        """Return the protocol in LaTeX, printed from its expressions: of an agent k, or of every agent of a graph."""
+
+    def _repr_latex_(self) -> str:
+        return f"$${self.latex()}$$"
+
+    def to_dict(self) -> dict[str, str]:
+        """Return ``kind`` and the parameters as exact strings."""
+        return {"kind": self.kind} | {name: format_exact(value) for name, value in self.parameters.items()}
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> Protocol:
+        """Return the protocol that :meth:`to_dict` describes.
+
+        Raises
+        ------
+        ParameterError
+            The kind is unknown, or a parameter is missing, unknown or outside its domain.
+
+        Examples
+        --------
+        >>> from ptcc_certify.protocols.nominal import NominalProtocol
+        >>> Protocol.from_dict(NominalProtocol(T=1, rho1=1, rho2="1/2", kappa=1).to_dict())
+        NominalProtocol(T=1, rho1=1, rho2=0.5, kappa=1)
+        """
+        given = dict(data)
+        kind = given.pop("kind", None)
+        if kind not in Protocol._kinds:
+            raise ParameterError(f'protocol "{shorten(str(kind))}" is unknown; one of {", ".join(Protocol._kinds)}')
+        try:
+            return Protocol._kinds[kind](**given)
+        except TypeError as error:
+            raise ParameterError(f"protocol {kind}: {error}") from None
+
+
+class ReachingProtocol(Protocol):
+    """A protocol under which sliding variables reach 0 by ``T_r``, whatever the disturbance within ``delta``.
+
+        sigma_k' = -mu1 sign(sigma_k) - (mu2 + mu3 kappa/(T_r - t)) sigma_k + d_k
+
+    Attributes
+    ----------
+    T_r, T_s : Fraction
+        Time to reach the sliding manifold, and time to settle on it, in units of time; ``T = T_r + T_s``.
+    mu1, mu2, mu3, delta : Fraction
+        Of the equation, ``|d_k| <= delta < mu1``.
+    """
+
+    deadline_latex: ClassVar[str] = "T_{r} + T_{s}"
+    T_r: Fraction
+    T_s: Fraction
+    mu1: Fraction
+    mu2: Fraction
+    mu3: Fraction
+    delta: Fraction
+
+    @property
+    def T(self) -> Fraction:  # type: ignore[override]
+        """The deadline ``T_r + T_s``."""
+        return self.T_r + self.T_s
+
+    @property
+    def span(self) -> Fraction:
+        """``T_s``."""
+        return self.T_s
+
+    @property
+    def reaching(self) -> ReachingProtocol:
+        """The protocol itself."""
+        return self
+
+    @cached_property
+    def reaching_gain(self) -> Gain:
+        """``mu2 + mu3 kappa/(T_r - t)``; by its clock ``c``, ``||sigma|| <= e^-c ||sigma(0)||`` (Proposition 1)."""
+        return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
+
+
+# ---------------------------------------------------------------------- expressions
+
+
+def symbols(name: str, graph: SignedDigraph) -> ca.SX:
+    """Return the column ``name1 .. nameN`` of CasADi symbols."""
+    import casadi as ca
+
+    return ca.vertcat(*(ca.SX.sym(f"{name}{k}") for k in range(1, graph.n_nodes + 1)))
+
+
+def aligned(rows: list[str]) -> str:
+    """Return equations in LaTeX, one below the other."""
+    return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"

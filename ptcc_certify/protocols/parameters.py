@@ -1,0 +1,110 @@
+"""Parameters as exact rationals: read, refused by name outside their domain, written short."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from fractions import Fraction
+from typing import Any, Self, overload
+
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import Exact
+from ptcc_certify.graphs.rationals import as_fraction, shorten
+
+_SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
+#: Bits of the longest parameter, whose products are written in certificates.
+LONGEST_BITS = 3000
+
+
+class Positive:
+    """A field of a frozen dataclass that takes any exact number and keeps it as a positive rational."""
+
+    zero_allowed = False
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> Fraction: ...
+    def __get__(self, instance: Any, owner: type) -> Any:
+        if instance is None:
+            raise AttributeError(self.name)  # no default
+        return instance.__dict__[self.name]
+
+    def __set__(self, instance: object, value: Exact) -> None:
+        instance.__dict__[self.name] = parameter(self.name, value, self.zero_allowed)
+
+
+class NotNegative(Positive):
+    """The same where 0 is allowed."""
+
+    zero_allowed = True
+
+
+class Given:
+    """The same where nothing may be given: then it is None."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: Any, owner: type) -> Fraction | None:
+        return None if instance is None else instance.__dict__[self.name]
+
+    def __set__(self, instance: object, value: Exact | None) -> None:
+        instance.__dict__[self.name] = None if value is None else parameter(self.name, value)
+
+
+class Parameters:
+    """What frozen dataclasses of such fields share."""
+
+    @property
+    def parameters(self) -> dict[str, Fraction]:
+        """The parameters that are given, by their names."""
+        every = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        return {name: value for name, value in every.items() if value is not None}
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={readable(x)}' for name, x in self.parameters.items())})"
+
+
+def readable(value: Fraction) -> str:
+    """Write a rational as short as it can be read back exactly: a float's decimals, or ``p/q``.
+
+    Examples
+    --------
+    >>> readable(Fraction(0.6)), readable(Fraction(3, 5)), readable(Fraction(2))
+    ('0.6', '3/5', '2')
+    """
+    if value.denominator != 1 and Fraction(float(value)) == value:
+        return repr(float(value))
+    return shorten(str(value))
+
+
+def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
+    """Return a parameter as an exact rational, or refuse it by name.
+
+    Examples
+    --------
+    >>> parameter("mu1", "1.2")
+    Fraction(6, 5)
+    """
+    domain = ">= 0" if zero_allowed else "> 0"
+    try:
+        value = as_fraction(given, name)
+    except NumberError:
+        raise ParameterError(
+            f"{name} = {shorten(str(given))} is not a finite number; {name} must be a number {domain}"
+        ) from None
+    refuse_out_of_range(name, value)
+    if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
+        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
+    if value < 0 or (value == 0 and not zero_allowed):
+        raise ParameterError(f"{name} = {readable(value)} is outside its domain; {name} must be {domain}")
+    return value
+
+
+def refuse_out_of_range(name: str, value: Fraction) -> None:
+    """Refuse what leaves the range of float64 by far."""
+    if value and not _SMALLEST <= abs(value) <= _LARGEST:
+        raise ParameterError(f"{name} is not between 1e-300 and 1e300 in size; choose other units of time or weight")

@@ -1,0 +1,122 @@
+"""The instants at which a run is sampled, dense towards its deadlines and accurate however near to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.rationals import as_fraction
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import Exact
+    from ptcc_certify.protocols import Protocol
+
+#: How far a run goes past the deadline unless told otherwise, as a share of it.
+PAST = 0.25
+_PAST_SAMPLES = 5
+# 1 - t/T at 0.5 T, 0.9 T, 0.99 T.
+_MARKS = (0.5, 0.1, 0.01)
+
+
+@dataclass(frozen=True)
+class Instants:
+    """Where a run is sampled: ``t``, ``1 - t/T`` and ``1 - t/T_r``, each (M,); the last is 0 without a ``T_r``."""
+
+    t: np.ndarray
+    left: np.ndarray
+    reaching_left: np.ndarray
+
+    @property
+    def z(self) -> np.ndarray:
+        """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
+        return minus_log(self.reaching_left, 1 - self.reaching_left)
+
+    def deadline(self, protocol: Protocol) -> int | None:
+        """Return which instant is ``T``; None if none is, or if there is no deadline."""
+        at = np.flatnonzero((self.left == 0) & (self.t == float(protocol.T)) & protocol.prescribed)
+        return int(at[0]) if at.size else None
+
+
+def default_instants(protocol: Protocol, remaining: float, samples: int, past: float) -> Instants:
+    """Return instants dense towards ``T_r``, if there is one, and towards ``T``, and evenly in time.
+
+    Raises
+    ------
+    ParameterError
+        A number is outside its domain.
+    """
+    if not 1e-300 <= remaining < 1:
+        raise ParameterError(f"remaining = {remaining} is outside its domain; it must be between 1e-300 and 1")
+    if samples < 2:
+        raise ParameterError(f"samples = {samples} is outside its domain; it must be at least 2")
+    if not 0 <= past <= 1e6:
+        raise ParameterError(f"past = {past} is outside its domain; it must be between 0 and 1e6")
+    T_r, T_s, T = (float(x) for x in (protocol.T - protocol.span, protocol.span, protocol.T))
+    grid = np.linspace(1, 0, samples)
+    if protocol.prescribed:
+        grid = np.exp(np.linspace(0, math.log(remaining), samples))
+        grid = np.append(grid, np.linspace(1, grid[-1], samples // 2))  # for figures in t
+    grid = np.unique(grid)[::-1]
+    shares = grid * (T_s / T)
+    if protocol.prescribed:
+        shares = shares[shares >= remaining * (1 - 1e-12)]
+    shares = np.append(shares, [left for left in _MARKS if left < T_s / T])
+    between = np.stack([T * (1 - shares), shares, np.zeros(shares.size)])
+    between[0, shares == T_s / T] = T_r
+    later = T * (1 + past * np.arange(_PAST_SAMPLES + 1 if past else 1) / _PAST_SAMPLES)
+    parts = [between, np.stack([later, np.zeros(later.size), np.zeros(later.size)])]
+    if T_r:
+        marks = np.array([T * (1 - left) for left in _MARKS])
+        early = np.append(grid, 1 - marks[marks < T_r] / T_r)
+        parts.append(np.stack([T_r * (1 - early), (T_s + T_r * early) / T, early]))
+    table = np.concatenate(parts, axis=1)
+    table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
+    fresh = np.append(True, np.diff(table, axis=1).any(axis=0))
+    return Instants(*table[:, fresh])
+
+
+def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
+    """Return the instants wanted, what is left until ``T`` and ``T_r`` from exact rationals.
+
+    Raises
+    ------
+    ParameterError
+        There are none, they are no numbers, negative, or not increasing.
+    """
+    try:
+        wanted = [as_fraction(t, "an instant") for t in times]  # type: ignore[arg-type]
+        t = np.array([float(value) for value in wanted])
+    except (NumberError, TypeError, OverflowError) as error:
+        raise ParameterError(f"times: {error}") from None
+    if not wanted:
+        raise ParameterError("times is empty; give at least one instant")
+    if wanted[0] < 0:
+        raise ParameterError(f"times starts at {t[0]}; instants must be >= 0")
+    for earlier, later in pairwise(wanted):
+        if later <= earlier:
+            raise ParameterError(f"times is not increasing: {float(later)} follows {float(earlier)}")
+
+    def left(deadline: Fraction) -> np.ndarray:
+        share = [max(0.0, float(1 - value / deadline)) if deadline else 0.0 for value in wanted]
+        return np.where(t == float(deadline), 0.0, share)
+
+    return Instants(t, left(protocol.T), left(protocol.T - protocol.span))
+
+
+def tau_before(t: np.ndarray, left: np.ndarray, T: float, remaining: float) -> np.ndarray:
+    """Return ``-ln(left T/remaining)``, ``left = 1 - t/T > 0``, of instants from ``remaining`` before ``T`` on."""
+    share = (t - (T - remaining)) / remaining
+    return np.maximum(minus_log(left * (T / remaining), share), 0.0)
+
+
+def minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return ``-ln(left)``, where ``left + share = 1``: whichever is the small one holds the digits."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(share < 0.5, -np.log1p(-share), -np.log(left))

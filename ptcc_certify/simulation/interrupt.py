@@ -1,0 +1,74 @@
+"""Runs that a signal stops: CasADi turns what a signal handler raises into a failure of CVODES, or loses it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from lmi.deadline import checkpoint, seconds_left
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let what a signal handler raises (KeyboardInterrupt, and OutOfTime at the time limit) pass.
+
+    CasADi looks for signals while it computes; where there are no timers, or in another thread than the main one, the
+    limit waits until it ends.
+    """
+    checkpoint()
+    previous = signal.getsignal(signal.SIGINT)
+    if not callable(previous) or threading.current_thread() is not threading.main_thread():
+        yield
+        checkpoint()
+        return
+    raised: list[BaseException] = []
+
+    def recorded(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
+        def handler(number: int, frame: Any) -> None:
+            try:
+                act(number, frame)
+            except BaseException as error:
+                raised.append(error)
+                raise
+
+        return handler
+
+    signal.signal(signal.SIGINT, recorded(previous))
+    said = io.StringIO()  # CasADi tells in words of its own that it was interrupted
+    try:
+        with contextlib.redirect_stderr(said), _alarm(recorded(lambda *_: checkpoint())):
+            yield
+    except Exception:
+        if raised:
+            raise raised[0] from None
+        raise
+    else:
+        if raised:
+            raise raised[0]
+    finally:
+        signal.signal(signal.SIGINT, previous)
+        if not raised and said.getvalue():
+            sys.stderr.write(said.getvalue())
+
+
+@contextmanager
+def _alarm(handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """Call the handler when the time limit is reached, if there is one and nobody else has set a timer."""
+    left = seconds_left()
+    if not math.isfinite(left) or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0]:
+        yield
+        return
+    previous = signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, max(left, 1e-3) + 1e-3)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)
