@@ -17,7 +17,7 @@ import resource
 import sys
 import traceback
 
-from lmi.exact.definite import arithmetic
+from lmi.exact import arithmetic
 from ptcc_certify.checker import main
 
 
