@@ -19,7 +19,7 @@ import flint
 import numpy as np
 
 from lmi.exact import dominance
-from lmi.exact.definite import BITS, Arithmetic, Rows, Scaled, symmetric
+from lmi.exact.definite import BITS, LARGEST_BITS, Arithmetic, Rows, Scaled, symmetric
 from lmi.exact.numbers import longest
 from lmi.exact.work import fits, spend
 
@@ -38,7 +38,6 @@ SLICE, FACTOR_BITS = 21, 57
 #: Longest column of a sparse factor that is multiplied pair by pair, entries of the largest dense block at the end,
 #: pairs in all, and at a time.
 LONGEST_COLUMN, LARGEST_BLOCK, LARGEST_PAIRS, CHUNK = 4000, 2_000_000, 400_000_000, 2_000_000
-LARGEST_BITS = 400_000_000
 
 
 class FastArithmetic(Arithmetic):
@@ -105,9 +104,7 @@ class FastArithmetic(Arithmetic):
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
         if len(S) > FLINT_ROWS and bits == BITS[0]:
-            values = _above_by_congruence(S, D)
-            if values is not None:
-                return values
+            return _above_by_congruence(S, D) or super().above(S, D, bits)
         return super().above(S, D, bits)
 
 
@@ -315,8 +312,7 @@ def _spare(T: np.ndarray, down: int, R: np.ndarray) -> list[int] | None:
         return None
     E = T - (whole << down if down else whole)
     diagonal = np.diag(E)
-    left: list[int] = (diagonal + np.abs(diagonal) - np.abs(E).sum(axis=1)).tolist()
-    return left
+    return list(diagonal + np.abs(diagonal) - np.abs(E).sum(axis=1))
 
 
 # ---------------------------------------------------------------------- sparse factors
@@ -343,8 +339,7 @@ class Remainder(NamedTuple):
         if m < self.n:
             diagonal = np.diag(self.block)
             left[m:] += (diagonal + np.abs(diagonal)) * d[m:] - np.abs(self.block) @ d[m:]
-        found: list[int] = left.tolist()
-        return found
+        return list(left)
 
 
 def remainder(S: Scaled) -> Remainder | None:
