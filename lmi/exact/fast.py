@@ -103,7 +103,7 @@ class FastArithmetic(Arithmetic):
 
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
-        if len(S) > FLINT_ROWS and bits == BITS[0]:
+        if len(S) > FLINT_ROWS and bits == BITS[0] and symmetric(S):
             return _above_by_congruence(S, D) or super().above(S, D, bits)
         return super().above(S, D, bits)
 
@@ -152,8 +152,6 @@ def unit_diagonal(S: Rows) -> tuple[np.ndarray, list[int]]:
 
 def _above_by_congruence(S: Rows, D: Rows) -> list[Fraction] | None:
     """Bound ``d'S^-1 d`` by ``|Y'd|^2 / least``, since ``Y'S Y >= least I`` is dominated by its diagonal."""
-    if any(row[i] <= 0 for i, row in enumerate(S)):
-        return None
     T, halves = unit_diagonal(S)
     try:
         found = np.linalg.inv(np.linalg.cholesky(T)).T
@@ -308,7 +306,7 @@ def _shifted(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]
 
 
 def _spare(T: np.ndarray, down: int, R: np.ndarray) -> list[int] | None:
-    if (whole := square(R)) is None:
+    if (T != T.T).any() or (whole := square(R)) is None:
         return None
     E = T - (whole << down if down else whole)
     diagonal = np.diag(E)
