@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from array import array
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from functools import cached_property
-from itertools import islice, pairwise
+from itertools import accumulate, islice, pairwise
 from typing import Any
 
 from lmi.exact.numbers import common_denominator, longest, sized
@@ -26,16 +26,14 @@ CHUNK = 65_536
 
 def numbered(weights: Any) -> tuple[list[Any], list[int]]:
     """Return the distinct weights, and the number of each one; by their texts, whose hashes nobody can foresee."""
-    number: dict[str, int] = {}
-    distinct: list[Any] = []
-    which = []
-    for w in weights:
-        p, q = w.as_integer_ratio()
-        k = number.setdefault(f"{p:x}/{q:x}", len(distinct))
-        if k == len(distinct):
-            distinct.append(w)
-        which.append(k)
-    return distinct, which
+    distinct = {_text(w): w for w in weights}
+    number = {text: k for k, text in enumerate(distinct)}
+    return list(distinct.values()), [number[_text(w)] for w in weights]
+
+
+def _text(w: Any) -> str:
+    p, q = w.as_integer_ratio()
+    return f"{p:x}/{q:x}"
 
 
 class Digraph:
@@ -254,14 +252,9 @@ class Digraph:
             rank[v] = k
         hashed = hashlib.sha256("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
         columns = [f"[{label}, " for label in quoted], [f'{label}, "' for label in quoted]
-        for lines in self._lines(rank, *columns, [f'{self._text(p, q)}"]\n' for p, q in self.ratios]):
+        for lines in self._lines(rank, *columns, [f'{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]):
             hashed.update(lines.encode("utf-8", "surrogatepass"))
         return hashed.hexdigest()
-
-    def _text(self, p: int, q: int) -> str:
-        common = math.gcd(p, self.scale)
-        below = q * (self.scale // common)
-        return f"{p // common}" if below == 1 else f"{p // common}/{below}"
 
     def _lines(self, rank: Sequence[int], *columns: Sequence[str]) -> Iterator[str]:
         """Yield the lines of all edges, put together from texts of source, target and weight, ascending by rank."""
@@ -274,9 +267,7 @@ class Digraph:
 
 def _starts(n: int, nodes: Any) -> list[int]:
     """Return where every node's part of a sorted list begins, and the end."""
-    starts = [0] * (n + 1)
+    counts = [0] * n
     for v in nodes:
-        starts[v + 1] += 1
-    for v in range(n):
-        starts[v + 1] += starts[v]
-    return starts
+        counts[v] += 1
+    return [0, *accumulate(counts)]
