@@ -197,7 +197,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
         rates = [m.rate_below for m in own]
         useful = [m.rate_below for m in own if m.prefactor <= LARGEST_PREFACTOR]
         bounds = [
-            min((0.5 * math.log(m.prefactor) - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
+            min((math.log(m.prefactor) / 2 - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
         ]
         result[kind] = {
             "tightness": max(rates, default=0.0) / spectral,
