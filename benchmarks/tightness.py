@@ -24,7 +24,6 @@ import flint
 import numpy as np
 
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
-from ptcc_certify.bounds.envelope import Member
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, sharpen
@@ -186,7 +185,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
     paper = [m for m in best.envelope.members if m.kind == "paper"]
     members = {
         "paper": paper,
-        **{kind: [Member.of_sharp(m) for m in sharpening.members] for kind, sharpening in found.items()},
+        **{kind: list(sharpening.members) for kind, sharpening in found.items()},
         "best": list(best.envelope.members),
     }
     result: dict[str, Any] = {"name": name, "n": graph.n_nodes, "spectral": spectral, "seconds": seconds}
@@ -195,10 +194,10 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
     worst, agents = 0.0, 0.0
     for kind, own in members.items():
         in_error = [m for m in own if m.coordinates == "E"]
-        rates = [m.rate for m in own]
-        useful = [m.rate for m in own if m.prefactor <= LARGEST_PREFACTOR]
+        rates = [m.rate_below for m in own]
+        useful = [m.rate_below for m in own if m.prefactor <= LARGEST_PREFACTOR]
         bounds = [
-            min((0.5 * math.log(m.prefactor) - m.rate * s / 2 for m in in_error), default=math.inf) for s in clocks
+            min((math.log(m.prefactor) / 2 - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
         ]
         result[kind] = {
             "tightness": max(rates, default=0.0) / spectral,
@@ -207,7 +206,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
         }
         for m in in_error:
             for s, v in judged:
-                worst = max(worst, math.exp(v - 0.5 * math.log(m.prefactor) + m.rate * s / 2))
+                worst = max(worst, math.exp(v - 0.5 * math.log(m.prefactor) + m.rate_below * s / 2))
     if best.outcome is not None:
         bound = best.outcome_distance([1 - fraction for fraction in INSTANTS])
         final = [Fraction(x) for x in best.outcome.final_state]

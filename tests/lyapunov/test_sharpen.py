@@ -119,7 +119,7 @@ def test_the_envelope_lies_below_each_member_and_above_the_motion():
         whole = envelope.norm_factor(s)
         for member in envelope.members:
             if member.coordinates == envelope.coordinates:
-                alone = np.sqrt(member.prefactor) * np.exp(-member.rate * s / 2)
+                alone = np.sqrt(member.prefactor_above) * np.exp(-member.rate_below * s / 2)
                 assert (whole <= alone * (1 + 3e-12)).all()  # bounds are rounded up by 1e-12
         x0 = rng.normal(size=graph.n_nodes)
         assert (envelope.bound(s, x0) <= whole * envelope.bound(0.0, x0) * (1 + 1e-9)).all() or len(
