@@ -206,7 +206,7 @@ class Limits:
     sample_period: Fraction | None = None
 
     def largest_gain(self, gain: PrescribedGain) -> Fraction | None:
-        """Return the largest gain that acts; None if it grows without limit."""
+        """Return the largest value of ``gain`` that acts; None if it grows without limit."""
         latest = self.stop_before
         if self.sample_period is not None:
             end = gain.T - (latest or 0)
@@ -249,7 +249,7 @@ class Limits:
         return rounded(max(s, Fraction(0)), BITS)
 
     def square_above(self, gain: PrescribedGain) -> Fraction:
-        """Bound the integral of the square of the gain up to the deadline from above, without sampling.
+        """Bound the integral of the square of ``gain`` up to the deadline from above, without sampling.
 
         Raises
         ------

@@ -89,7 +89,7 @@ class Protocol(Parameters, ABC):
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Protocol:
-        """Return the protocol that :meth:`to_dict` describes.
+        """Return the protocol of ``data``, as :meth:`to_dict` writes it.
 
         Raises
         ------

@@ -13,6 +13,7 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
 #: Bits of the longest parameter, whose products are written in certificates.
 LONGEST_BITS = 3000
+_TAKEN = "Fraction | int | float | str"
 
 
 class Positive:
@@ -22,6 +23,7 @@ class Positive:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+        owner.__annotations__[name] = _TAKEN  # what the constructor takes, for help()
 
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
@@ -47,6 +49,7 @@ class Given:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+        owner.__annotations__[name] = f"{_TAKEN} | None"
 
     def __get__(self, instance: Any, owner: type) -> Fraction | None:
         return None if instance is None else instance.__dict__[self.name]
