@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.reaching_time import ReachingTime
 
 #: Matplotlib's name of the style of all figures.
-STYLE = "ptcc_certify.report.ptcc"
+STYLE = "ptcc_certify.ptcc"
 #: Width and height in inches of figures as wide as a column, or two, of a journal.
 SINGLE_COLUMN, DOUBLE_COLUMN = (3.5, 2.7), (7.16, 2.9)
 #: What figures are saved as; PDF and SVG are vectors.
