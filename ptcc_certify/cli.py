@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import signal
 import sys
 import threading
@@ -91,8 +90,6 @@ _limit_options = _options(
     click.option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
 )
 _SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
-#: How many threads linear algebra uses, which NumPy reads when it is loaded.
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _method_option = click.option(
     "--method",
     type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
@@ -572,7 +569,6 @@ def batch(
     code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
     undecided or have an error. 2: nothing was written.
     """
-    os.environ.update({name: os.environ.get(name, "1") for name in _THREADS})  # processes are better than threads
     from ptcc_certify import batch as many
 
     expected, wanted = _behaviour(expect), _number(min_rate, "--min-rate")

@@ -53,6 +53,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from lmi.exact.rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, Start
@@ -123,7 +124,7 @@ def certified_row(name: str, payload: Any, settings: Settings) -> Row:
     row: Row = dict.fromkeys(COLUMNS)
     row["graph"] = printable(name)
     try:
-        with _ONE_AT_A_TIME:
+        with _ONE_AT_A_TIME, threadpool_limits(limits=1, user_api="blas"):  # processes are better than threads
             graph = _graph(name, payload, settings)
             negative = int((graph.sign < 0).sum())
             row |= {"sha256": graph.sha256, "nodes": graph.n_nodes, "edges": graph.n_edges, "negative": negative}

@@ -1,21 +1,17 @@
 r"""Bounded disturbances ``d_k(t)`` of the agents ``x_k' = u_k + d_k`` with ``|d_k| <= delta``.
 
-An expression is written in ``t`` and in ``k = 1, ..., N``, the position of the agent, and is read once into a postfix
-program. One loop runs that program over floats, over intervals or over CasADi: nothing here recurses, so that no text
-can exhaust the interpreter. The bound ``|d| <= delta`` on the whole horizon is established by interval arithmetic
-with outward rounding; an undefined operation makes an enclosure ``nan``, and what is computed from it stays ``nan``.
+An expression is written in ``t`` and in ``k = 1, ..., N``, the position of the agent
+(:mod:`ptcc_certify.protocols.expression`). The bound ``|d| <= delta`` on the whole horizon is established by interval
+arithmetic over balls, bisecting boxes of time, for the expression in real arithmetic.
 """
 
 from __future__ import annotations
 
 import math
-import operator
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,264 +19,16 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
+from ptcc_certify.protocols.expression import ATOMS, Interval, Program, enclosure, floats, parse, symbolic
 from ptcc_certify.protocols.latex import to_latex
 
 if TYPE_CHECKING:
     import casadi as ca
     from numpy.typing import ArrayLike
 
-MAX_CHARACTERS, MAX_NESTING = 1000, 50
 MAX_SWITCHES, MAX_SAMPLES = 10**6, 2 * 10**7
 TOLERANCE = 1e-12
-_CELLS, _BISECTIONS, _BOXES, _INSTANTS, _CHUNK = 256, 40, 200_000, 20_000, 64
-
-Program = tuple[float | str, ...]
-Interval = tuple[Any, Any]
-
-# ---------------------------------------------------------------------- from a text to a postfix program
-
-# a number, a name, an operator, or any other character but a blank
-_TOKEN = re.compile(
-    r"((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|([A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/(),]|([^ \t\r\n])"
-)
-_BINDING = {"(": 0, "+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
-_ATOMS = ("k", "t", "pi", "e")
-_FUNCTIONS = ("sin", "cos", "tan", "atan", "tanh", "exp", "log", "sqrt", "abs", "sign", "min", "max")
-_BINARY = frozenset(("+", "-", "*", "/", "**", "min", "max"))
-_KNOWN = f"{', '.join(_ATOMS)} and the functions {', '.join(_FUNCTIONS)}"
-
-
-def _refusal(text: str, column: int, what: str) -> ParameterError:
-    return ParameterError(f'disturbance "{shorten(text)}", column {column}: {what}')
-
-
-def _parse(text: str) -> Program:
-    """Order the operations by their binding: pending operators wait on a stack until a weaker one comes."""
-    if len(text) > MAX_CHARACTERS:
-        raise ParameterError(f"a disturbance of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
-    program: list[float | str] = []
-    pending: list[str] = []
-    calls: list[tuple[str, int, int]] = []  # function or "", arguments so far, column of each open parenthesis
-    function, operand_due, column, token = "", True, 1, ""
-
-    def release(binding: int) -> None:
-        while pending and _BINDING[pending[-1]] >= binding:
-            program.append(pending.pop())
-
-    def wait(operator_: str) -> None:
-        pending.append(operator_)
-        if sum(waiting in ("(", "**") for waiting in pending) > MAX_NESTING:
-            raise _refusal(text, column, f"nested deeper than {MAX_NESTING} levels; write it flatter")
-
-    for match in _TOKEN.finditer(text):
-        column, token = match.start() + 1, match[0]
-        if match[3]:
-            hint = "write a power as **" if token == "^" else f"write numbers, + - * / ** ( ) , {_KNOWN}"
-            raise _refusal(text, column, f'"{shorten(token)}" has no meaning; {hint}')
-        if function and token != "(":
-            break
-        if operand_due:
-            if match[1]:
-                if not math.isfinite(float(token)):
-                    raise _refusal(text, column, f"{shorten(token)} is beyond the range of floats; write less")
-                program.append(float(token))
-            elif token == "(":
-                calls.append((function, 1, column))
-                wait("(")
-                function = ""
-            elif token in _FUNCTIONS:
-                function = token
-            elif token in _ATOMS:
-                program.append(token)
-            elif match[2]:
-                raise _refusal(text, column, f'unknown name "{shorten(token)}"; the names are {_KNOWN}')
-            elif token == "-" and pending and pending[-1] == "neg":
-                pending.pop()  # two signs of one run cancel
-            elif token == "-":
-                wait("neg")
-            elif token != "+":
-                raise _refusal(text, column, f'a number, a name or "(" is missing before "{token}"')
-            operand_due = not match[1] and token not in _ATOMS
-        elif token in (",", ")"):
-            release(1)
-            if not calls:
-                raise _refusal(text, column, f'"{token}" without a "(" before it; remove it')
-            name, arguments, start = calls.pop()
-            if token == "," or name in ("min", "max"):
-                if name not in ("min", "max"):
-                    raise _refusal(text, column, f"only min and max take a comma; write {name or 'one value'} without")
-                if token == ")" and arguments < 2:
-                    raise _refusal(text, column, f"{name} takes two or more arguments; write {name}(a, b)")
-            if token == ",":
-                calls.append((name, arguments + 1, start))
-                operand_due = True
-            else:
-                pending.pop()
-                program.extend([name] * max(arguments - 1, 1) if name else [])
-        elif token in _BINARY and not match[2]:
-            release(_BINDING[token] + (token == "**"))
-            wait(token)
-            operand_due = True
-        else:
-            raise _refusal(text, column, f'an operator is missing before "{shorten(token)}"; write * for a product')
-    if function:
-        raise _refusal(text, column, f'"(" is missing after {function}; write {function}(...)')
-    if operand_due:
-        raise _refusal(text, len(text) + 1, "the expression ends too early; write a number, k or t here")
-    release(1)
-    if calls:
-        raise _refusal(text, calls[-1][2], 'this "(" is never closed; write ")"')
-    return tuple(program)
-
-
-def _run(program: Program, algebra: dict[str, Callable[..., Any]], atoms: dict[str, Any], number: Callable) -> Any:
-    stack: list[Any] = []
-    with np.errstate(all="ignore"):
-        for item in program:
-            if not isinstance(item, str):
-                stack.append(number(item))
-            elif item in atoms:
-                stack.append(atoms[item])
-            elif item in _BINARY:
-                right = stack.pop()
-                stack[-1] = algebra[item](stack[-1], right)
-            else:
-                stack[-1] = algebra[item](stack[-1])
-    return stack[0]
-
-
-_FLOATS: dict[str, Callable[..., Any]] = {
-    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative},
-    **{"sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh, "exp": np.exp, "log": np.log},
-    **{"sqrt": np.sqrt, "abs": np.abs, "sign": np.sign, "min": np.minimum, "max": np.maximum},
-}
-
-
-def _floats(program: Program, k: np.ndarray, t: np.ndarray) -> np.ndarray:
-    atoms = {"k": k, "t": t, "pi": np.float64(math.pi), "e": np.float64(math.e)}
-    return np.broadcast_to(_run(program, _FLOATS, atoms, np.float64), np.broadcast_shapes(k.shape, t.shape))
-
-
-# ---------------------------------------------------------------------- intervals
-
-# Errors of NumPy's functions are below 4 units in the last place, so two of their values are in order up to 8.
-_ULPS = 8
-
-
-def _hull(corners: Sequence[tuple[Any, Any]], ulps: int) -> Interval:
-    """Enclose values, each given with where it is exact; the others are moved outwards."""
-    low, high = [value for value, _ in corners], [value for value, _ in corners]
-    for _ in range(ulps):
-        low, high = [np.nextafter(value, -np.inf) for value in low], [np.nextafter(value, np.inf) for value in high]
-    lows = [np.where(exact, value, lo) for (value, exact), lo in zip(corners, low, strict=True)]
-    highs = [np.where(exact, value, hi) for (value, exact), hi in zip(corners, high, strict=True)]
-    return reduce(np.minimum, lows), reduce(np.maximum, highs)
-
-
-def _nowhere(undefined: Any, x: Interval) -> Interval:
-    return np.where(undefined, np.nan, x[0]), np.where(undefined, np.nan, x[1])
-
-
-def _sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """Return ``a + b`` and where its rounding error, which is a float itself, is zero."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part) == 0
-
-
-def _product(a: Any, b: Any) -> tuple[Any, Any]:
-    """Return ``a b`` and where its rounding error is zero, by splitting each factor into halves of 26 bits."""
-    product, splitter = a * b, 134217729.0
-    a1, b1 = splitter * a - (splitter * a - a), splitter * b - (splitter * b - b)
-    a2, b2 = a - a1, b - b1
-    error = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
-    return product, (a == 0) | (b == 0) | (error == 0) & (np.abs(product) > 1e-250)
-
-
-def _add(x: Interval, y: Interval) -> Interval:
-    return _hull([_sum(x[0], y[0]), _sum(x[1], y[1])], 1)
-
-
-def _divide(x: Interval, y: Interval) -> Interval:
-    return _nowhere((y[0] <= 0) & (y[1] >= 0), _hull([(a / b, a == 0) for a in x for b in y], 1))
-
-
-def _absolute(x: Interval) -> Interval:
-    sizes = np.abs(x[0]), np.abs(x[1])
-    return np.where((x[0] <= 0) & (x[1] >= 0), 0.0, np.minimum(*sizes)), np.maximum(*sizes)
-
-
-def _power(x: Interval, y: Interval) -> Interval:
-    """Enclose ``x**y``: an even whole power of ``|x|``, otherwise monotone in both ``x`` and ``y``."""
-    whole, reaches_zero = (y[0] == y[1]) & (y[0] == np.floor(y[0])), (x[0] <= 0) & (x[1] >= 0)
-    even = whole & (np.mod(y[0], 2) == 0)
-    base = tuple(np.where(even, size, end) for size, end in zip(_absolute(x), x, strict=True))
-    lo, hi = _hull([(np.power(a, b), (a == 0) | (np.abs(a) == 1) & whole) for a in base for b in y], _ULPS)
-    undefined = np.where(whole, (y[0] < 0) & reaches_zero, (x[0] < 0) | (x[0] == 0) & (y[0] <= 0))
-    return _nowhere(undefined | np.isnan(x[0]) | np.isnan(y[0]), (np.where(base[0] >= 0, np.maximum(lo, 0), lo), hi))
-
-
-def _monotone(name: str, low: float = -np.inf, high: float = np.inf) -> Callable[[Interval], Interval]:
-    """Return the enclosure of an increasing function of values in [low, high] that is exact at 0."""
-
-    def enclose(x: Interval) -> Interval:
-        lo, hi = _hull([(_FLOATS[name](end), end == 0) for end in x], _ULPS)
-        return np.maximum(lo, low), np.minimum(hi, high)
-
-    return enclose
-
-
-def _reaches(x: Interval, offset: float, period: float) -> Any:
-    """Tell where ``x`` may hold a point ``(offset + n) period``; the slack covers the rounding of the quotient."""
-    lo, hi = x[0] / period, x[1] / period
-    return np.ceil(lo - offset - 1e-15 * (1 + np.abs(lo))) <= np.floor(hi - offset + 1e-15 * (1 + np.abs(hi)))
-
-
-def _wave(name: str, peak: float) -> Callable[[Interval], Interval]:
-    """Return the enclosure of sin or cos, 1 at ``peak`` turns; undefined where the argument may overflow."""
-
-    def enclose(x: Interval) -> Interval:
-        ends, slack = [_FLOATS[name](end) for end in x], [np.where(end == 0, 0, 4e-15) for end in x]
-        lo = np.maximum(np.minimum(ends[0] - slack[0], ends[1] - slack[1]), -1.0)
-        hi = np.minimum(np.maximum(ends[0] + slack[0], ends[1] + slack[1]), 1.0)
-        turn = 2 * math.pi
-        waves = np.where(_reaches(x, peak + 0.5, turn), -1.0, lo), np.where(_reaches(x, peak, turn), 1.0, hi)
-        return _nowhere(np.isinf(x[0]) | np.isinf(x[1]), waves)
-
-    return enclose
-
-
-_INTERVALS: dict[str, Callable[..., Interval]] = {
-    "+": _add,
-    "-": lambda x, y: _add(x, (-y[1], -y[0])),
-    "*": lambda x, y: _hull([_product(a, b) for a in x for b in y], 1),
-    "/": _divide,
-    "**": _power,
-    "neg": lambda x: (-x[1], -x[0]),
-    "sin": _wave("sin", 0.25),
-    "cos": _wave("cos", 0.0),
-    "tan": lambda x: _nowhere(_reaches(x, 0.5, math.pi), _monotone("tan")(x)),
-    "atan": _monotone("atan"),
-    "tanh": _monotone("tanh", -1.0, 1.0),
-    "exp": _monotone("exp", 0.0),
-    "log": lambda x: _nowhere(x[0] <= 0, _monotone("log")(x)),
-    "sqrt": lambda x: _nowhere(x[0] < 0, _monotone("sqrt", 0.0)(x)),
-    "abs": _absolute,
-    "sign": lambda x: (np.sign(x[0]), np.sign(x[1])),
-    "min": lambda x, y: (np.minimum(x[0], y[0]), np.minimum(x[1], y[1])),
-    "max": lambda x, y: (np.maximum(x[0], y[0]), np.maximum(x[1], y[1])),
-}
-
-
-def _enclosure(program: Program, k: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> Interval:
-    """Enclose the values on the boxes ``t in [lo, hi]``; nan where they may be undefined."""
-    near = {name: (np.nextafter(value, 0), np.nextafter(value, 4)) for name, value in (("pi", math.pi), ("e", math.e))}
-    numbers = {value: (np.float64(value), np.float64(value)) for value in program if not isinstance(value, str)}
-    ends = _run(program, _INTERVALS, {"k": (k, k), "t": (lo, hi), **near}, numbers.__getitem__)
-    return np.broadcast_to(ends[0], lo.shape), np.broadcast_to(ends[1], lo.shape)
-
-
-# ---------------------------------------------------------------------- disturbances
+_GRID, _BISECTIONS, _BOXES, _INSTANTS, _CHUNK = 513, 48, 40_000, 20_000, 64
 
 
 class Disturbance(ABC):
@@ -414,7 +162,7 @@ class ExpressionDisturbance(Disturbance):
         texts = [text_or_texts] if common else list(text_or_texts)
         if not texts or not all(isinstance(text, str) for text in texts):
             raise ParameterError("a disturbance is one text, or one text for each agent")
-        programs = {text: _parse(text) for text in dict.fromkeys(map(str, texts))}
+        programs = {text: parse(text) for text in dict.fromkeys(map(str, texts))}
         object.__setattr__(self, "texts", tuple(" ".join(str(text).split()) for text in texts))
         object.__setattr__(self, "common", common)
         object.__setattr__(self, "_programs", {" ".join(text.split()): program for text, program in programs.items()})
@@ -429,13 +177,14 @@ class ExpressionDisturbance(Disturbance):
         instants, agents = np.asarray(t, dtype=float), np.asarray(agents, dtype=int)
         values = np.empty((agents.size, instants.size))
         for text, rows in self._groups(agents):
-            values[rows] = _floats(self._programs[text], agents[rows, None] + 1.0, instants[None, :])
+            values[rows] = floats(self._programs[text], agents[rows, None] + 1.0, instants[None, :])
         return values
 
     def casadi(self, t: ca.SX | ca.MX, agent: int) -> ca.SX | ca.MX:
         """Return the CasADi expression of the symbol ``t`` for ``agent`` (from 0), of the type of ``t``."""
         number = type(t)
-        return self._symbolic(agent, {"k": number(agent + 1), "t": t, "pi": number(math.pi), "e": number(math.e)})
+        atoms = {"k": number(agent + 1), "t": t, "pi": number(math.pi), "e": number(math.e)}
+        return symbolic(self._program(agent), atoms)
 
     def latex(self, agent: int = 0) -> str:
         """Return the LaTeX of the common expression, or of that of ``agent`` (counted from 0).
@@ -448,7 +197,7 @@ class ExpressionDisturbance(Disturbance):
         import casadi as ca
 
         try:
-            return to_latex(self._symbolic(agent, {name: ca.SX.sym(name) for name in _ATOMS}))
+            return to_latex(symbolic(self._program(agent), {name: ca.SX.sym(name) for name in ATOMS}))
         except RecursionError:
             raise ParameterError(f'disturbance "{shorten(self.text)}" is too long to be printed as LaTeX') from None
 
@@ -484,14 +233,8 @@ class ExpressionDisturbance(Disturbance):
             groups.setdefault(self.texts[0 if self.common else agent], []).append(row)
         return [(text, np.array(rows)) for text, rows in groups.items()]
 
-    def _symbolic(self, agent: int, atoms: dict[str, Any]) -> Any:
-        import casadi as ca
-
-        names = {"abs": "fabs", "min": "fmin", "max": "fmax"}
-        algebra = {name: getattr(ca, names.get(name, name)) for name in _FUNCTIONS}
-        algebra |= {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
-        algebra |= {"**": operator.pow, "neg": operator.neg}
-        return _run(self._programs[self.texts[0 if self.common else agent]], algebra, atoms, type(atoms["t"]))
+    def _program(self, agent: int) -> Program:
+        return self._programs[self.texts[0 if self.common else agent]]
 
     def _check_boxes(
         self, text: str, agents: np.ndarray, limit: _Limit, labels: Sequence[str], until: float, budget: int
@@ -500,29 +243,27 @@ class ExpressionDisturbance(Disturbance):
         program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', limit.bound
 
         def sample(k: np.ndarray, t: np.ndarray) -> None:
-            _refuse_beyond(_floats(program, k + 1.0, t), t, k, limit, labels, place)
+            _refuse_beyond(floats(program, k + 1.0, t), t, k, limit, labels, place)
 
-        sample(agents[:, None], np.linspace(0, until, 2 * _CELLS + 1)[None, :])
-        edges, sampled = np.linspace(0, until, _CELLS + 1), False
-        k, lo, hi = np.repeat(agents, _CELLS), np.tile(edges[:-1], agents.size), np.tile(edges[1:], agents.size)
+        sample(agents[:, None], np.linspace(0, until, _GRID)[None, :])
+        boxes, sampled = [(int(agent), 0.0, until) for agent in agents], False
         for level in range(_BISECTIONS + 1):
-            ends = _enclosure(program, k + 1.0, lo, hi)
-            size = np.maximum(-ends[0], ends[1])
-            left = ~(size <= bound)
-            if level == _BISECTIONS or 2 * left.sum() > budget:
-                sampled |= bool((left & np.isfinite(size)).any())
-                left &= ~np.isfinite(size)
-            if not left.any():
+            ends = [enclosure(program, agent + 1, lo, hi) for agent, lo, hi in boxes]
+            undefined = [box for box, end in zip(boxes, ends, strict=True) if end is None]
+            boxes = [box for box, end in zip(boxes, ends, strict=True) if end is None or not _within(end, bound)]
+            if level == _BISECTIONS or 2 * len(boxes) > budget:
+                sampled |= len(boxes) > len(undefined)
+                boxes = undefined
+            if not boxes:
                 break
-            k, lo, hi = k[left], lo[left], hi[left]
-            if level == _BISECTIONS or 2 * k.size > _BOXES:  # unbounded ones may overspend: they are few
-                where = f"agent {shorten(labels[k[0]])}, t = {lo[0]:.9g}"
+            if level == _BISECTIONS or 2 * len(boxes) > _BOXES:  # undefined ones may overspend: they are few
+                where = f"agent {shorten(labels[boxes[0][0]])}, t = {boxes[0][1]:.9g}"
                 mend = "is it undefined there? keep clear of divisions by zero, or write sqrt(max(0, ...))"
                 raise ParameterError(f"{place}: no bound can be given near {where}; {mend}")
-            middle = (lo + hi) / 2
-            sample(k, middle)
-            k, lo, hi = np.tile(k, 2), np.concatenate([lo, middle]), np.concatenate([middle, hi])
-            budget -= k.size
+            halves = [(agent, lo, (lo + hi) / 2, hi) for agent, lo, hi in boxes]
+            sample(np.array([half[0] for half in halves]), np.array([half[2] for half in halves]))
+            boxes = [(agent, *part) for agent, lo, mid, hi in halves for part in ((lo, mid), (mid, hi))]
+            budget -= len(boxes)
         if sampled:
             # Not on a lattice, which a fast signal could hide between.
             sample(agents[:, None], np.sort(np.random.default_rng(_INSTANTS).uniform(0, until, _INSTANTS))[None, :])
@@ -917,6 +658,10 @@ class _Limit(NamedTuple):
     @property
     def bound(self) -> float:
         return nearest_float(self.delta) * (1 + self.slack)
+
+
+def _within(ends: Interval, bound: float) -> bool:
+    return bool(ends[0] >= -bound and ends[1] <= bound)
 
 
 def _refuse_other_count(count: int, what: str, labels: Sequence[str]) -> None:

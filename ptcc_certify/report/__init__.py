@@ -5,10 +5,9 @@ proved is told apart from what is numerical: a simulated run, repeated for the f
 one file that loads nothing and runs no script; every text that stands in the certificate is shown as text, whatever
 it holds.
 
-:mod:`~ptcc_certify.report.page` is the page, section by section, of pieces from :mod:`~ptcc_certify.report.markup` and
-equations from :mod:`~ptcc_certify.report.mathml`; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both take numbers
-and words from :mod:`~ptcc_certify.report.texts`, which rounds what was proved to the safe side, and figures from
-:mod:`~ptcc_certify.report.figures`.
+:mod:`~ptcc_certify.report.page` fills the templates of the page; :mod:`~ptcc_certify.report.statement` is the LaTeX.
+Both take numbers and words from :mod:`~ptcc_certify.report.texts`, which rounds what was proved to the safe side, and
+figures from :mod:`~ptcc_certify.report.figures`.
 """
 
 from __future__ import annotations

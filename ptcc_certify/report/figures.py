@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
 
@@ -33,7 +35,7 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:
     return figures
 
 
-def inline_figure(figure: Figure, name: str, caption: str) -> str:
+def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:
     """Return a figure as inline SVG, which a caption of HTML describes in words and numbers."""
     image = figure_bytes(figure, ".svg").decode()
     image = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", image, flags=re.DOTALL)
@@ -43,6 +45,6 @@ def inline_figure(figure: Figure, name: str, caption: str) -> str:
     image = re.sub(r' d="[^"]*"', lambda d: re.sub(r"(\.\d{3})\d+", r"\1", d[0]), image)  # a smaller page
     frame = re.search(r'<svg[^>]*viewBox="([-0-9. ]+)"[^>]*>', image)
     assert frame is not None
-    said = re.sub(r"<[^>]*>", "", caption)  # what is left is escaped already, quotes too
-    head = f'<svg viewBox="{frame[1]}" role="img" aria-label="{said}">'
-    return f'<figure id="figure-{name}">{head}{image[frame.end() :].strip()}<figcaption>{caption}</figcaption></figure>'
+    return Markup(
+        '<figure id="figure-{}"><svg viewBox="{}" role="img" aria-label="{}">{}<figcaption>{}</figcaption></figure>'
+    ).format(name, frame[1], caption.striptags(), Markup(image[frame.end() :].strip()), caption)

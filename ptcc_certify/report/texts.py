@@ -1,24 +1,24 @@
 """Numbers, labels and words of a report, as HTML; numbers that were proved are rounded to the safe side.
 
-Texts of the file are escaped here, whatever they hold.
+What holds HTML is :class:`markupsafe.Markup`, which the templates print as it is; everything else they escape.
 """
 
 from __future__ import annotations
 
-import html
 import re
-from collections import Counter
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from typing import Any
+
+from latex2mathml.converter import convert
+from markupsafe import Markup, escape
 
 from lmi.exact.rounding import down, up
-from ptcc_certify.bounds.input import Limited, Starts
+from ptcc_certify.bounds.input import Starts
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
-from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.theorems.claims import Claim
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
@@ -26,6 +26,7 @@ AUTHORS = "Zhen-Hua Zhu, Huaiyu Wu, Zhi-Hong Guan, Zhi-Wei Liu, Yang Chen, Xiuju
 TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic networks with disturbances"
 
 _MINUS = "\N{MINUS SIGN}"
+_LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4"}
 
 # ---------------------------------------------------------------------- texts of the file
 
@@ -36,20 +37,15 @@ def printable(text: str, limit: int = CHARACTERS) -> str:
     return "".join(c if c.isprintable() else f"\\u{{{ord(c):x}}}" for c in cut)
 
 
-def escaped(text: str, limit: int = 2000) -> str:
-    """Return a text of the file as HTML."""
-    return html.escape(printable(text, limit))
-
-
-def label_html(text: str) -> str:
+def label(text: str) -> Markup:
     """Return a label; ``bdi`` keeps its direction of writing to itself."""
-    return f"<bdi>{escaped(text, CHARACTERS)}</bdi>"
+    return Markup("<bdi>{}</bdi>").format(printable(text))
 
 
-def labels_html(labels: Sequence[str]) -> str:
-    """Return up to 30 labels, and how many more there are."""
-    more = f" and {len(labels) - LISTED:,} more" if len(labels) > LISTED else ""
-    return ", ".join(map(label_html, labels[:LISTED])) + more
+def labels(nodes: Sequence[Any], names: Sequence[str] | None = None) -> Markup:
+    """Return up to 30 labels, or those of nodes, and how many more there are."""
+    shown = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:LISTED])
+    return shown + (f" and {len(nodes) - LISTED:,} more" if len(nodes) > LISTED else "")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -76,25 +72,25 @@ def rational(x: Fraction) -> str:
     return _near(x)
 
 
-def _near(x: Fraction) -> str:
+def _near(x: Fraction) -> Markup:
     if abs(x) > 10**300:
-        return "beyond 10<sup>300</sup>" if x > 0 else f"beyond {_MINUS}10<sup>300</sup>"
-    return f"\N{ALMOST EQUAL TO} {power(f'{nearest_float(x):.6g}')}"
+        return Markup("beyond {}10<sup>300</sup>").format("" if x > 0 else _MINUS)
+    return "\N{ALMOST EQUAL TO} " + power(f"{nearest_float(x):.6g}")
 
 
-def power(text: str) -> str:
+def power(text: str) -> Markup:
     """Write ``3e-07`` as a product with a power of ten, and a true minus sign."""
     mantissa, _, exponent = text.partition("e")
-    product = f"{mantissa} \u00d7 10<sup>{int(exponent)}</sup>" if exponent else mantissa
+    product = Markup("{} \u00d7 10<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
     return product.replace("-", _MINUS)
 
 
-def above(x: Fraction | float, digits: int = 4) -> str:
+def above(x: Fraction | float, digits: int = 4) -> Markup:
     """Write a positive number, rounded up."""
     return power(up(x, digits))
 
 
-def below(x: Fraction | float, digits: int = 6) -> str:
+def below(x: Fraction | float, digits: int = 6) -> Markup:
     """Write a positive number, rounded down."""
     return power(down(x, digits))
 
@@ -104,16 +100,34 @@ def enclosed(value: tuple[Fraction, Fraction]) -> str:
     middle, radius = value
     if radius == 0:
         text = rational(middle)
-        return f"{_near(middle)} ({text})" if "/" in text else text
+        return _near(middle) + f" ({text})" if "/" in text else text
     text = f"{nearest_float(middle):.9g}"
     if "inf" in text:
         return _near(middle)
-    return f"{power(text)} \u00b1 {above(radius + abs(middle - Fraction(text)), 2)}"
+    return power(text) + " \u00b1 " + above(radius + abs(middle - Fraction(text)), 2)
 
 
-def subscripts(text: str) -> str:
-    """Set ``T_r`` and ``T_s`` with subscripts."""
-    return re.sub(r"T_([rs])\b", r"T<sub>\1</sub>", text)
+# ---------------------------------------------------------------------- letters and equations
+
+
+def indexed(text: str) -> Markup:
+    """Set indices: ``T_r`` with its r below."""
+    return Markup(re.sub(r"\b(\w)_(\w)\b", r"\1<sub>\2</sub>", str(escape(text))))
+
+
+def symbol(name: str) -> Markup:
+    """Return a parameter's letter with its index: ``rho1``."""
+    letters, index = re.fullmatch(r"([A-Za-z]+?)_?([0-9rs]?)", name).groups()  # type: ignore[union-attr]
+    letter = _LETTERS.get(letters, letters)
+    return indexed(f"{letter}_{index}" if index else letter)
+
+
+def equations(protocol: Protocol) -> Markup:
+    """Return the equations of a protocol in MathML; their LaTeX is the text in their place."""
+    source = protocol.latex()
+    known = re.sub(r"\\(operatorname|mathrm)\b", r"\\text", source.replace("{aligned}", "{align*}"))
+    opening = Markup('<math display="block" alttext="{}">').format(" ".join(source.split()))
+    return opening + Markup(convert(known, display="block").partition(">")[2])
 
 
 # ---------------------------------------------------------------------- words
@@ -129,14 +143,6 @@ def parameter_names(protocol: Protocol) -> list[str]:
     return [name for name in protocol.to_dict() if name != "kind"]
 
 
-def claim_text(claim: Claim) -> str:
-    """Say what is claimed, and by which corollaries."""
-    special = f", {', '.join(claim.special)}" if claim.special else ""
-    number = "Corollary" if len(claim.corollaries) == 1 else "Corollaries"
-    by = f" ({number} {', '.join(claim.corollaries)})" if claim.corollaries else ""
-    return f"{claim.behaviour.capitalize()}{special}{by}"
-
-
 def agent_parts(saved: Certificate) -> list[str]:
     """Say of every agent which part of the graph it is in."""
     parts = ["follower"] * saved.graph.n_nodes
@@ -148,114 +154,7 @@ def agent_parts(saved: Certificate) -> list[str]:
     return parts
 
 
-def balance_text(component: ClosedComponent, labels: Sequence[str]) -> str:
-    """Say how a leader group splits, or why it does not."""
-    if component.negative_cycle is not None:
-        cycle = component.negative_cycle[:LISTED]
-        steps = ", ".join(f"{label_html(labels[s])} \u2192 {label_html(labels[t])}" for s, t in cycle)
-        return f"unbalanced; negative cycle {steps}{', ...' if len(component.negative_cycle) > LISTED else ''}"
-    camps = [
-        [labels[v] for v, g in zip(component.nodes, component.gauge or (), strict=True) if g == sign]
-        for sign in (1, -1)
-    ]
-    said = " against ".join(f"{{{labels_html(camp)}}}" for camp in camps if camp)
-    return f"balanced; {'camps' if camps[1] else 'one camp'} {said}"
-
-
-def kinds_text(saved: Certificate) -> str:
-    """Count the Lyapunov functions by their class."""
-    names = {"paper": "the article's", "perron": "Perron vectors", "lmi": "best diagonal", "full": "full matrices"}
-    counted = Counter(m.kind for m in saved.envelope.members)
-    return ", ".join(f"{count} {names[kind]}" for kind, count in counted.items())
-
-
 def common_bound(starts: Starts) -> Fraction | None:
     """Return ``R`` of a set that is all starts with ``|x_k(0)| <= R``; None of another one."""
     same = len(set(starts.radius)) == 1 and not any(starts.center) and not starts.axes
     return starts.radius[0] if same else None
-
-
-def limits_text(entry: Limited) -> str:
-    """Name limits of the gain."""
-    limits = entry.limits
-    said = [f"gain \u2264 {rational(limits.gain_cap)}"] if limits.gain_cap is not None else []
-    said += [f"input 0 from T \u2212 {rational(limits.stop_before)} on"] if limits.stop_before is not None else []
-    said += [f"input held for {rational(limits.sample_period)}"] if limits.sample_period is not None else []
-    return ", ".join(said)
-
-
-def limited_text(entry: Limited) -> str:
-    """Say what is proved under limits of the gain, and under noise with them."""
-    said = [f"\u2016E(T)\u2016 \u2264 {above(entry.norm, 3)}"]
-    said += [f"every agent within {above(max(entry.agents), 3)} of its outcome"] if entry.agents is not None else []
-    said += [f"|u<sub>k</sub>| \u2264 {above(entry.largest)}"] if entry.largest is not None else []
-    if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-        said.append(
-            f"with noise |n<sub>k</sub>| \u2264 {rational(entry.noise)}: "
-            f"\u2016E(T)\u2016 \u2264 {above(entry.noisy_norm, 3)}, "
-            f"|u<sub>k</sub>| \u2264 {above(entry.noisy_largest)}"
-        )
-    return "; ".join(said)
-
-
-def caveats(saved: Certificate, no_run: str) -> list[str]:
-    """Say what a reader might take for proved and is not, for this certificate."""
-    effort, sliding = saved.effort, saved.protocol.reaching is not None
-    residual = () if effort is None else effort.residual
-    said = []
-    if saved.verdict != "certified":
-        notes = saved.document["unverified"].get("notes")
-        own = [escaped(note, 300) for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else []
-        word = f" The file remarks, unverified: {'; '.join(own)}." if own else ""
-        said.append(f"The certificate is undecided: that the agents behave so by the deadline is not certified.{word}")
-    said.append(
-        "The model: agents are single integrators, weights are exact and constant, every agent knows the states it "
-        "listens to without delay" + ("." if any(e.noise for e in residual) else " and without noise.")
-    )
-    if any(e.limits.sample_period for e in residual):
-        said.append("Sampling is certified with the periods named above, and with no others.")
-    else:
-        said.append("Continuous time: nothing is said of an input that is sampled and held.")
-    if not saved.constant:
-        gain = "The gain is infinite at the deadline. No device follows it to the end; "
-        said.append(
-            gain + ("what the limits named above leave is proved." if residual else "what a cap leaves was not asked.")
-        )
-    if sliding:
-        said.append(
-            "Disturbances must stay within \u03b4, and \u03b4 must be known. The sign in the input is ideal: a device "
-            "that switches with a delay chatters, and what that does is not said."
-        )
-    elif effort is None or effort.disturbed is None:
-        said.append("There are no disturbances in the model, and nothing is said of what they would do.")
-    if saved.start is None:
-        said.append("No start was given: there is no final state, and no bound of the input in numbers.")
-    elif effort is not None and effort.starts is not None:
-        said.append("Bounds of the input are for the set of starts, the final state for the one start alone.")
-    elif not saved.constant:
-        said.append("Final state and bounds in numbers are for this start; behaviour and rate are for every start.")
-    if effort is not None and not saved.constant:
-        if effort.bounded is False:
-            said.append("The input is not bounded: the deadline is met in the model, and by no actuator with a limit.")
-        elif effort.bounded is None:
-            said.append("Whether the input stays bounded is not decided.")
-        elif effort.peak is None and saved.start is not None:
-            said.append("The input stays bounded, but by which number is not proved.")
-    if saved.final_state is not None and any(radius for _, radius in saved.final_state):
-        said.append("The final state is proved to lie in the intervals, and no nearer.")
-    if saved.rate is not None and saved.upper_bound is None:
-        said.append("No upper bound on the rate is proved: a faster certificate may exist.")
-    if len(saved.claims) > 1:
-        said.append(
-            "The article leaves disconnected graphs out; components are treated one by one, by the same proofs."
-        )
-    if saved.trajectory is None:
-        said.append(f"No run was simulated for this page: {escaped(no_run)}.")
-    else:
-        said.append("Simulated curves and everything called numerical are floating point, and no part of the proof.")
-    said.append(
-        "The theorems are those of the article: verified are their hypotheses, and the inequalities and numbers "
-        "listed. The SHA-256 values show that a file was not changed; they are no signature. "
-        "Whether the graph is the one you mean, only you can tell."
-    )
-    return said

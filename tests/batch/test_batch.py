@@ -23,10 +23,12 @@ import networkx as nx
 import numpy as np
 import pytest
 from bad_inputs import ptcc
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, batch, certify, certify_many
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
+from ptcc_certify.batch.settings import Settings
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph
@@ -1041,3 +1043,20 @@ def test_ctrl_c_while_processes_start_is_one_line(delay: float):
     assert (process.returncode, out) == (130, "")
     (line,) = err.splitlines()
     assert line.startswith("ptcc: interrupted; ")
+
+
+def test_a_row_takes_one_thread_of_linear_algebra(monkeypatch: pytest.MonkeyPatch):
+    """Processes side by side are better than threads; afterwards these are as many as before."""
+    graph, seen = rows_module._graph, []
+
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    def watched(*args: Any) -> SignedDigraph:
+        seen.append(threads())
+        return graph(*args)
+
+    monkeypatch.setattr(rows_module, "_graph", watched)
+    with threadpool_limits(2, user_api="blas"):
+        row = rows_module.certified_row("fig1a", load_graph("fig1a"), Settings(NominalProtocol(1, 1, 1, 1)))
+        assert (row["verdict"], seen) == ("certified", [{1}]) and max(threads()) == 2

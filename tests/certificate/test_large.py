@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from generators import all_classes, random_graph
-from lmi.exact.sparse import residual_definite
 from mutations import Json, changed, resealed
 from scipy.linalg import expm
 from scipy.sparse.linalg import eigs

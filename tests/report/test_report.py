@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 from bad_inputs import ptcc
 from generators import sparse_digraph
+from jinja2 import UndefinedError
 
 import ptcc_certify
 from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
@@ -34,9 +35,9 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.report import report_html, report_latex, write_report
-from ptcc_certify.report.page import ROWS
+from ptcc_certify.report.page import ROWS, _environment
 from ptcc_certify.report.statement import _tex
-from ptcc_certify.report.texts import LISTED
+from ptcc_certify.report.texts import LISTED, printable
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -46,7 +47,7 @@ TAGS = frozenset(
         "[a-z0-9]+",
         "html head meta title style body main h1 h2 h3 div strong span p nav ul li a section table caption thead tbody "
         "tr th td code pre q cite details summary figure figcaption bdi sub sup svg g defs clippath path rect use "
-        "math mrow mi mo mn mfrac msub msup msubsup munder mover munderover mspace mtable mtr mtd",
+        "math mrow mi mo mn mtext mfrac msub msup msubsup munder mover munderover mspace mtable mtr mtd",
     )
 )
 HOSTILE = [
@@ -389,6 +390,23 @@ def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
     assert "x" * 100 not in page.text
 
 
+def test_templates_escape_what_they_show():
+    """Nothing in them turns the escaping off, and a label that is HTML, or a template, is shown as it stands."""
+    folder = resources.files("ptcc_certify.report") / "templates"
+    sources = {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir()}
+    assert sorted(sources) == sorted(_environment().list_templates()) and "page.html" in sources
+    for source in sources.values():
+        assert not re.search(r"\|\s*safe|autoescape|<script|\bon[a-z]+=", source)
+    for text in (*HOSTILE, "{{ saved }}", "{% raw %}", "{# #}"):
+        shown = _environment().from_string("<p title='{{ x }}'>{{ x }}</p>{{ x|label }}{{ [x]|labels }}").render(x=text)
+        page = Page(shown)
+        assert [tag for tag, _ in page.tags] == ["p", "bdi", "bdi"] and list(page.tags[0][1]) == ["title"]
+        assert page.tags[0][1]["title"] == page.pieces[0][1] == printable(text, 2000)
+        assert page.pieces[1][1] == page.pieces[2][1] == printable(text)
+    with pytest.raises(UndefinedError):
+        _environment().from_string("{{ saved.rate }}").render()
+
+
 def test_a_rejected_certificate_is_called_rejected_and_nothing_else(tmp_path: Path):
     made = example("nominal")
     made.save(tmp_path / "c.json")
@@ -487,7 +505,7 @@ def test_the_equations_are_those_of_the_protocol(protocol: Any, tmp_path: Path):
     latex = protocol.latex()
     assert " ".join(latex.split()) == tree.attrib["alttext"]
     names = {"\u03c1": "rho", "\u03ba": "kappa", "\u03bc": "mu", "\u03c3": "sigma", "\u03c2": "varsigma"}
-    shown = [names.get(x.text or "", x.text or "") for x in tree.iter() if x.tag in ("mi", "mn")]
+    shown = [names.get(x.text or "", x.text or "") for x in tree.iter() if x.tag in ("mi", "mn", "mtext") and x.text]
     bare = re.sub(
         r"\\(begin|end)\{\w+\}|\\(left|right|frac|sum|quad|dot|ge|le|operatorname|mathrm)(?![A-Za-z])", " ", latex
     )
