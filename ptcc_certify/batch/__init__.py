@@ -126,9 +126,8 @@ def certify_many(
             progress(len(rows), len(chosen), errors)
             missing = [number for number in range(len(chosen)) if number not in rows]
             tasks = (chosen[number].task(number) for number in missing)
-            for task, row in stack.enter_context(
-                closing(compute_rows(tasks, asked, min(workers, len(missing)), scheduler))
-            ):
+            where = (max(1, min(workers, len(missing))), scheduler if missing else None)
+            for task, row in stack.enter_context(closing(compute_rows(tasks, asked, *where))):
                 rows[task.number] = row
                 if journal is not None:
                     journal.append(task.mark, row)

@@ -22,7 +22,7 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.report.figures import INPUT_NODES, draw
 from ptcc_certify.report.page import rejected_html, report_html
-from ptcc_certify.report.plots import figure_bytes
+from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.statement import report_latex
 
 #: What a report is written as.

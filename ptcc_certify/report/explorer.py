@@ -30,7 +30,8 @@ from ptcc_certify.lyapunov.search import METHODS, sharpen
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.nominal import NominalProtocol, Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plot_trajectory
+from ptcc_certify.report.plots.style import SINGLE_COLUMN, STYLE, new_axes
+from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems import theorem_for

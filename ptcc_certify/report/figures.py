@@ -7,7 +7,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.saved import SavedCertificate
-from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import DRAWN_NODES, plot_graph
+from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.trajectory import plot_sliding
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:

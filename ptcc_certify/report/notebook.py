@@ -12,7 +12,11 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.report.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.trade_off import plot_trade_off
+from ptcc_certify.report.plots.trajectory import plot_run
 from ptcc_certify.report.screen import certificate_lines, structure_lines
 from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
 

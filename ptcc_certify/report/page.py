@@ -20,7 +20,7 @@ from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.markup import bullets, document, folded, table, verdict_box
 from ptcc_certify.report.mathml import equations, symbol
-from ptcc_certify.report.plots import DRAWN_NODES
+from ptcc_certify.report.plots.graph import DRAWN_NODES
 from ptcc_certify.report.screen import remarks_on, structure_text
 from ptcc_certify.report.texts import (
     AUTHORS,
