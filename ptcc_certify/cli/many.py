@@ -73,28 +73,27 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
     if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out")
     protocol, total = shared.protocol_of(options, ()), 0
-    with counting() as show, _interrupted_by_term():
+    where: dict[str, Any] = {"workers": workers or many.default_workers(), "scheduler": scheduler}
+    try:
+        with counting() as show, _interrupted_by_term():
 
-        def progress(*counts: int) -> None:
-            nonlocal total
-            if output and total == 0 and counts[0]:
-                click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
-            total = counts[1]
-            show(*counts)
+            def progress(*counts: int) -> None:
+                nonlocal total
+                if output and total == 0 and counts[0]:
+                    click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
+                total = counts[1]
+                show(*counts)
 
-        where = {"workers": workers or many.default_workers(), "scheduler": scheduler}
-        try:
-            rows = many.certify_many(
-                pattern, protocol, output=output, restart=restart, progress=progress, **where, **settings
-            )
-        except BaseException as error:
-            found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
-            if found or stopped:
-                kept = _kept(found, total, output, restart)
-                click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
-            if stopped:
-                return INTERRUPTED
-            raise
+            where |= {"output": output, "restart": restart, "progress": progress}
+            rows = many.certify_many(pattern, protocol, **where, **settings)
+    except BaseException as error:
+        found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+        if found or stopped:
+            kept = _kept(found, total, output, restart)
+            click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
+        if stopped:
+            return INTERRUPTED
+        raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
     else:
