@@ -24,6 +24,7 @@ from ptcc_certify.bounds.final_state import exact_start, outcome
 from ptcc_certify.certificate.certificate import Certificate, certify
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import METHODS, sharpen
@@ -47,8 +48,6 @@ KINDS = ("nominal", "sliding-mode")
 DISTURBANCES = ("none", "adversary", "sin", "telegraph")
 #: The name of a graph that is given, among those of the packaged ones.
 GIVEN = "given graph"
-#: Largest graph that is explored, and the largest whose certificate is checked unasked.
-EXPLORED_NODES, CHECKED_NODES = 120, 24
 #: Values of ``s`` times the largest rate that is possible, at which the bound should be small, whatever the gains.
 _CLOCKS = (4.0,)
 #: Parameters of the protocols with what they begin with; their sliders go up to 3, but for some.

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.saved import SavedCertificate
+from ptcc_certify.graphs.limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.graph import DRAWN_NODES, plot_graph
+from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trajectory import plot_sliding
@@ -16,9 +17,6 @@ from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-#: Agents up to which there is a figure of every agent's input.
-INPUT_NODES = 100
 
 
 def draw(saved: SavedCertificate, wanted: Sequence[str]) -> dict[str, Figure]:

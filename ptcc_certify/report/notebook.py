@@ -11,6 +11,7 @@ import html
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from ptcc_certify.graphs.limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from ptcc_certify.gain_design import Design
     from ptcc_certify.graphs.digraph import SignedDigraph
 
-#: Largest graph that is drawn unasked: a layout takes seconds above.
-SHOWN_NODES = 120
 # Where the text of a line of a screen begins, after its head.
 _HEAD = 11
 

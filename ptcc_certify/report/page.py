@@ -15,12 +15,12 @@ from ptcc_certify.bounds.input import Effort
 from ptcc_certify.certificate.document import producer
 from ptcc_certify.certificate.saved import RejectedCertificate, SavedCertificate
 from ptcc_certify.graphs.io.graph_files import reading_flags
+from ptcc_certify.graphs.limits import DRAWN_NODES
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.markup import bullets, document, folded, table, verdict_box
 from ptcc_certify.report.mathml import equations, symbol
-from ptcc_certify.report.plots.graph import DRAWN_NODES
 from ptcc_certify.report.screen import remarks_on, structure_text
 from ptcc_certify.report.texts import (
     AUTHORS,

@@ -16,10 +16,9 @@ from ptcc_certify.certificate import certificate as certificates
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.report import explorer as module
 from ptcc_certify.report.explorer import (
-    CHECKED_NODES,
-    EXPLORED_NODES,
     GIVEN,
     Explorer,
     Settings,

@@ -21,10 +21,11 @@ from ptcc_certify.certificate.certificate import Certificate, certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.nominal import NominalProtocol
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.graph import DRAWN_NODES, EDGE_STYLES, HALO, KAMADA_NODES, LABELLED_NODES, plot_graph
+from ptcc_certify.report.plots.graph import EDGE_STYLES, HALO, plot_graph
 from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import CAMP_COLOURS, DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, save_figure

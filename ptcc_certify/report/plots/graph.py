@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import CAMP_COLOURS, SINGLE_COLUMN, axes_of, camp_groups, finished, styled
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Colour and line of an edge from an ally (+1) or an opponent (-1).
 EDGE_STYLES = {1: ("#4477AA", "-", "ally"), -1: ("#AA3344", "--", "opponent")}
-#: Largest graph that is drawn, whose nodes are labelled, and whose layout is that of Kamada and Kawai.
-DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
 #: Colour and width, in points, of what marks the closed components of a graph.
 HALO = ("#DDDDDD", 22)
 
