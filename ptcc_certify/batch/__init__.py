@@ -71,7 +71,7 @@ def certify_many(
     progress : callable
         Is told how many rows are there, how many there will be, and how many of them have an error; first before any
         work.
-    **settings
+    **settings : keywords of :class:`Settings`
         What a row depends on besides its graph and the protocol; here with the defaults:
 
         - ``x0="random"``, ``seed=0``, ``sigma0=None``: the start, and the sliding variables at 0, as numbers in node

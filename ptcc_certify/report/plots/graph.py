@@ -64,22 +64,21 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     if structure.followers.size:
         ax.plot([], [], color=HALO[0], linewidth=6, label="leader group")
     radius = _draw_nodes(ax, structure, place)
-    for sign, (colour, line, name) in EDGE_STYLES.items():
-        own, width = graph.sign == sign, 0.6 if many else 1.1
-        looks: dict[str, Any] = {"color": colour, "linestyle": line, "linewidth": width}
-        for source, target in zip(graph.source[own].tolist(), graph.target[own].tolist(), strict=True):
-            apart: dict[str, Any] = {
-                "shrinkA": radius[source],
-                "shrinkB": radius[target],
-                "connectionstyle": "arc3,rad=0.1",
-            }
-            head = 5 if many else 9
-            arrow = FancyArrowPatch(
-                place[source], place[target], arrowstyle="-|>", mutation_scale=head, **apart, **looks
-            )
-            ax.add_artist(arrow).set_zorder(1)
-        if own.any():
-            ax.plot([], [], label=name, **looks)
+    looks: dict[int, dict[str, Any]] = {
+        sign: {"color": colour, "linestyle": line, "linewidth": 0.6 if many else 1.1}
+        for sign, (colour, line, _) in EDGE_STYLES.items()
+    }
+    for source, target, sign in zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), strict=True):
+        apart: dict[str, Any] = {
+            "shrinkA": radius[source],
+            "shrinkB": radius[target],
+            "connectionstyle": "arc3,rad=0.1",
+        }
+        head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9}
+        ax.add_artist(FancyArrowPatch(place[source], place[target], zorder=1, **head, **apart, **looks[sign]))
+    for sign, (_, _, name) in EDGE_STYLES.items():
+        if (graph.sign == sign).any():
+            ax.plot([], [], label=name, **looks[sign])
     if not many:
         _draw_labels(ax, graph.labels, place, radius)
     ax.set_aspect("equal")
