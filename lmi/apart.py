@@ -12,6 +12,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from contextvars import ContextVar
 from typing import Any
 
 from lmi.deadline import checkpoint, seconds_left
@@ -19,6 +20,8 @@ from lmi.errors import LMIError
 
 _HEAD = 8
 _ITEM, _ERROR, _END = range(3)
+#: Whether another thread than the main one may copy its process: all others are idle, and hold nothing.
+any_thread: ContextVar[bool] = ContextVar("any_thread", default=False)
 #: PR_SET_PDEATHSIG of Linux.
 _DEATH_SIGNAL = 1
 
@@ -55,7 +58,8 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
     [0, 1, 4]
     """
     checkpoint()
-    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+    main = threading.current_thread() is threading.main_thread()
+    if sys.platform != "linux" or not (main or any_thread.get()):
         yield from work()
         return
     here, there = os.pipe()

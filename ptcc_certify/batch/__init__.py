@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.journal import Journal, journal_path
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import Settings, Start, whole_number
+from ptcc_certify.batch.settings import Settings, whole_number
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.batch.table import refuse_table, table_bytes
 from ptcc_certify.errors import ParameterError, PTCCError
@@ -37,25 +37,12 @@ def certify_many(
     sources: Any,
     protocol: Protocol,
     *,
-    x0: Start = "random",
-    seed: int = 0,
-    sigma0: Start = None,
-    disturbance: str | None = None,
-    method: str = "best",
-    simulation: bool | None = False,
-    initial_bound: Any = None,
-    expect: str | None = None,
-    min_rate: Any = None,
-    orientation: str | None = None,
-    duplicates: Literal["refuse", "sum", "last"] = "refuse",
-    drop_self_loops: bool = False,
-    undirected: bool = False,
-    time_limit: float | None = None,
     workers: int = 1,
     scheduler: str | None = None,
     output: str | os.PathLike[str] | None = None,
     restart: bool = False,
     progress: Callable[[int, int, int], None] = lambda done, total, errors: None,
+    **settings: Any,
 ) -> list[Row]:
     """Certify many graphs, and return or write a table with one row for each.
 
@@ -69,36 +56,9 @@ def certify_many(
         matches has an error. A file that is named several times, in whatever way or through links, has one row, under
         the first of its names. Paths are read as they are written, and a leading ``./`` is left out of names.
     protocol : NominalProtocol or SlidingModeProtocol
-    x0 : "random", str, sequence of numbers, mapping, pandas Series or None
-        ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
-        and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
-        an error.
-    seed : int
-        Of random starts and telegraph signals.
-    sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
-        Sliding mode: the sliding variables at 0, like ``x0``; None: 0.
-    disturbance : str, optional
-        Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the adversary by default.
-    method : {"best", "paper", "perron", "lmi", "full"}
-        As in :func:`ptcc_certify.certify`.
-    simulation : bool or None
-        Compare with CVODES runs; None: of up to 10,000 agents.
-    initial_bound : positive number, optional
-        Bound the input for all starts with ``|x_k(0)| <= initial_bound`` instead of ``x0``.
-    expect : str, optional
-        A behaviour that every graph should show.
-    min_rate : positive number, optional
-        A rate that should be proved for every graph, per unit of the stretched clock.
-    orientation : {"information", "listens"}, optional
-        How files are read, as the next three; see :func:`ptcc_certify.read_graph`.
-    duplicates : {"refuse", "sum", "last"}
-        What becomes of two rows for the same ordered pair.
-    drop_self_loops, undirected : bool
-        Drop self-loops; let each edge go both ways.
-    time_limit : float, optional
-        Seconds for each graph, as in :func:`ptcc_certify.certify`; the column ``cut_off`` names what they ended.
     workers : int
-        Processes on this machine, through joblib; 1: in this process.
+        Processes on this machine; 1: in this process. A script that wants more calls this under
+        ``if __name__ == "__main__":``.
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://host:8786``; it and its workers have the same version of this package.
     output : path, optional
@@ -111,6 +71,18 @@ def certify_many(
     progress : callable
         Is told how many rows are there, how many there will be, and how many of them have an error; first before any
         work.
+    **settings : keywords of :class:`Settings`
+        What a row depends on besides its graph and the protocol; here with the defaults:
+
+        - ``x0="random"``, ``seed=0``, ``sigma0=None``: the start, and the sliding variables at 0, as numbers in node
+          order, by label, or ``"random"``: then every graph has its own, a function of ``seed`` and the graph;
+        - ``disturbance=None``: what a simulated run meets under the sliding-mode protocol;
+        - ``method="best"``, ``simulation=False``, ``time_limit=None`` (seconds for each graph), ``expect=None``,
+          ``min_rate=None``, ``initial_bound=None``;
+        - ``orientation=None``, ``duplicates="refuse"``, ``drop_self_loops=False``, ``undirected=False``: how files are
+          read, see :func:`ptcc_certify.read_graph`.
+
+        :class:`ptcc_certify.batch.Settings` tells all about each.
 
     Returns
     -------
@@ -135,72 +107,50 @@ def certify_many(
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
     """
-    settings = Settings(
-        protocol=protocol,
-        x0=x0,
-        seed=seed,
-        sigma0=sigma0,
-        disturbance=disturbance,
-        method=method,
-        simulation=simulation,
-        initial_bound=initial_bound,
-        expect=expect,
-        min_rate=min_rate,
-        orientation=orientation,
-        duplicates=duplicates,
-        drop_self_loops=drop_self_loops,
-        undirected=undirected,
-        time_limit=time_limit,
-    )
-    workers = whole_number(workers, "workers", 1)
+    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1)
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
     chosen = chosen_sources(sources, () if path is None else (path, journal_path(path)))
-
     rows: dict[int, Row] = {}
-
-    def so_far() -> list[Row]:
-        return [rows[number] for number in sorted(rows)]
-
-    def complete(keep: Callable[[str, Row], None]) -> list[Row]:
-        """Compute the rows that are missing and keep each as it comes; return all in their order."""
-        errors = sum(row["error"] is not None for row in rows.values())
-        progress(len(rows), len(chosen), errors)
-        missing = [number for number in range(len(chosen)) if number not in rows]
-        if missing:
+    with ExitStack() as stack:
+        journal = None
+        if path is not None:
+            refuse_table(path, chosen, restart or journal_path(path).exists())  # a table that is replaced has one
+            journal = stack.enter_context(closing(Journal(journal_path(path), chosen, asked, restart)))
+            if journal.new:  # another batch may have written the table meanwhile, and removed its journal
+                refuse_table(path, chosen, restart)
+            rows |= journal.current()
+        try:
+            errors = sum(row["error"] is not None for row in rows.values())
+            progress(len(rows), len(chosen), errors)
+            missing = [number for number in range(len(chosen)) if number not in rows]
             tasks = (chosen[number].task(number) for number in missing)
-            with closing(compute_rows(tasks, settings, min(workers, len(missing)), scheduler)) as found:
-                for task, row in found:
-                    rows[task.number] = row
-                    keep(task.mark, row)
-                    errors += row["error"] is not None
-                    progress(len(rows), len(chosen), errors)
-        return so_far()
-
-    if path is None:
-        try:
-            return complete(lambda *_: None)
+            where = (max(1, min(workers, len(missing))), scheduler if missing else None)
+            for task, row in stack.enter_context(closing(compute_rows(tasks, asked, *where))):
+                rows[task.number] = row
+                if journal is not None:
+                    journal.append(task.mark, row)
+                errors += row["error"] is not None
+                progress(len(rows), len(chosen), errors)
         except BaseException as error:
-            error.rows = so_far()  # type: ignore[attr-defined]
-            raise
-    # A table that is being replaced has a journal.
-    refuse_table(path, chosen, restart or journal_path(path).exists())
-    with closing(Journal(journal_path(path), chosen, settings, restart)) as journal:
-        if journal.new:  # another batch may have written the table, and removed its journal, since it was looked for
-            refuse_table(path, chosen, restart)
-        rows.update(journal.current())
-        try:
-            table = complete(journal.append)
-        except BaseException as error:
-            error.rows = so_far()  # type: ignore[attr-defined]
-            if rows:
+            error.rows = _in_order(rows)  # type: ignore[attr-defined]
+            if path is not None and rows:
                 with suppress(PTCCError, OSError):  # what stopped the batch is told, not what came of it
-                    write_atomically(path, table_bytes(so_far(), path.suffix.lower()))
+                    _write(path, rows)
             raise
-        write_atomically(path, table_bytes(table, path.suffix.lower()))
-        journal.remove()
-    return table
+        if path is not None and journal is not None:
+            _write(path, rows)
+            journal.remove()
+    return _in_order(rows)
+
+
+def _in_order(rows: dict[int, Row]) -> list[Row]:
+    return [rows[number] for number in sorted(rows)]
+
+
+def _write(path: Path, rows: dict[int, Row]) -> None:
+    write_atomically(path, table_bytes(_in_order(rows), path.suffix.lower()))
 
 
 def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool = False) -> int:

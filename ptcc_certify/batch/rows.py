@@ -49,6 +49,7 @@ import io
 import math
 import threading
 import time
+from dataclasses import asdict
 from fractions import Fraction
 from typing import Any
 
@@ -68,43 +69,32 @@ from ptcc_certify.graphs.io import random_states, read_graph, read_state
 Row = dict[str, Any]
 #: The columns in their order, and of which type their entries are.
 COLUMNS: dict[str, type] = {
-    "graph": str,
-    "sha256": str,
-    "nodes": int,
-    "edges": int,
-    "negative": int,
-    "connectivity": str,
-    "components": int,
-    "leaders": int,
-    "followers": int,
-    "closed_components": int,
-    "balanced_leaders": int,
-    "balanced": bool,
-    "theorem": str,
-    "behaviour": str,
-    "verdict": str,
-    "useful": bool,
-    "asked": str,
-    "rate": float,
-    "upper_bound": float,
-    "optimality_ratio": float,
-    "fastest": str,
-    "prefactor": float,
-    "paper_rate": float,
-    "diagonal_rate": float,
-    "input_bounded": bool,
-    "peak_input": float,
-    "seed": int,
-    "largest_outcome": float,
-    "degenerate": bool,
-    "reaching_time": float,
-    "worst_ratio": float,
-    "bound_kept": bool,
-    "obligations": int,
-    "cut_off": str,
-    "note": str,
-    "seconds": float,
-    "error": str,
+    name: kind
+    for kind, names in (
+        (str, "graph sha256"),
+        (int, "nodes edges negative"),
+        (str, "connectivity"),
+        (int, "components leaders followers closed_components balanced_leaders"),
+        (bool, "balanced"),
+        (str, "theorem behaviour verdict"),
+        (bool, "useful"),
+        (str, "asked"),
+        (float, "rate upper_bound optimality_ratio"),
+        (str, "fastest"),
+        (float, "prefactor paper_rate diagonal_rate"),
+        (bool, "input_bounded"),
+        (float, "peak_input"),
+        (int, "seed"),
+        (float, "largest_outcome"),
+        (bool, "degenerate"),
+        (float, "reaching_time worst_ratio"),
+        (bool, "bound_kept"),
+        (int, "obligations"),
+        (str, "cut_off note"),
+        (float, "seconds"),
+        (str, "error"),
+    )
+    for name in names.split()
 }
 # python-flint keeps one working precision for a whole process: its threads take turns.
 _ONE_AT_A_TIME = threading.Lock()
@@ -161,13 +151,7 @@ def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
         return ensemble.graph(i)
     file = io.BytesIO(payload)
     file.name = name if name != "-" else "./-"  # its ending tells the format, and - is not standard input here
-    return read_graph(
-        file,
-        orientation=settings.orientation,
-        duplicates=settings.duplicates,
-        drop_self_loops=settings.drop_self_loops,
-        undirected=settings.undirected,
-    )
+    return read_graph(file, **asdict(settings.reading))
 
 
 def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certificate:

@@ -29,8 +29,67 @@ INSTALL = 'install it with: pip install "ptcc-certify[batch]"'
 
 
 @dataclass(frozen=True)
+class Reading:
+    """How files are read; see :func:`ptcc_certify.read_graph`.
+
+    Attributes
+    ----------
+    orientation : {"information", "listens"}, optional
+    duplicates : {"refuse", "sum", "last"}
+        What becomes of two rows for the same ordered pair.
+    drop_self_loops, undirected : bool
+        Drop self-loops; let each edge go both ways.
+    """
+
+    orientation: str | None = None
+    duplicates: Literal["refuse", "sum", "last"] = "refuse"
+    drop_self_loops: bool = False
+    undirected: bool = False
+
+
+@dataclass(frozen=True)
 class Settings:
-    """Everything that a row depends on besides its graph; see :func:`ptcc_certify.certify_many` for the entries."""
+    """Everything that a row depends on besides its graph.
+
+    Attributes
+    ----------
+    protocol : NominalProtocol or SlidingModeProtocol
+    x0 : "random", str, sequence of numbers, mapping, pandas Series or None
+        ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
+        and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
+        an error.
+    seed : int
+        Of random starts and telegraph signals.
+    sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
+        Sliding mode: the sliding variables at 0, like ``x0``; None: 0.
+    disturbance : str, optional
+        Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the adversary by default.
+    method : {"best", "paper", "perron", "lmi", "full"}
+        As in :func:`ptcc_certify.certify`.
+    simulation : bool or None
+        Compare with CVODES runs; None: of up to 10,000 agents.
+    initial_bound : positive number, optional
+        Bound the input for all starts with ``|x_k(0)| <= initial_bound`` instead of ``x0``.
+    expect : str, optional
+        A behaviour that every graph should show.
+    min_rate : positive number, optional
+        A rate that should be proved for every graph, per unit of the stretched clock.
+    time_limit : float, optional
+        Seconds for each graph, as in :func:`ptcc_certify.certify`; the column ``cut_off`` names what they ended.
+    reading : Reading
+        How files are read.
+
+    Raises
+    ------
+    ParameterError
+        A setting is outside its domain.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> Settings.of(NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), seed=3, undirected=True).reading.undirected
+    True
+    """
 
     protocol: Protocol
     x0: Start = "random"
@@ -42,11 +101,14 @@ class Settings:
     initial_bound: Fraction | None = None
     expect: str | None = None
     min_rate: Fraction | None = None
-    orientation: str | None = None
-    duplicates: Literal["refuse", "sum", "last"] = "refuse"
-    drop_self_loops: bool = False
-    undirected: bool = False
     time_limit: float | None = None
+    reading: Reading = Reading()
+
+    @classmethod
+    def of(cls, protocol: Protocol, **settings: Any) -> Settings:
+        """Return the settings of these keywords: the names of the fields, and those of :class:`Reading`."""
+        reading = {name: settings.pop(name) for name in Reading.__dataclass_fields__ if name in settings}
+        return cls(protocol, **settings, reading=Reading(**reading))
 
     def __post_init__(self) -> None:
         if not isinstance(self.protocol, Protocol):
@@ -55,18 +117,7 @@ class Settings:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         if self.method not in METHODS:
             raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
-        object.__setattr__(self, "seed", whole_number(self.seed, "seed", 0))
         sliding = self.protocol.reaching is not None
-        for name in ("x0", "sigma0"):
-            start = getattr(self, name)
-            if (labelled := by_label(start, name)) is not None:
-                object.__setattr__(self, name, start := labelled)
-            if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
-                raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
-            try:
-                _plain(start)  # refuses what is no number, before the work
-            except NumberError as error:
-                raise ParameterError(f"{name}: {error}") from None
         for name in ("sigma0", "disturbance"):
             if getattr(self, name) is not None and not sliding:
                 raise ParameterError(
@@ -74,23 +125,16 @@ class Settings:
                 )
         if self.disturbance is not None:
             self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
-        for name in ("initial_bound", "min_rate"):
-            if (value := getattr(self, name)) is not None:
-                try:
-                    number = as_fraction(value)
-                except NumberError as error:
-                    raise ParameterError(f"{name}: {error}") from None
-                if number <= 0:
-                    raise ParameterError(f"{name} is outside its domain; it must be > 0")
-                object.__setattr__(self, name, number)
-        if self.time_limit is not None:
-            try:
-                seconds = nearest_float(as_fraction(self.time_limit, "time_limit"))  # type: ignore[arg-type]
-            except NumberError as error:
-                raise ParameterError(f"time_limit: {error}") from None
-            if not 0 < seconds < math.inf:
-                raise ParameterError("time_limit is outside its domain; it must be > 0, in seconds")
-            object.__setattr__(self, "time_limit", seconds)
+        checked = {
+            "seed": whole_number(self.seed, "seed", 0),
+            "x0": _start(self.x0, "x0"),
+            "sigma0": _start(self.sigma0, "sigma0"),
+            "initial_bound": _positive(self.initial_bound, "initial_bound"),
+            "min_rate": _positive(self.min_rate, "min_rate"),
+            "time_limit": _seconds(self.time_limit),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         if self.expect is not None:
             try:
                 object.__setattr__(self, "expect", behaviour_name(self.expect))
@@ -99,8 +143,8 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as JSON takes them."""
-        entries = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {name: _plain(value) for name, value in entries.items()}
+        entries = vars(self) | vars(self.reading)
+        return {name: _plain(value) for name, value in entries.items() if name != "reading"}
 
     def seed_of(self, graph: SignedDigraph) -> int:
         """Return the seed of a graph's own random start: 32 bits of a hash of ``seed`` and the graph."""
@@ -123,6 +167,39 @@ def whole_number(value: Any, name: str, least: int) -> int:
         domain = f"an integer from {least} to {LARGEST_SETTING}"
         raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
     return number
+
+
+def _start(start: Start, name: str) -> Start:
+    """Return a start as a row takes it; refuse a file, and what is no number."""
+    if (labelled := by_label(start, name)) is not None:
+        start = labelled
+    if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
+        raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
+    try:
+        _plain(start)
+    except NumberError as error:
+        raise ParameterError(f"{name}: {error}") from None
+    return start
+
+
+def _positive(value: Any, name: str, unit: str = "") -> Fraction | None:
+    if value is None:
+        return None
+    try:
+        number = as_fraction(value)
+    except NumberError as error:
+        raise ParameterError(f"{name}: {error}") from None
+    if number <= 0:
+        raise ParameterError(f"{name} is outside its domain; it must be > 0{unit}")
+    return number
+
+
+def _seconds(time_limit: Any) -> float | None:
+    number = _positive(time_limit, "time_limit", ", in seconds")
+    seconds = None if number is None else nearest_float(number)
+    if seconds is not None and not 0 < seconds < math.inf:
+        raise ParameterError("time_limit is outside its domain; it must be > 0, in seconds")
+    return seconds
 
 
 def _text(value: Any) -> str:

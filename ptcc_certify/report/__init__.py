@@ -19,17 +19,16 @@ from pathlib import Path
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.report.figures import INPUT_NODES, draw
+from ptcc_certify.graphs.limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
-from ptcc_certify.report.plots import figure_bytes
+from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.statement import report_latex
 
 #: What a report is written as.
 SUFFIXES = (".html", ".htm", ".tex")
-#: Agents up to which a run is repeated unasked.
-SIMULATED_NODES = 1000
 
-__all__ = ["SIMULATED_NODES", "SUFFIXES", "rejected_html", "report_html", "report_latex", "write_report"]
+__all__ = ["SUFFIXES", "rejected_html", "report_html", "report_latex", "write_report"]
 
 
 def write_report(
@@ -126,8 +125,8 @@ def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate,
         return saved, "it was left out (--no-simulation)"
     if saved.start is None:
         return saved, "the certificate names no start"
-    if simulation is None and n > SIMULATED_NODES:
-        return saved, f"above {SIMULATED_NODES} agents it is repeated only where that is asked for"
+    if simulation is None and n > REPEATED_NODES:
+        return saved, f"above {REPEATED_NODES} agents it is repeated only where that is asked for"
     try:
         return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), ""
     except (SimulationError, ParameterError) as error:

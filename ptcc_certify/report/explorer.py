@@ -11,10 +11,10 @@ import html
 import io
 import math
 import textwrap
-from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,18 +25,21 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import METHODS, sharpen
 from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.plots import SINGLE_COLUMN, STYLE, new_axes, plot_sliding, plot_trajectory
+from ptcc_certify.report.plots.style import SINGLE_COLUMN, STYLE, new_axes
+from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
     from ipywidgets import VBox
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from ptcc_certify.graphs.digraph import SignedDigraph
@@ -45,25 +48,24 @@ KINDS = ("nominal", "sliding-mode")
 DISTURBANCES = ("none", "adversary", "sin", "telegraph")
 #: The name of a graph that is given, among those of the packaged ones.
 GIVEN = "given graph"
-#: Largest graph that is explored, and the largest whose certificate is checked unasked.
-EXPLORED_NODES, CHECKED_NODES = 120, 24
 #: Values of ``s`` times the largest rate that is possible, at which the bound should be small, whatever the gains.
 _CLOCKS = (4.0,)
-#: Parameters of each kind of protocol, with the largest value of their sliders.
-_SLIDERS = {
-    "T": 3.0,
-    "T_r": 3.0,
-    "T_s": 3.0,
-    "rho1": 3.0,
-    "rho2": 3.0,
-    "kappa": 5.0,
-    "mu1": 5.0,
-    "mu2": 3.0,
-    "mu3": 3.0,
-    "delta": 3.0,
+#: Parameters of the protocols with what they begin with; their sliders go up to 3, but for some.
+_BEGIN = {
+    "T": 1,
+    "T_r": 0.5,
+    "T_s": 0.5,
+    "rho1": 0.2,
+    "rho2": 0.5,
+    "kappa": 1,
+    "mu1": 2,
+    "mu2": 1,
+    "mu3": 1,
+    "delta": 1,
 }
+_LARGEST, _LARGER = 3.0, {"kappa": 5.0, "mu1": 5.0}
 _NOMINAL = ("T", "rho1", "rho2", "kappa")
-_SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
+_SLIDING = tuple(name for name in _BEGIN if name != "T")
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
 _SHOWN = ("claim", "ends at", "sliding", "disturbed", "rate", "left", "proof", "input", "INPUT", "simulated", "note")
 _SAMPLES, _DPI = 81, 120
@@ -74,18 +76,14 @@ _SWITCHES = 5
 _WITHOUT_WIDGETS = "controls need a notebook with ipywidgets: pip install 'ptcc-certify[notebook]'"
 
 
-@dataclass(frozen=True)
 class Settings:
     """What the controls are set to.
 
-    Attributes
+    Parameters
     ----------
     graph : str
         A packaged graph, or ``"given graph"``.
     kind : {"nominal", "sliding-mode"}
-    T, T_r, T_s, rho1, rho2, kappa, mu1, mu2, mu3, delta : number or str
-        Parameters of the protocol; those of the other kind are ignored. A float is taken as the decimal of 12 digits
-        that it stands for: 0.6 is 3/5.
     reaching : bool
         Sliding mode: whether ``sigma(0)`` is random, or 0, which leaves no reaching phase.
     disturbance : {"none", "adversary", "sin", "telegraph"}
@@ -94,11 +92,14 @@ class Settings:
         Of the start, of ``sigma(0)`` and of telegraph signals: whole numbers from -9 to 9.
     method : {"best", "paper", "perron", "lmi", "full"}
         Classes of Lyapunov functions; see :mod:`ptcc_certify.lyapunov.search`.
+    **parameters : number or str
+        Parameters of the protocol: ``T, T_r, T_s, rho1, rho2, kappa, mu1, mu2, mu3, delta``; those of the other kind
+        are ignored. A float is taken as the decimal of 12 digits that it stands for: 0.6 is 3/5.
 
     Raises
     ------
     ParameterError
-        An unknown kind, disturbance or method, or a negative seed.
+        An unknown kind, disturbance, method or parameter, or a negative seed.
 
     Examples
     --------
@@ -106,28 +107,44 @@ class Settings:
     NominalProtocol(T=3/5, rho1=1/5, rho2=3/10, kappa=1)
     """
 
-    graph: str = "fig3a"
-    kind: str = "nominal"
-    T: Any = 1
-    T_r: Any = 0.5
-    T_s: Any = 0.5
-    rho1: Any = 0.2
-    rho2: Any = 0.5
-    kappa: Any = 1
-    mu1: Any = 2
-    mu2: Any = 1
-    mu3: Any = 1
-    delta: Any = 1
-    reaching: bool = True
-    disturbance: str = "adversary"
-    seed: int = 0
-    method: str = "best"
+    def __init__(
+        self,
+        graph: str = "fig3a",
+        kind: str = "nominal",
+        *,
+        reaching: bool = True,
+        disturbance: str = "adversary",
+        seed: int = 0,
+        method: str = "best",
+        **parameters: Any,
+    ):
+        for name, value, known in (
+            ("kind", kind, KINDS),
+            ("disturbance", disturbance, DISTURBANCES),
+            ("method", method, METHODS),
+            *(("parameter", name, _BEGIN) for name in parameters),
+        ):
+            _refuse_unknown(name, value, known)
+        if seed < 0:
+            raise ParameterError(f"seed = {seed} is outside its domain; seed must be >= 0")
+        self.graph, self.kind, self.reaching, self.disturbance = graph, kind, reaching, disturbance
+        self.seed, self.method = seed, method
+        self.parameters = _BEGIN | parameters
 
-    def __post_init__(self) -> None:
-        for name, known in (("kind", KINDS), ("disturbance", DISTURBANCES), ("method", METHODS)):
-            _refuse_unknown(name, getattr(self, name), known)
-        if self.seed < 0:
-            raise ParameterError(f"seed = {self.seed} is outside its domain; seed must be >= 0")
+    def to_dict(self) -> dict[str, Any]:
+        """Return all settings by their names, the parameters of the protocol among them."""
+        own = {name: value for name, value in vars(self).items() if name != "parameters"}
+        return own | self.parameters
+
+    def changed(self, **changes: Any) -> Settings:
+        """Return these settings but for some.
+
+        Raises
+        ------
+        ParameterError
+            As for new ones.
+        """
+        return Settings(**self.to_dict() | changes)
 
     def protocol(self) -> Protocol:
         """Return the protocol.
@@ -138,7 +155,7 @@ class Settings:
             A parameter is outside its domain.
         """
         names = _NOMINAL if self.kind == "nominal" else _SLIDING
-        return Protocol.from_dict({"kind": self.kind, **{name: _decimal(getattr(self, name)) for name in names}})
+        return Protocol.from_dict({"kind": self.kind, **{name: _decimal(self.parameters[name]) for name in names}})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -366,78 +383,68 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
     import ipywidgets as widgets
 
     _refuse_unknown("graph", settings.graph, explorer.graphs)
-
-    wide = {"style": {"description_width": "85px"}, "layout": {"width": "310px"}}
-
-    def choice(name: str, options: tuple[str, ...], title: str) -> Any:
-        return widgets.Dropdown(options=options, value=getattr(settings, name), description=title, **wide)
-
-    def slider(name: str, largest: float) -> Any:
-        value = float(as_fraction(_decimal(getattr(settings, name)), name))
-        return widgets.FloatSlider(
-            value=value,
-            min=min(0.0, value),
-            max=max(largest, value),
-            step=0.05,
-            description=name,
-            continuous_update=False,
-            readout_format=".6g",
-            **wide,
-        )
-
-    panel: dict[str, Any] = {
-        "graph": choice("graph", tuple(explorer.graphs), "graph"),
-        "kind": choice("kind", KINDS, "protocol"),
-        "method": choice("method", METHODS[::-1], "bounds"),
-        "seed": widgets.IntSlider(
-            value=settings.seed,
-            min=0,
-            max=max(99, settings.seed),
-            description="start seed",
-            continuous_update=False,
-            **wide,
-        ),
-        **{name: slider(name, largest) for name, largest in _SLIDERS.items()},
-        "reaching": widgets.Checkbox(value=settings.reaching, description="sigma(0) random", indent=False),
-        "disturbance": choice("disturbance", DISTURBANCES, "disturbance"),
-    }
+    panel = _panel(explorer, settings.to_dict())
     image, text = widgets.Image(format="png"), widgets.HTML()
     button, box = widgets.Button(description="check"), widgets.HBox(layout={"flex_flow": "row wrap"})
 
     def wanted() -> Settings:
-        return Settings(**{f.name: panel[f.name].value for f in fields(Settings)})
+        return Settings(**{name: control.value for name, control in panel.items()})
 
     def tell(words: str) -> None:
         text.value = f"<pre>{html.escape(words)}</pre>"
 
+    def show(view: View, more: str = "") -> None:
+        tell(view.unchecked + more)
+        image.value = view.png
+
     def update(_: object = None) -> None:
         tell("verdict    none: not computed yet")  # nothing of the settings before may stay
         settings = wanted()
-        sliding = settings.kind != "nominal"
-        names = ("graph", "kind", "method", "seed", *(_SLIDING if sliding else _NOMINAL))
-        shown = tuple(panel[name] for name in (*names, *(("reaching", "disturbance") if sliding else ())))
+        own = _NOMINAL if settings.kind == "nominal" else (*_SLIDING, "reaching", "disturbance")
+        shown = tuple(panel[name] for name in ("graph", "kind", "method", "seed", *own))
         if box.children != shown:
             box.children = shown
         cheap = explorer.graphs[settings.graph].n_nodes <= CHECKED_NODES
         button.layout.display = "none" if cheap else None
         if not explorer.knows(settings):  # the paper's function is there at once
-            view = explorer.view(replace(settings, method="paper"))
-            tell(f"{view.unchecked}\nbounds     the paper's; the class {settings.method} is being searched")
-            image.value = view.png
+            searched = f"\nbounds     the paper's; the class {settings.method} is being searched"
+            show(explorer.view(settings.changed(method="paper")), searched)
         view = explorer.view(settings)
-        tell(view.unchecked)
-        image.value = view.png
+        show(view)
         if cheap:
             tell(view.text)
 
-    def check(_: object) -> None:
-        tell(explorer.view(wanted()).text)
-
     for control in panel.values():
         control.observe(update, names="value")
-    button.on_click(check)
+    button.on_click(lambda _: tell(explorer.view(wanted()).text))
     update()
     return widgets.VBox([box, button, text, image])
+
+
+def _panel(explorer: Explorer, begin: dict[str, Any]) -> dict[str, Any]:
+    """Return the controls by the names of the settings, set to what these begin with."""
+    import ipywidgets as widgets
+
+    wide = {"style": {"description_width": "85px"}, "layout": {"width": "310px"}}
+
+    def choice(name: str, options: tuple[str, ...], title: str) -> Any:
+        return widgets.Dropdown(options=options, value=begin[name], description=title, **wide)
+
+    def slider(name: str, largest: float) -> Any:
+        value = float(as_fraction(_decimal(begin[name]), name))
+        bounds = {"min": min(0.0, value), "max": max(largest, value), "step": 0.05, "readout_format": ".6g"}
+        return widgets.FloatSlider(value=value, description=name, continuous_update=False, **bounds, **wide)
+
+    seed, largest = begin["seed"], max(99, begin["seed"])
+    return {
+        "graph": choice("graph", tuple(explorer.graphs), "graph"),
+        "kind": choice("kind", KINDS, "protocol"),
+        "method": choice("method", METHODS[::-1], "bounds"),
+        "seed": widgets.IntSlider(seed, 0, largest, description="start seed", continuous_update=False, **wide),
+        **{name: slider(name, _LARGER.get(name, _LARGEST)) for name in _BEGIN},
+        "reaching": widgets.Checkbox(value=begin["reaching"], description="sigma(0) random", indent=False),
+        "disturbance": choice("disturbance", DISTURBANCES, "disturbance"),
+    }
 
 
 def _in_notebook() -> bool:
@@ -463,7 +470,7 @@ def _disturbance(settings: Settings, protocol: ReachingProtocol, n: int) -> Dist
     """Return what the simulated run meets, scaled to ``delta``."""
     until = float(protocol.T) * 2
     if settings.disturbance == "sin":
-        return ExpressionDisturbance(f"{_decimal(settings.delta)}*sin(2*k*t)")
+        return ExpressionDisturbance(f"{_decimal(settings.parameters['delta'])}*sin(2*k*t)")
     if settings.disturbance == "telegraph":
         return telegraph_noise(float(protocol.delta), _SWITCHES / float(protocol.T), n, until, settings.seed)
     return as_disturbance(settings.disturbance, n, protocol.delta, until)
@@ -496,9 +503,12 @@ def _figure(certificate: Certificate) -> Figure:
     from matplotlib import style
     from matplotlib.figure import Figure
 
-    draw = [_draw_states]
-    draw += [] if certificate.direct else [_draw_sliding]
-    draw += [_draw_decay] if certificate.envelope.members else []
+    run: Any = certificate.trajectory
+    draw: list[Callable[[Axes], object]] = [lambda ax: plot_trajectory(run, certificate.structure, ax)]
+    if not certificate.direct:
+        draw.append(lambda ax: plot_sliding(run, certificate.reaching, ax))
+    if certificate.envelope.members:
+        draw.append(partial(_draw_decay, certificate))
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
         figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
@@ -507,19 +517,11 @@ def _figure(certificate: Certificate) -> Figure:
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)
         figure.subplots_adjust(left / whole, bottom / height, 1 - right / whole, 1 - top / height, gap / panel_width)
         for place, panel in enumerate(draw, start=1):
-            panel(certificate, new_axes(figure, (1, len(draw), place)))
+            panel(new_axes(figure, (1, len(draw), place)))
     return figure
 
 
-def _draw_states(certificate: Certificate, ax: Any) -> None:
-    plot_trajectory(certificate.trajectory, certificate.structure, ax)  # type: ignore[arg-type]
-
-
-def _draw_sliding(certificate: Certificate, ax: Any) -> None:
-    plot_sliding(certificate.trajectory, certificate.reaching, ax)  # type: ignore[arg-type]
-
-
-def _draw_decay(certificate: Certificate, ax: Any) -> None:
+def _draw_decay(certificate: Certificate, ax: Axes) -> None:
     """Draw ``||E||`` (or ``||eps||``) under its bound as :func:`plot_decay` does, but without each member's own."""
     run, envelope = certificate.trajectory, certificate.envelope
     assert run is not None

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.report.plots import DRAWN_NODES, figure_bytes, plot_decay, plot_graph, plot_input, plot_sliding
+from ptcc_certify.graphs.limits import DRAWN_NODES, INPUT_NODES
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.trajectory import plot_sliding
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-#: Agents up to which there is a figure of every agent's input.
-INPUT_NODES = 100
 
 
 def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:

@@ -15,8 +15,13 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.display import shows
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.report.plots import figure_bytes, plot_decay, plot_graph, plot_run, plot_trade_off
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.trade_off import plot_trade_off
+from ptcc_certify.report.plots.trajectory import plot_run
 from ptcc_certify.report.screen import certificate_lines, structure_lines
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -24,8 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, FigureBase
 
 
-#: Largest graph that is drawn unasked: a layout takes seconds above.
-SHOWN_NODES = 120
 # Where the text of a line of a screen begins, after its head.
 _HEAD = 11
 

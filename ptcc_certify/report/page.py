@@ -22,11 +22,11 @@ from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.io.graph_files import reading_flags
+from ptcc_certify.graphs.limits import DRAWN_NODES
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.report import texts
 from ptcc_certify.report.figures import draw, inline_figure
-from ptcc_certify.report.plots import DRAWN_NODES
 from ptcc_certify.report.screen import remarks_on, structure_text
 from ptcc_certify.report.texts import LISTED, above, agent_parts, enclosed, printable, rational
 from ptcc_certify.theorems import THEOREMS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -12,10 +12,11 @@ import numpy as np
 
 from lmi.exact.enclosure import LARGEST_PUSH
 from lmi.exact.rounding import down, near, up
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
+    from ptcc_certify.bounds.input import Effort
     from ptcc_certify.certificate.certificate import Certificate
 
 _ORIENTATION = {
@@ -28,155 +29,166 @@ _ORIENTATION = {
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
 
 
+#: The head of a line, and its text; a line without a head belongs to the one before.
+Lines = Iterator[tuple[str, str]]
+
+
 def structure_lines(structure: Structure, name: str) -> list[str]:
     """Return the lines of ``ptcc classify``."""
-    graph = structure.graph
-    negative = int((graph.sign < 0).sum())
-    lines = [
-        _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
-        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])),
-        _line("nodes", _listed(graph.labels)),
-        _line("structure", structure_text(structure)),
-    ]
-    for number, component in list(enumerate(structure.closed_components, start=1))[:4]:
-        nodes = [graph.labels[v] for v in component.nodes]
-        if component.negative_cycle is not None:
-            steps = " ".join(f"{graph.labels[s]}->{graph.labels[t]}" for s, t in component.negative_cycle[:12])
-            more = " ..." if len(component.negative_cycle) > 12 else ""
-            lines.append(_line(f"leaders {number}", f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"))
-        else:
-            camps = [
-                [label for label, g in zip(nodes, component.gauge or (), strict=True) if g == sign] for sign in (1, -1)
-            ]
-            text = " against ".join("{" + _listed(camp, 40) + "}" for camp in camps if camp)
-            lines.append(_line(f"leaders {number}", f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"))
-    if len(structure.closed_components) > 4:
-        lines.append(_line("", f"... {len(structure.closed_components)} closed components in all"))
-    if structure.followers.size:
-        lines.append(_line("followers", _listed([graph.labels[v] for v in structure.followers.tolist()])))
-    lines += _claim_lines(structure, [component.claim for component in structure.components])
-    return lines
+    labels = structure.graph.labels
+
+    def lines() -> Lines:
+        yield from _graph_lines(structure, name)
+        yield "nodes", _listed(labels)
+        yield "structure", structure_text(structure)
+        for number, component in enumerate(structure.closed_components[:4], start=1):
+            yield f"leaders {number}", _leaders_text(component, labels)
+        if len(structure.closed_components) > 4:
+            yield "", f"... {len(structure.closed_components)} closed components in all"
+        if structure.followers.size:
+            yield "followers", _listed([labels[v] for v in structure.followers.tolist()])
+        yield from _claim_lines([component.claim for component in structure.components])
+
+    return _written(lines())
 
 
 def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     """Return the lines of ``ptcc certify``: at most 28 for a connected graph."""
     structure, p = certificate.structure, certificate.protocol
-    graph = structure.graph
-    negative = int((graph.sign < 0).sum())
-    names = [name for name in p.to_dict() if name != "kind"]
-    parameters = ", ".join(f"{name} {near(getattr(p, name), 12)}" for name in names)
-    lines = [
-        _line("graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"),
-        _line("read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])),
-        _line("structure", structure_text(structure)),
-        *_claim_lines(structure, certificate.claims, _deadline(certificate)),
-        _line("protocol", f"{p.kind}: {parameters}"),
-    ]
-    if certificate.start is not None:
-        lines.append(_line("start", _pairs(graph.labels, certificate.start)))
-    lines += _sliding_lines(certificate)
-    if certificate.outcome is not None:
-        ends = certificate.outcome.final_state
-        kind = "exact" if certificate.outcome.exact else "floating point"
-        if certificate.outcome.radius is not None:
-            widest = max(certificate.outcome.radius)
-            kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
-        if kind != "floating point" and any(Fraction(_digits(x)) != x for x in ends[:100]):
-            kind += "; here to 5 digits"
-        lines.append(_line("ends at", f"{_pairs(graph.labels, ends)} ({kind})"))
-        if certificate.outcome.degenerate:
-            groups = ", ".join(map(str, certificate.outcome.degenerate))
-            lines.append(_line("", f"degenerate start: leader group {groups} meets at 0, although it is balanced"))
-    lines += _rate_lines(certificate)
-    lines += _effort_lines(certificate)
-    lines += _simulation_lines(certificate)
-    if certificate.cut_off:
-        named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-        lines.append(_line("cut off", f"{named}; what was proved by then stands"))
-    lines += [_line("note", note) for note in certificate.notes[:3]]
-    lines.append(_line("verdict", certificate.assessment.text))
-    return lines
+
+    def lines() -> Lines:
+        yield from _graph_lines(structure, name)
+        yield "structure", structure_text(structure)
+        yield from _claim_lines(certificate.claims, _deadline(certificate))
+        names = [name for name in p.to_dict() if name != "kind"]
+        yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
+        if certificate.start is not None:
+            yield "start", _pairs(structure.graph.labels, certificate.start)
+        for part in (_sliding_lines, _outcome_lines, _rate_lines, _effort_lines, _simulation_lines):
+            yield from part(certificate)
+        if certificate.cut_off:
+            named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
+            yield "cut off", f"{named}; what was proved by then stands"
+        yield from (("note", note) for note in certificate.notes[:3])
+        yield "verdict", certificate.assessment.text
+
+    return _written(lines())
 
 
-def _rate_lines(certificate: Certificate) -> list[str]:
+def _graph_lines(structure: Structure, name: str) -> Lines:
+    graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
+    yield "graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"
+    yield "read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])
+
+
+def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
+    """Tell how a group of leaders splits, or why it does not."""
+    nodes = [labels[v] for v in component.nodes]
+    if component.negative_cycle is not None:
+        steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
+        more = " ..." if len(component.negative_cycle) > 12 else ""
+        return f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"
+    gauge = component.gauge or ()
+    camps = [[label for label, g in zip(nodes, gauge, strict=True) if g == sign] for sign in (1, -1)]
+    text = " against ".join("{" + _listed(camp, 40) + "}" for camp in camps if camp)
+    return f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"
+
+
+def _outcome_lines(certificate: Certificate) -> Lines:
+    """Tell where the agents end."""
+    result = certificate.outcome
+    if result is None:
+        return
+    kind = "exact" if result.exact else "floating point"
+    if result.radius is not None:
+        widest = max(result.radius)
+        kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
+    if kind != "floating point" and any(Fraction(_digits(x)) != x for x in result.final_state[:100]):
+        kind += "; here to 5 digits"
+    yield "ends at", f"{_pairs(certificate.graph.labels, result.final_state)} ({kind})"
+    if result.degenerate:
+        groups = ", ".join(map(str, result.degenerate))
+        yield "", f"degenerate start: leader group {groups} meets at 0, although it is balanced"
+
+
+def _rate_lines(certificate: Certificate) -> Lines:
     rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
     best = "" if bound is None else f"; none exceeds {up(bound, 8)}, proved"
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
         best += f" ({spectral:.6g}, numerical)"
     if certificate.constant:
         kept = "its state" if certificate.direct else "x - sigma"
-        return [_line("rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay")]
+        yield "rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay"
+        return
     if rate is None:
         numerical = certificate.numerical_rate
-        return [_line("rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}")]
+        yield "rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}"
+        return
     ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
-    lines = [_line("rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{ratio}")]
-    lines += _class_lines(certificate)
-    lines += _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
-    lines += _distance_lines(certificate)
+    yield "rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{ratio}"
+    yield from _class_lines(certificate)
+    yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
+    yield from _distance_lines(certificate)
     arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
-    said = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}"
-    report = certificate.checked
+    said, report = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}", certificate.checked
     if report is not None:
         said += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
-    lines.append(_line("proof", said))
-    return lines
+    yield "proof", said
 
 
-def _class_lines(certificate: Certificate) -> list[str]:
+def _class_lines(certificate: Certificate) -> Lines:
     """Tell the members of the envelope: class, rate and prefactor; what else was tried; the paper's own formula."""
-    V, lines = certificate.lyapunov, []
+    V, found = certificate.lyapunov, certificate.sharpening
     if V is not None and certificate.proof.rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         prefactor = f"||{V.coordinates}||^2 prefactor {up(V.prefactor, 4)}"
-        lines.append(_line("", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"))
-    found = certificate.sharpening
+        yield "", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"
     if found.tried:
         tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
         limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
-        lines.append(_line("", f"tried {', '.join(tried)} (numerical{limit}{time})"))
+        yield "", f"tried {', '.join(tried)} (numerical{limit}{time})"
         taken = [f"{V.kind} {down(V.proved_rate, 4)} (prefactor {up(V.prefactor, 2)})" for V in found.members]
-        lines.append(_line("", f"taken {', '.join(taken) or 'none, no rate was proved'}"))
-    return lines
+        yield "", f"taken {', '.join(taken) or 'none, no rate was proved'}"
 
 
-def _distance_lines(certificate: Certificate) -> list[str]:
+def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
+    """List bounds at instants, rounded up."""
+    return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
+
+
+def _distance_lines(certificate: Certificate) -> Lines:
     """Tell how far from its outcome the farthest agent may be, and every agent at the instant asked for."""
     if certificate.start is None or not any(V.deviation for V in certificate.functions):
-        return []
-    labels = certificate.graph.labels
+        return
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
     worst = certificate.outcome_distance([q for q, _ in instants]).max(axis=0, initial=0.0)
-    said = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, instants, strict=True))
-    numerical = "" if certificate.direct else " (numerical, rounded up)"
-    lines = [_line("distance", f"of every agent to its outcome at most {said}{numerical}")] if instants else []
+    if instants:
+        numerical = "" if certificate.direct else " (numerical, rounded up)"
+        said = _at_instants(worst, (name for _, name in instants))
+        yield "distance", f"of every agent to its outcome at most {said}{numerical}"
     if certificate.at is not None:
-        q = float(1 - certificate.at / certificate.protocol.T)
-        each = certificate.outcome_distance([q])[:, 0]
-        listed = _listed([f"{label} {up(float(x), 2)}" for label, x in zip(labels, each, strict=True)])
-        lines.append(_line("", f"at t = {near(certificate.at, 12)}: {listed}"))
-    return lines
+        each = certificate.outcome_distance([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
+        listed = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
+        yield "", f"at t = {near(certificate.at, 12)}: {_listed(listed)}"
 
 
-def _effort_lines(certificate: Certificate) -> list[str]:
+def _effort_lines(certificate: Certificate) -> Lines:
     """Tell whether the input stays finite, and how large it gets."""
     effort = certificate.effort
     if effort is None or certificate.constant:
-        return []
+        return
     lower, upper = effort.threshold
     product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
     if effort.bounded:
         how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
-        lines = [_line("input", f"bounded up to the deadline for every start: {how}")]
+        yield "input", f"bounded up to the deadline for every start: {how}"
     elif effort.bounded is False:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "limit" else " = 1 or less"
-        lines = [
-            _line("INPUT", "NOT BOUNDED: the state converges, but from some starts the input grows without limit"),
-            _line("", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"),
-        ]
+        yield "INPUT", "NOT BOUNDED: the state converges, but from some starts the input grows without limit"
+        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"
     else:
-        lines = [_line("input", f"bounded or not is undecided: {product}, it takes 1")]
+        yield "input", f"bounded or not is undecided: {product}, it takes 1"
     sizes = []
     if effort.peak is not None:
         most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
@@ -187,40 +199,43 @@ def _effort_lines(certificate: Certificate) -> list[str]:
     if sizes:
         whom = "" if effort.starts is None else " for all these starts"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
-        lines.append(_line("effort", ", ".join(sizes) + whom + part))
+        yield "effort", ", ".join(sizes) + whom + part
     other = bool(certificate.limits) or not certificate.direct  # the found start is of neither
     worst = None if effort.peak is None or other else certificate.worst_start
     if worst is not None and math.isfinite(worst.size):
         labels = certificate.graph.labels
         where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
-        lines.append(_line("", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"))
+        yield "", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"
     if effort.sliding is not None and not effort.sliding.bounded:
-        lines.append(_line("", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"))
-    for entry in effort.residual:
-        named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
-        said = [f"{what}{near(x)}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
-        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its outcome"
-        largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
-        lines.append(_line("limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"))
-        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
-            lines.append(_line("", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"))
-    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
-        lines.append(_line("noise", "not certified: noise times an infinite gain; cap the gain, or stop before"))
-    if effort.longest_period is not None:
-        lines.append(_line("limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"))
-    elif len(effort.residual) < len(certificate.limits):
-        lines.append(_line("limited", "nothing is certified under these limits"))
+        yield "", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"
+    yield from _limited_lines(certificate, effort)
     if effort.disturbed is not None:
         d, drift = effort.disturbed, effort.disturbed.drift
         ends = "" if drift is None else ", and all end where they would without"
         if drift is not None and any(drift):
             ends = f", every agent ends within {up(max(drift), 4)} of its outcome"
-        more = f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|"
-        lines.append(_line("disturbed", f"{more}{ends}"))
+        yield "disturbed", f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|{ends}"
     elif certificate.delta is not None:
-        lines.append(_line("disturbed", "nothing is certified: the rate proves no bounded input"))
-    return lines
+        yield "disturbed", "nothing is certified: the rate proves no bounded input"
+
+
+def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
+    """Tell what is proved under limits of the gain, and under noise with them."""
+    for entry in effort.residual:
+        named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
+        said = [f"{what}{near(x)}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
+        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its outcome"
+        largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
+        yield "limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
+        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
+            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
+            yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
+    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
+        yield "noise", "not certified: noise times an infinite gain; cap the gain, or stop before"
+    if effort.longest_period is not None:
+        yield "limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"
+    elif len(effort.residual) < len(certificate.limits):
+        yield "limited", "nothing is certified under these limits"
 
 
 def _remedy(certificate: Certificate) -> str:
@@ -236,48 +251,47 @@ def _sliding_share(certificate: Certificate) -> float:
     return float(p.span / p.T)
 
 
-def _residual_lines(certificate: Certificate) -> list[str]:
-    coordinates, at = certificate.envelope.coordinates, certificate.at
-    proved = [f"{up(certificate.envelope.residual(q), 2)} at {name}" for q, name in _INSTANTS]
+def _residual_lines(certificate: Certificate) -> Lines:
+    envelope, at = certificate.envelope, certificate.at
+    proved = _at_instants((envelope.residual(q) for q, _ in _INSTANTS), (name for _, name in _INSTANTS))
     if at is not None:
-        own = certificate.envelope.residual(float(1 - at / certificate.protocol.T))
-        proved.insert(0, f"{up(own, 3)} at t = {near(at, 12)}")
-    lines = [_line("left", f"||{coordinates}(t)|| / ||{coordinates}(0)|| at most {', '.join(proved)}")]
+        own = envelope.residual(float(1 - at / certificate.protocol.T))
+        proved = f"{up(own, 3)} at t = {near(at, 12)}, {proved}"
+    yield "left", f"||{envelope.coordinates}(t)|| / ||{envelope.coordinates}(0)|| at most {proved}"
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
-        lines.append(_line("", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)))
-    return lines
+        yield "", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
 
 
-def _reaching_lines(certificate: Certificate) -> list[str]:
+def _reaching_lines(certificate: Certificate) -> Lines:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
     from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 
-    envelope, coordinates = certificate.envelope, certificate.envelope.coordinates
+    envelope = certificate.envelope
     if certificate.start is None or not isinstance(envelope, SlidingEnvelope):
-        return []
+        return
     share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
     bounds = envelope.state_bound(np.array([q for q, _ in chosen]), certificate.start)
-    said = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(bounds, chosen, strict=True))
-    return [_line("left", f"||{coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)")]
+    said = _at_instants(bounds, (name for _, name in chosen))
+    yield "left", f"||{envelope.coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
 
 
-def _simulation_lines(certificate: Certificate) -> list[str]:
+def _simulation_lines(certificate: Certificate) -> Lines:
+    """Tell what the run showed, under one head."""
+    for number, text in enumerate(_simulated(certificate)):
+        yield "" if number else "simulated", text
+
+
+def _simulated(certificate: Certificate) -> Iterator[str]:
     run, seen = certificate.trajectory, certificate.comparison
     if run is None:
-        return []
-    lines = []
+        return
     if seen is not None and not certificate.constant:
         said = "VIOLATED" if seen.violated else "kept" if seen.judged else "not tested, all is below the floor"
         resolved = f"down to 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
-        lines.append(
-            _line(
-                "simulated",
-                f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, worst ratio {seen.worst_ratio:.4g}, "
-                f"resolved {resolved}",
-            )
-        )
+        ratio = f"worst ratio {seen.worst_ratio:.4g}, resolved {resolved}"
+        yield f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, {ratio}"
     if seen is not None and (slid := run.sliding) is not None and not certificate.direct:
         last = int(slid.reaching_z.argmax())
         when = "at T_r only"
@@ -285,27 +299,20 @@ def _simulation_lines(certificate: Certificate) -> list[str]:
             when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
         kept = "kept" if seen.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
-        lines.append(
-            _line(
-                "" if lines else "simulated",
-                f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}",
-            )
-        )
+        yield f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}"
     if certificate.outcome is not None:
         gap = float(abs(run.final_state - certificate.outcome.values).max())
         settled = "" if run.deadline_resolved else " (the run had not settled)"
-        lines.append(_line("" if lines else "simulated", f"end state within {gap:.1e} of the outcome{settled}"))
-    return lines
+        yield f"end state within {gap:.1e} of the outcome{settled}"
 
 
-def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> list[str]:
+def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:
     if len(claims) == 1:
-        return [_line("claim", _claim_text(claims[0], when))]
-    counts = Counter(claims)
-    return [
-        _line("claim" if i == 0 else "", f"{count} component(s): {_claim_text(claim, when)}")
-        for i, (claim, count) in enumerate(sorted(counts.items(), key=lambda item: item[0].theorem))
-    ]
+        yield "claim", _claim_text(claims[0], when)
+        return
+    counts = sorted(Counter(claims).items(), key=lambda item: item[0].theorem)
+    for i, (claim, count) in enumerate(counts):
+        yield "" if i else "claim", f"{count} component(s): {_claim_text(claim, when)}"
 
 
 def _deadline(certificate: Certificate) -> str:
@@ -315,15 +322,15 @@ def _deadline(certificate: Certificate) -> str:
     return f" at T_r + T_s = {near(p.T)} whatever the disturbance"
 
 
-def _sliding_lines(certificate: Certificate) -> list[str]:
+def _sliding_lines(certificate: Certificate) -> Lines:
     """Tell ``sigma(0)``, what is proved of the sliding variables, and which disturbance the run met."""
     reaching, labels, run = certificate.reaching, certificate.graph.labels, certificate.trajectory
     if reaching is None or certificate.sigma0 is None:
-        return []
+        return
     if certificate.direct:
-        lines = [_line("sigma(0)", "0: no reaching phase, the agents slide from the beginning")]
+        yield "sigma(0)", "0: no reaching phase, the agents slide from the beginning"
     else:
-        lines = [_line("sigma(0)", _pairs(labels, certificate.sigma0))]
+        yield "sigma(0)", _pairs(labels, certificate.sigma0)
         late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
         last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
         said = []
@@ -339,10 +346,9 @@ def _sliding_lines(certificate: Certificate) -> list[str]:
             if push + pole > LARGEST_PUSH:
                 why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
             said.append(f"only at T_r for {_listed(late, 40)}: {why}")
-        lines.append(_line("sliding", f"sigma_k = 0 proved: {'; '.join(said)}"))
+        yield "sliding", f"sigma_k = 0 proved: {'; '.join(said)}"
     if run is not None and (slid := run.sliding) is not None:
-        lines.append(_line("disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"))
-    return lines
+        yield "disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"
 
 
 def _claim_text(claim: Claim, when: str) -> str:
@@ -367,20 +373,13 @@ def structure_text(structure: Structure) -> str:
 def remarks_on(structure: Structure) -> list[str]:
     """Return what is particular about a graph and about how it was read."""
     read = structure.graph.read
-    remarks = [
-        text
-        for text, holds in (
-            ("undirected", structure.undirected and structure.graph.n_edges > 0),
-            ("all weights positive", structure.all_positive and structure.graph.n_edges > 0),
-            ("sign-asymmetric", not structure.sign_symmetric),
-            ("no edges, is this the right file?", structure.graph.n_edges == 0),
-        )
-        if holds
-    ]
-    if read["duplicates"] != "refused":
-        remarks.append(f"duplicates {read['duplicates']}")
-    if read["self_loops"] != "refused":
-        remarks.append(f"self-loops {read['self_loops']}")
+    some = structure.graph.n_edges > 0
+    remarks = ["undirected"] if structure.undirected and some else []
+    remarks += ["all weights positive"] if structure.all_positive and some else []
+    remarks += [] if structure.sign_symmetric else ["sign-asymmetric"]
+    remarks += [] if some else ["no edges, is this the right file?"]
+    for name, word in (("duplicates", "duplicates"), ("self_loops", "self-loops")):
+        remarks += [] if read[name] == "refused" else [f"{word} {read[name]}"]
     return [*remarks, *read["notes"]]
 
 
@@ -402,6 +401,5 @@ def _listed(words: Sequence[str], width: int = 90) -> str:
     return text
 
 
-def _line(head: str, text: str) -> str:
-    clean = "".join(c if c.isprintable() else "?" for c in text)
-    return f"{head:<10} {clean}"
+def _written(lines: Lines) -> list[str]:
+    return [f"{head:<10} {''.join(c if c.isprintable() else '?' for c in text)}" for head, text in lines]

@@ -17,13 +17,11 @@ import numpy as np
 
 import lmi
 from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs import limits
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 
-#: Up to this many nodes null vectors, outcomes and proofs are computed in exact rationals.
-EXACT_NODES = 120
-#: Above this many nodes null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
-DENSE_NODES, FACTOR_NODES = 500, 20_000
+EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES, limits.FACTOR_NODES
 #: Eigenvalues nearest to 0 that are computed, products spent on an inverse, and restarts of Arnoldi's method.
 _NEAREST, _PRODUCTS, _RESTARTS = 8, 2000, 50
 

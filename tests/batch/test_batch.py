@@ -640,7 +640,7 @@ def test_nothing_is_said_after_a_scheduler_was_refused():
 def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPatch):
     """The packages and the scheduler are asked for after the journal is locked."""
     write_graph(TRIANGLE, "g.csv")
-    for package, options in (("joblib.externals.loky", {"workers": 2}), ("distributed", {"scheduler": "tcp://h:1"})):
+    for package, options in (("distributed", {"workers": 2}), ("distributed", {"scheduler": "tcp://h:1"})):
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, package, None)
             with pytest.raises(ParameterError, match="pip install"):
@@ -659,7 +659,7 @@ def test_a_batch_that_is_refused_leaves_no_journal(monkeypatch: pytest.MonkeyPat
     ("package", "args"),
     [
         ("pyarrow", ("-o", "t.parquet")),
-        ("joblib.externals.loky", ("--workers", "2")),
+        ("distributed", ("--workers", "2")),
         ("distributed", ("--scheduler", "tcp://127.0.0.1:1")),
     ],
 )

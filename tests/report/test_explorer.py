@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import sys
 import time
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,10 +16,9 @@ from ptcc_certify.certificate import certificate as certificates
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.report import explorer as module
 from ptcc_certify.report.explorer import (
-    CHECKED_NODES,
-    EXPLORED_NODES,
     GIVEN,
     Explorer,
     Settings,
@@ -142,7 +140,7 @@ def test_a_class_of_bounds_shows_its_own_rate(explorer: Explorer):
 
 
 def test_what_is_shown_is_what_certify_certifies(explorer: Explorer):
-    settings = replace(SLIDING, method="paper", disturbance="sin", seed=3)
+    settings = SLIDING.changed(method="paper", disturbance="sin", seed=3)
     start, sigma0 = np.random.default_rng(3).integers(-9, 10, size=(2, 6)).tolist()
     whole = ptcc.certify(
         load_graph("fig3a"), settings.protocol(), start, sigma0=sigma0, disturbance="1*sin(2*k*t)", method="paper"
@@ -225,7 +223,7 @@ def test_every_control_of_the_sliding_mode_is_followed(explorer: Explorer, name:
 def test_a_larger_margin_reaches_the_manifold_earlier(explorer: Explorer):
     times = []
     for mu1, delta in ((1.5, 1), (2, 1), (4, 1), (4, 0)):
-        reaching = explorer.certificate(replace(SLIDING, mu1=mu1, delta=delta)).reaching
+        reaching = explorer.certificate(SLIDING.changed(mu1=mu1, delta=delta)).reaching
         assert reaching is not None
         times.append(max(r.time for r in reaching))
     assert times == sorted(times, reverse=True)
@@ -265,7 +263,7 @@ def test_what_is_wrong_is_told_in_one_line_and_drawn(sliding: Panel):
     ],
 )
 def test_refused_settings_say_why(explorer: Explorer, change: dict[str, Any], says: str):
-    view = explorer.view(replace(Settings(), **change))
+    view = explorer.view(Settings().changed(**change))
     assert says in view.text
     assert view.text == view.unchecked
     assert "\n" not in view.text

@@ -22,30 +22,16 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.limits import Actuator
-from ptcc_certify.report.plots import (
-    CAMP_COLOURS,
-    CLASS_MARKERS,
-    DOUBLE_COLUMN,
-    DRAWN_NODES,
-    EDGE_STYLES,
-    HALO,
-    KAMADA_NODES,
-    LABELLED_NODES,
-    SINGLE_COLUMN,
-    STYLE,
-    plot_decay,
-    plot_effort,
-    plot_frontier,
-    plot_graph,
-    plot_input,
-    plot_run,
-    plot_spectrum,
-    plot_trajectory,
-    save_figure,
-)
+from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import EDGE_STYLES, HALO, plot_graph
+from ptcc_certify.report.plots.input import plot_effort, plot_input
+from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
+from ptcc_certify.report.plots.style import CAMP_COLOURS, DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.trajectory import plot_run, plot_trajectory
+from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum

@@ -4,10 +4,10 @@ Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.g
 builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.
 """
 
-from ptcc_certify.graphs.io.files import MAX_BYTES, MAX_LINE, write_atomically
+from ptcc_certify.graphs.io.files import write_atomically
 from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
-from ptcc_certify.graphs.io.matrices import MAX_NODES
 from ptcc_certify.graphs.io.state import by_label, in_node_order, random_states, read_state
+from ptcc_certify.graphs.limits import MAX_BYTES, MAX_LINE, MAX_NODES
 
 __all__ = [
     "MAX_BYTES",

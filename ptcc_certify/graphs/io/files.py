@@ -16,12 +16,8 @@ from pathlib import Path
 from typing import IO
 
 from ptcc_certify.errors import FormatError, PTCCError
+from ptcc_certify.graphs.limits import MAX_BYTES, MAX_LINE
 from ptcc_certify.graphs.rationals import shorten
-
-MAX_BYTES = 2**30
-"""A file, unpacked, may have this many bytes."""
-MAX_LINE = 65_536
-"""A line of a text file may have this many characters."""
 
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]
 

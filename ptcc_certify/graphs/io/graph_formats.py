@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
-from ptcc_certify.graphs.io.matrices import MAX_NODES
 from ptcc_certify.graphs.io.rows import Numbers, Rows
+from ptcc_certify.graphs.limits import MAX_NODES
 from ptcc_certify.graphs.rationals import shorten
 
 

@@ -19,12 +19,10 @@ import numpy as np
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io import files
 from ptcc_certify.graphs.io.rows import Rows
+from ptcc_certify.graphs.limits import MAX_NODES
 from ptcc_certify.graphs.rationals import shorten
 
 Array = np.ndarray
-
-MAX_NODES = 2 * 10**6
-"""A matrix may have this many rows: their number stands in the file, not the nodes themselves."""
 
 _BANNER = "%%matrixmarket matrix (coordinate|array) (real|double|integer) (general|symmetric)"
 _MAT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}

@@ -1,0 +1,152 @@
+"""``ptcc certify``, ``check`` and ``report``: make a certificate, check it, and write it for somebody to read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.terminal import OK, REJECTED, UNDECIDED, print_json, print_lines, progress, refuse_output
+from ptcc_certify.errors import ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.checker import CheckReport
+
+
+@click.command()
+@shared.graph_options
+@shared.protocol_options
+@click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock.")
+@shared.method_option
+@shared.limit_options
+@shared.starts_option
+@click.option("--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.")
+@click.option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
+@click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
+@click.option(
+    "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
+)
+@shared.time_limit_option
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
+@shared.json_option
+def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> int:
+    """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
+    from ptcc_certify.certificate.procedure import STEPS
+    from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.request import Expectations
+    from ptcc_certify.report.screen import certificate_lines
+
+    at, bound, most = (shared.number(options, name) for name in ("at", "initial_bound", "max_input"))
+    if most is not None and most <= 0:
+        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    expected = Expectations(shared.expected_behaviour(options), shared.number(options, "min_rate"), most)
+    refuse_output(output, graph)
+    protocol = shared.protocol_of(options)
+    signed = shared.read(graph, options)
+    start = shared.start_of(options["x0"], options["seed"], signed)
+    more = shared.sliding_keywords(protocol, options, signed)
+    if options["kind"] == "nominal":
+        actuator = shared.actuator_of(options)
+        more = {"limits": [] if actuator is None else [actuator]}
+        more |= {name: shared.number(options, name) for name in ("delta", "noise")}
+    elif options["noise"] is not None:
+        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
+    more |= {name: options[name] for name in ("method", "simulation", "time_limit")}
+    with progress(STEPS) as begin:
+        certificate = run(signed, protocol, start, at=at, starts=bound, expectations=expected, progress=begin, **more)
+    if output:
+        certificate.save(output)
+    found = certificate.assessment
+    if as_json:
+        print_json(certificate.to_dict())
+        if found.exit_code:
+            click.echo(f"verdict    {found.text}", err=True)
+    else:
+        print_lines(certificate_lines(certificate, graph))
+        if output:
+            click.echo(f"written    {output}")
+    return found.exit_code
+
+
+@click.command()
+@click.argument("certificate")
+@click.argument("graph", required=False)
+@shared.reading_options
+@click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
+@shared.memory_option
+@shared.json_option
+def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, **options: Any) -> int:
+    """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
+
+    GRAPH is read as the certificate says that it was read, which is printed; the options about reading override that.
+    Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
+    certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
+    """
+    from ptcc_certify.checker import read_and_check
+
+    with progress(("independent check",)) as begin:
+        begin("independent check")
+        document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
+    how: dict[str, str] = {}
+    if graph is not None and report.accepted:
+        report, how = _same_graph(certificate, document, report, graph, options)
+    if as_json:
+        print_json(report.to_dict() | how)
+    else:
+        print_lines([*(f"graph      {how[key]}" for key in how), *report.lines()])
+    if not report.accepted:
+        return REJECTED
+    return OK if report.verdict == "certified" else UNDECIDED
+
+
+def _same_graph(
+    certificate: str, document: dict[str, Any], report: CheckReport, graph: str, options: shared.Options
+) -> tuple[CheckReport, dict[str, str]]:
+    """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
+    from ptcc_certify.certificate.format_graph import certificate_graph
+    from ptcc_certify.graphs.difference import difference
+    from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
+
+    source = click.get_current_context().get_parameter_source
+    asked = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
+    given = {"orientation" if name == "edges" else name: options[name] for name in asked}
+    signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **given)
+    way = "as the options say" if given else "as the certificate says"
+    how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
+    if signed.sha256 == report.sha256:
+        return report, how
+    reason = f"another graph than {graph}: {difference(certificate_graph(document, Path(certificate).parent), signed)}"
+    return replace(report, accepted=False, steps=(), rejected="graph", reason=reason), how
+
+
+@click.command()
+@click.argument("certificate")
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False), required=True, help="A page, .html, or a statement, .tex"
+)
+@click.option(
+    "--simulation/--no-simulation", default=None, help="Repeat the CVODES run.  [default: up to 1,000 agents]"
+)
+@shared.memory_option
+def report(certificate: str, output: str, simulation: bool | None, memory: float) -> int:
+    """Check CERTIFICATE and write a report to send to somebody: a page of HTML, or a statement in LaTeX.
+
+    The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
+    certificate the page tells the reason and no claim.
+    """
+    from ptcc_certify.certificate.certificate import RejectedCertificate
+    from ptcc_certify.report import write_report
+
+    try:
+        with progress(("independent check", "simulation", "report")) as begin:
+            verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
+    except RejectedCertificate as error:
+        click.echo(f"rejected: {error}", err=True)
+        return REJECTED
+    click.echo(f"{verdict:<10} {output}")
+    return {"certified": OK, "undecided": UNDECIDED}.get(verdict, REJECTED)

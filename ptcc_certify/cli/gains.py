@@ -1,0 +1,102 @@
+"""``ptcc design``: gains from limits."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptcc_certify.cli.options import Options, flag_of, graph_options, json_option, number, read
+from ptcc_certify.cli.terminal import (
+    FIGURES,
+    OK,
+    REFUTED_EXPECTATION,
+    UNDECIDED,
+    print_json,
+    print_lines,
+    refuse_output,
+)
+from ptcc_certify.errors import ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.gain_design import Design
+
+
+@click.command()
+@graph_options
+@click.option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all starts.")
+@click.option("--initial-bound", metavar="R", required=True, help="All starts with |x_k(0)| <= R.")
+@click.option("--deadline", metavar="T", help="Ask for this deadline.")
+@click.option("--shortest-deadline", is_flag=True, help="Ask for the shortest deadline.")
+@click.option("--residual", metavar="r", help="Every agent may be so far from its outcome at the deadline.")
+@click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
+@click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
+@json_option
+def design(graph: str, curve: str | None, output: str | None, as_json: bool, **options: Any) -> int:
+    """Find gains of the nominal protocol whose input is proved to stay within a limit.
+
+    The numbers printed are exact, and the last line is the command that proves them again with exit code 0.
+
+    Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
+    """
+    from ptcc_certify.gain_design import INFEASIBLE, MET
+    from ptcc_certify.gain_design import design as run
+
+    if (options["deadline"] is None) != options["shortest_deadline"]:
+        raise ParameterError("give --deadline T, or ask for the --shortest-deadline: one of the two")
+    for path in (output, curve):
+        refuse_output(path, graph)
+    if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
+        raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
+    asked: Any = {name: number(options, name) for name in ("max_input", "initial_bound", "deadline", "residual")}
+    found = run(read(graph, options), input_norm=2 if options["input_norm"] else None, **asked)
+    if output and found.certificate is not None:
+        found.certificate.save(output)
+    if curve:
+        _save_curve(found, curve)
+    command = _certify_command(found, graph, options)
+    if as_json:
+        print_json(found.to_dict() | {"command": command})
+    else:
+        print_lines(found.lines())
+        if output and found.certificate is not None:
+            click.echo(f"written    {output}")
+        if command is not None:
+            again = " (give it the graph again, on standard input)" if graph == "-" else ""
+            click.echo(f"to prove it again{again}:\n{command}")
+        elif found.protocol is not None:
+            why = "certify finds other functions for these gains, which prove less"
+            click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
+    return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
+
+
+def _certify_command(found: Design, graph: str, options: Options) -> str | None:
+    """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
+    if found.certify_options is None:
+        return None
+    flags = [] if options["edges"] is None else ["--edges", options["edges"]]
+    flags += [] if options["duplicates"] == "refuse" else ["--duplicates", options["duplicates"]]
+    flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
+    given = [*flags, *found.certify_options]
+    if graph.startswith("-") and graph != "-":
+        return shlex.join(["ptcc", "certify", *given, "--", graph])
+    return shlex.join(["ptcc", "certify", graph, *given])
+
+
+def _save_curve(found: Design, path: str) -> None:
+    """Write peak input against deadline: CSV, or a figure."""
+    from ptcc_certify.graphs.io import write_atomically
+
+    if Path(path).suffix.lower() == ".csv":
+        curve = found.trade_off(found.deadlines())
+        rows = zip(*(values.tolist() for values in curve), strict=True)
+        lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
+        write_atomically(path, "\n".join(lines) + "\n")
+    else:
+        from ptcc_certify.report.plots.style import save_figure
+        from ptcc_certify.report.plots.trade_off import plot_trade_off
+
+        save_figure(plot_trade_off(found).figure, path)

@@ -1,0 +1,149 @@
+"""``ptcc batch``: many graphs, one table."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.options import READING, number
+from ptcc_certify.cli.terminal import INTERRUPTED, OK, counting
+from ptcc_certify.errors import ParameterError
+
+#: Options that are settings of a row by the same name.
+_SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", *READING[1:])
+
+
+@click.command()
+@click.argument("pattern", nargs=-1, required=True)
+@shared.reading_options
+@shared.protocol_options
+@click.option("--expect", metavar="BEHAVIOUR", help="E.g. stability; exit code 3 if it does not follow for some graph.")
+@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
+@shared.method_option
+@shared.starts_option
+@click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@shared.time_limit_option
+@click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the table to FILE.csv or FILE.parquet.")
+@click.option("--restart", is_flag=True, help="Begin again, and replace the table, or the graphs of --write-graphs.")
+@click.option("--write-graphs", metavar="DIR", help="Only write the graphs of SPEC.toml to this folder, as CSV.")
+def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_graphs: str | None, **options: Any) -> int:
+    """Certify many graphs: a table with one row for each.
+
+    PATTERN is a file, a quoted pattern such as 'graphs/*.csv', a packaged graph, or SPEC.toml, which describes an
+    ensemble of random graphs (keys: count, nodes, seed, connectivity, balanced, mean_degree, negative, weight_range,
+    weight_decades, undirected); several may be given. Every graph has a random start of its own, unless --x0 is given.
+
+    Rows are kept in FILE.journal as they come: after an interruption the same command goes on with those that are
+    missing, and with files that have changed; the list of graphs may have changed too. FILE then has the rows so far.
+    Whatever goes wrong with one graph becomes the column error of its row. Without -o the table is printed as CSV when
+    it is complete, or with the rows so far when it ends before.
+
+    Exit code 0: every graph certified, and what was asked of them holds. Otherwise the table is there too, and the
+    code is the worst of its rows: 1 a simulated run exceeds its bound, 3 an expectation is refuted, 4 some are
+    undecided or have an error. 2: nothing was written.
+    """
+    from ptcc_certify import batch as many
+
+    settings = {name: options[name] for name in _SETTINGS} | {"orientation": options["edges"]}
+    settings |= {name: number(options, name) for name in ("min_rate", "initial_bound")}
+    settings |= {"expect": shared.expected_behaviour(options)}
+    workers, scheduler = options["workers"], options["scheduler"]
+    if write_graphs is not None:
+        for flag, value in (("-o", output), ("--scheduler", scheduler), ("--workers", workers)):
+            if value is not None:
+                raise ParameterError(f"{flag} has no effect beside --write-graphs; leave it out")
+        click.echo(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
+        return OK
+    if scheduler is not None and workers is not None:
+        raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
+    if restart and output is None:
+        raise ParameterError("--restart replaces a table; name it with -o")
+    if output in ("", "-"):
+        raise ParameterError("-o names a file; for standard output leave it out")
+    protocol, total = shared.protocol_of(options, ()), 0
+    where: dict[str, Any] = {"workers": workers or many.default_workers(), "scheduler": scheduler}
+    try:
+        with counting() as show, _interrupted_by_term():
+
+            def progress(*counts: int) -> None:
+                nonlocal total
+                if output and total == 0 and counts[0]:
+                    click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
+                total = counts[1]
+                show(*counts)
+
+            where |= {"output": output, "restart": restart, "progress": progress}
+            rows = many.certify_many(pattern, protocol, **where, **settings)
+    except BaseException as error:
+        found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+        if found or stopped:
+            kept = _kept(found, total, output, restart)
+            click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
+        if stopped:
+            return INTERRUPTED
+        raise
+    if output is None:
+        click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
+    else:
+        counts = [f"{sum(row['verdict'] == v for row in rows)} {v}" for v in ("certified", "undecided")]
+        failed = sum(row["error"] is not None for row in rows)
+        click.echo(f"rows       {len(rows)}: {', '.join(counts)}, {failed} with an error")
+        click.echo(f"written    {output}")
+    return _exit_code(rows)
+
+
+@contextmanager
+def _interrupted_by_term() -> Iterator[None]:
+    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():  # which alone handles signals
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
+    """Tell, after a batch ended before its time, which rows there are and how it goes on; print them without a file."""
+    from ptcc_certify.batch import table_bytes
+
+    if not rows:
+        return "nothing is kept"
+    if output is None:
+        click.echo(table_bytes(rows, ".csv").decode(), nl=False, color=True)
+        return f"{len(rows)} of {total} rows are printed; with -o FILE.csv the same command could go on"
+    missing = f"{total - len(rows)} are missing, and the same command{' without --restart' * restart} goes on"
+    return f"{len(rows)} of {total} rows are kept, in {output} too; {missing}"
+
+
+def _exit_code(rows: Sequence[dict[str, Any]]) -> int:
+    """Return the exit code of the worst row, and tell how many rows are not what one would wish."""
+    from ptcc_certify.certificate.verdict import OPEN, REFUTED, exit_code
+
+    failed = [row for row in rows if row["error"] is not None]
+    violated = sum(row["bound_kept"] is False for row in rows)
+    refuted = sum(row["asked"] == REFUTED for row in rows)
+    undecided = sum(row["verdict"] == "undecided" or row["asked"] == OPEN for row in rows)
+    cut_off = sum(row["cut_off"] is not None for row in rows)
+    if cut_off:
+        click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
+    said = (
+        (violated, "violated: the simulated run exceeds the proved bound; please report"),
+        (refuted, "refuted: what was asked does not hold"),
+        (undecided, "undecided, or what was asked is left open"),
+        (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}"),
+    )
+    for count, text in said:
+        if count:
+            click.echo(f"note: {count} of {len(rows)} graphs: {text}", err=True)
+    return exit_code(bool(violated), bool(refuted), bool(undecided or failed))

@@ -1,0 +1,243 @@
+"""Options that several commands share, and what becomes of them: graphs, protocols, starts, numbers.
+
+Commands take theirs as keywords; the functions here take what they need from these.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptcc_certify.errors import NumberError, ParameterError, PTCCError
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.protocols.limits import Actuator
+
+#: What the commands are given, by the names of their parameters.
+Options = Mapping[str, Any]
+
+READING = ("edges", "duplicates", "drop_self_loops", "undirected")
+LIMITS = ("gain_cap", "stop_before", "sample_period")
+SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
+
+
+def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def apply(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+def _sliding(flag: str, text: str) -> Callable[[Any], Any]:
+    name = flag.removeprefix("--").replace("-", "_")
+    return click.option(flag, name, show_default=SLIDING_DEFAULTS[name], help=text)
+
+
+reading_options = _options(
+    click.option(
+        "--edges",
+        type=click.Choice(["information", "listens"]),
+        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
+    ),
+    click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
+    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
+    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
+)
+graph_options = _options(click.argument("graph"), reading_options)
+protocol_options = _options(
+    click.option(
+        "--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal", show_default=True
+    ),
+    click.option("--T", "T", show_default="1", help="Deadline (nominal)."),
+    click.option("--rho1", default="1", show_default=True, help="Constant part of the gain."),
+    click.option("--rho2", default="1", show_default=True, help="Factor of the growing part of the gain."),
+    click.option("--kappa", default="2", show_default=True, help="Exponent of the time scaling."),
+    _sliding("--T-r", "Sliding mode: time to reach the manifold."),
+    _sliding("--T-s", "Sliding mode: time on it; the deadline is T_r + T_s."),
+    _sliding("--mu1", "Sliding mode: switching gain, above delta."),
+    _sliding("--mu2", "Sliding mode: constant part of the reaching gain."),
+    _sliding("--mu3", "Sliding mode: factor of its growing part."),
+    _sliding("--delta", "Bound of every disturbance."),
+    click.option(
+        "--disturbance",
+        metavar="EXPR",
+        show_default="adversary",
+        help="Of the simulated run: an expression of k and t, adversary (sliding mode), telegraph or none.",
+    ),
+    click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
+    click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random starts."),
+)
+limit_options = _options(
+    click.option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
+    click.option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
+    click.option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
+)
+method_option = click.option(
+    "--method",
+    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
+    default="best",
+    show_default=True,
+    help="Lyapunov functions searched beside the paper's.",
+)
+starts_option = click.option(
+    "--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0."
+)
+memory_option = click.option(
+    "--memory",
+    type=click.FloatRange(min=0, min_open=True, max=1000),
+    default=1,
+    show_default=True,
+    metavar="GB",
+    help="What the check may take; a certificate that may take more is refused.",
+)
+time_limit_option = click.option(
+    "--time-limit",
+    type=float,
+    metavar="SECONDS",
+    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of a parameter."""
+    return f"--{name.replace('_', '-')}"
+
+
+def number(options: Options, name: str) -> Fraction | None:
+    """Return the exact number that an option gives, None if it was not given."""
+    if options[name] is None:
+        return None
+    return exact_number(options[name], flag_of(name))
+
+
+def exact_number(text: str, flag: str) -> Fraction:
+    """Return the exact number that a text of an option stands for."""
+    from ptcc_certify.graphs.rationals import parse_exact
+
+    try:
+        return parse_exact(text)
+    except PTCCError as error:
+        raise ParameterError(f"{flag}: {error}") from None
+
+
+def expected_behaviour(options: Options) -> str | None:
+    """Return the behaviour that ``--expect`` names."""
+    from ptcc_certify.graphs.structure import behaviour_name
+
+    try:
+        return None if options["expect"] is None else behaviour_name(options["expect"])
+    except ValueError as error:
+        raise ParameterError(f"--expect: {error}") from None
+
+
+def graph_file(graph: str) -> Any:
+    """Return the file of a graph, of a packaged one where no such file exists."""
+    from ptcc_certify.examples import GRAPHS, graph_path
+
+    if graph == "-" and sys.stdin is None:
+        raise ParameterError("standard input is closed; name a file")
+    packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
+    return graph_path(graph) if packaged else graph
+
+
+def read(graph: str, options: Options) -> SignedDigraph:
+    """Read GRAPH as the options say."""
+    from ptcc_certify.graphs.io import read_graph
+
+    how = {name: options[name] for name in READING if name != "edges"}
+    return read_graph(graph_file(graph), orientation=options["edges"], **how)
+
+
+def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
+    """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
+    from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+
+    shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
+    nominal = options["kind"] == "nominal"
+    others = (*SLIDING_DEFAULTS, "disturbance", "sigma0") if nominal else LIMITS
+    for name in others:
+        if options.get(name) is not None and not (nominal and name in disturbed):
+            other = "sliding-mode" if nominal else "nominal"
+            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; leave it out or change the protocol")
+    if nominal:
+        return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
+    if options["T"] is not None:
+        raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
+    own = {name: default if options[name] is None else options[name] for name, default in SLIDING_DEFAULTS.items()}
+    return SlidingModeProtocol(**own, **shared)
+
+
+def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
+    """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
+    from ptcc_certify.protocols.disturbance import as_disturbance
+
+    if (sliding := protocol.reaching) is None:
+        return {}
+    source = "adversary" if options["disturbance"] is None else options["disturbance"]
+    horizon, seed = 2 * float(protocol.T), options["seed"]
+    return {
+        "sigma0": _sigma0(options["sigma0"], seed, graph),
+        "disturbance": as_disturbance(source, graph.n_nodes, sliding.delta, horizon, seed),
+    }
+
+
+def actuator_of(options: Options) -> Actuator | None:
+    """Return the limits of the gain; None if there are none."""
+    from ptcc_certify.protocols.limits import Actuator
+
+    actuator = Actuator(**{name: number(options, name) for name in LIMITS})
+    return None if actuator.ideal else actuator
+
+
+def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
+    from ptcc_certify.graphs.rationals import parse_exact
+
+    try:
+        if text is None or parse_exact(text) == 0:
+            return [Fraction(0)] * graph.n_nodes
+    except NumberError:
+        pass
+    return start_of(text or "", [seed, 1], graph, "--sigma0: ")
+
+
+def start_of(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
+    """Return the start that ``--x0`` gives, or draw one."""
+    from ptcc_certify.graphs.io import random_states, read_state
+
+    if x0 == "random":
+        return [x for (x,) in random_states(seed, graph.n_nodes)]
+    try:
+        return read_state(x0, graph)
+    except PTCCError as error:
+        raise type(error)(f"{option}{error}") from None
+
+
+def start_columns(options: Options, graph: SignedDigraph) -> Any:
+    """Return the start of agents of ``--dimension`` components, one column for each."""
+    import numpy as np
+
+    from ptcc_certify.graphs.io import random_states
+
+    x0, seed, n, dimension = options["x0"], options["seed"], graph.n_nodes, options["dimension"]
+    if dimension == 1:
+        return start_of(x0, seed, graph)
+    if x0 == "random":
+        return random_states(seed, n, dimension)
+    texts = x0.split(",")
+    if len(texts) != n * dimension:
+        raise ParameterError(
+            f"--x0 has {len(texts)} value{'s' * (len(texts) > 1)} for {n} agents of dimension {dimension}; "
+            f"give {n * dimension} numbers, agent after agent"
+        )
+    return np.array([exact_number(text, "--x0") for text in texts]).reshape(n, dimension)

@@ -1,0 +1,69 @@
+"""``ptcc simulate``: the closed loop as CSV or figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.terminal import FIGURES, OK, refuse_output
+from ptcc_certify.errors import ParameterError
+
+_TABLES = ("", ".csv", ".txt")
+
+
+@click.command()
+@shared.graph_options
+@shared.protocol_options
+@shared.limit_options
+@click.option(
+    "--dimension", type=click.IntRange(1, 1000), default=1, show_default=True, help="State components per agent."
+)
+@click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
+@click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
+@click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
+def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
+    """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
+
+    rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
+    numbers, agent after agent. Under the sliding-mode protocol columns sigma(<label>) follow the states.
+    """
+    from ptcc_certify.graphs.io import write_atomically
+    from ptcc_certify.simulation.run import simulate as run
+
+    suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
+    if suffix not in (*FIGURES, *_TABLES):
+        raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
+    if suffix in FIGURES and vectors:
+        raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
+    refuse_output(output, graph)
+    protocol = shared.protocol_of(options, ("delta", "disturbance"))
+    nominal = options["kind"] == "nominal"
+    if vectors and not nominal:
+        raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
+    signed = shared.read(graph, options)
+    more = shared.sliding_keywords(protocol, options, signed)
+    if nominal:
+        more = {
+            "actuator": shared.actuator_of(options),
+            "delta": options["delta"],
+            "disturbance": options["disturbance"],
+        }
+    more |= {name: options[name] for name in ("samples", "boundary_layer")}
+    trajectory = run(signed, protocol, shared.start_columns(options, signed), **more)
+    if output and suffix in FIGURES:
+        from ptcc_certify.graphs.structure import analyse
+        from ptcc_certify.report.plots.style import save_figure
+        from ptcc_certify.report.plots.trajectory import plot_run
+
+        save_figure(plot_run(trajectory, analyse(signed), wide=wide), output)
+    elif output:
+        write_atomically(output, trajectory.to_csv())
+    else:
+        click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
+    if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
+        click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
+    return OK

@@ -1,0 +1,22 @@
+"""Sizes up to which something is done: the limits that a user may meet, in one table.
+
+Those of the independent check stand with it, those of the exact arithmetic with :mod:`lmi.exact`, and where one way of
+computing takes over from another is told where it does.
+"""
+
+#: Files: bytes after unpacking, characters of a line, nodes (a matrix has their number, not themselves).
+MAX_BYTES, MAX_LINE, MAX_NODES = 2**30, 65_536, 2 * 10**6
+
+#: Nodes up to which null vectors, outcomes and proofs are computed in exact rationals.
+EXACT_NODES = 120
+#: Nodes above which null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
+DENSE_NODES, FACTOR_NODES = 500, 20_000
+
+#: Agents up to which a report repeats the run unasked, and of every one of which it shows the input.
+REPEATED_NODES, INPUT_NODES = 1000, 100
+#: Nodes of a graph that is drawn, that is labelled, and whose layout is that of Kamada and Kawai.
+DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
+#: Nodes of a graph that a notebook draws unasked: a layout takes seconds above.
+SHOWN_NODES = 120
+#: Nodes of a graph that is explored, and up to which its certificate is checked unasked.
+EXPLORED_NODES, CHECKED_NODES = 120, 24

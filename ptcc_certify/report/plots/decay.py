@@ -1,0 +1,103 @@
+"""The error of a run under its proved bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.bounds.envelope import FLOOR_FACTOR
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.simulation.trajectory import Trajectory
+
+#: Horizontal axes of the decay, and their labels.
+_DECAY_AXES = {"left": "time left, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
+
+
+@styled
+def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = "left") -> Axes:
+    """Draw ``||E(t)|| / ||E(0)||`` of the simulated run under its proved bounds; the vertical axis is logarithmic.
+
+    Thick: the bound, the best of all proved Lyapunov functions at every instant. Thin: each of them. Dashed: the
+    paper's. Dotted: the integrator's floor, below which the run says nothing. If only Theorem 1.1's own coordinates
+    were proved, ``||eps(t)||`` instead.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        With a trajectory and a proved rate.
+    ax : Axes, optional
+    axis : {"left", "time", "clock"}
+        Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or ``t/T``; or the stretched
+        clock ``s(t)``, on which each bound is a straight line where nothing but a rate is at work.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        There is nothing to draw, or an unknown axis.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]
+    ['time left, $1 - t/T$', 'time, $t/T$', 'stretched clock $s(t)$']
+    """
+    if axis not in _DECAY_AXES:
+        raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
+    if run is None or start is None or certificate.comparison is None or not envelope.members:
+        raise ValueError("the certificate holds no simulated run with a proved bound")
+    ax, before, unit = axes_of(ax), run.remaining > 0, _unit(run)
+    remaining, states = run.remaining[before], run.states[:, before] / unit
+    place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
+    shown = [m for m in envelope.members if m.coordinates == envelope.coordinates]
+    norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
+    bound = envelope.norm_bound(remaining, start) / unit
+    scale = float(norm[0]) or float(bound[0])
+    if scale == 0:
+        raise ValueError("the agents begin where they end: nothing decays")
+    for number, member in enumerate(shown if len(shown) > 1 else ()):
+        alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / unit / scale
+        if member.kind == "paper":
+            ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
+        else:
+            label = "each Lyapunov function" if all(m.kind == "paper" for m in shown[:number]) else None
+            ax.plot(place, alone, color=BOUND, linewidth=0.7, alpha=0.55, label=label)
+    ax.plot(place, bound / scale, color=BOUND, linewidth=1.6, label="proved bound")
+    if norm[0] > 0:
+        ax.plot(place, np.maximum(norm / scale, 1e-300), color=RUN, label="simulated (CVODES)")
+        floor = FLOOR_FACTOR * run.rtol * float(np.abs(states).max()) * _row_sum(certificate)
+        ax.axhline(floor / scale, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")
+        least = min(float((norm / scale).min()), floor / scale)
+        ax.set_ylim(max(least, 1e-18) / 3, 3 * max(float((norm / scale).max()), float((bound / scale).max())))
+    ax.set_yscale("log")
+    if axis == "left":
+        ax.set_xscale("log", subs=[])  # ticks at decades only
+        ax.invert_xaxis()
+    name = "E" if envelope.coordinates == "E" else r"\varepsilon"
+    return finished(ax, _DECAY_AXES[axis], rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$")
+
+
+def _row_sum(certificate: Certificate) -> float:
+    """Bound ``||dz||`` for an error of 1 in every state."""
+    if certificate.envelope.coordinates == "eps":
+        return 2 * math.sqrt(certificate.graph.n_nodes)
+    return float(np.linalg.norm(abs(certificate.graph.laplacian()).sum(axis=1)))
+
+
+def _unit(trajectory: Trajectory) -> float:
+    """Return the size of the largest state, in which squares neither overflow nor vanish."""
+    return float(np.abs(trajectory.states).max(initial=0)) or 1.0

@@ -1,0 +1,242 @@
+"""The input of a run, what it has spent, and what is proved of both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled
+from ptcc_certify.report.plots.trajectory import draw_agents, draw_deadlines
+from ptcc_certify.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ptcc_certify.bounds.input import Effort
+    from ptcc_certify.certificate.certificate import Certificate
+
+#: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
+RESOLVED_ERROR = 10
+#: Decades of the input that are drawn below its size at the start; changes of sign go further down.
+INPUT_DECADES = 3
+
+
+@styled
+def plot_input(
+    trajectory: Trajectory, structure: Structure, certificate: Certificate | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same start proves.
+
+    The axis of the input is logarithmic, from three decades below its size at the start. Behind an actuator it is the
+    input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn
+    where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol,
+    boundary layers. Under caps and stops that ``certificate`` judges, theirs is drawn.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of one start.
+    structure : Structure
+        Of the same graph.
+    certificate : Certificate, optional
+        Of the same graph, protocol and start. One of a set of starts adds nothing.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        The trajectory holds several starts, or the certificate is of another graph, protocol or start.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse, simulate
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> ax = plot_input(run, analyse(pair))
+    >>> len(ax.lines), ax.get_ylabel()
+    (3, 'input $|u_k|$')
+    """
+    _need_one_start(trajectory)
+    peak = None if certificate is None else _certified_peak(trajectory, certificate)
+    ax, u = axes_of(ax), _resolved_input(trajectory)
+    size = np.where(np.isnan(u), 0.0, np.abs(u))
+    top = max(float(size.max(initial=0)), peak or 0.0)
+    if top > 0:
+        ax.set_yscale("log", nonpositive="clip")
+        first = float(size[:, 0].max(initial=0)) if u.shape[1] else 0.0
+        ax.set_ylim((first or top) * 10.0**-INPUT_DECADES, top * 2)
+    held = trajectory.held_input is not None
+    draw_agents(trajectory, np.abs(u), structure, ax, drawstyle="steps-post" if held else "default")
+    if peak is not None:
+        ax.axhline(peak, color="black", linewidth=0.9, linestyle="--", label="certified peak")
+    return finished(ax, "time $t$", "input $|u_k|$")
+
+
+@styled
+def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate of the same start proves.
+
+    The integral is numerical: between the samples ``||u||^2`` is taken for an exponential of ``ln(T/(T - t))``, as it
+    is along a single mode. No bound is drawn where none holds: as in :func:`plot_input`, and under the sliding-mode
+    protocol, whose switching part no certificate integrates.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of one start.
+    certificate : Certificate, optional
+        Of the same graph, protocol and start.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        The trajectory holds several starts, its samples do not settle the energy, or the certificate is of another
+        graph, protocol or start.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> ax = plot_effort(cert.trajectory, cert)
+    >>> [line.get_label() for line in ax.lines]
+    ['simulated (CVODES)', 'certified bound', 'deadline']
+    """
+    _need_one_start(trajectory)
+    proved = None if certificate is None else _certified_effort(trajectory, certificate)
+    bound = None
+    if proved is not None and proved.energy is not None and trajectory.actuator is None:
+        bound = None if trajectory.sliding else float(proved.energy.value)
+    ax, spent = axes_of(ax), _energy(trajectory)
+    ax.plot(trajectory.t, spent, color=RUN, label="simulated (CVODES)")
+    if bound is not None:
+        ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
+    ax.set_ylim(0, 1.1 * max(bound or 0.0, float(spent.max(initial=0))) or 1)
+    draw_deadlines(trajectory, ax)
+    return finished(ax, "time $t$", r"energy spent, $\int \|u\|^2\, dt$")
+
+
+def _need_one_start(trajectory: Trajectory) -> None:
+    if trajectory.states.ndim != 2:
+        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
+
+
+def _resolved_input(trajectory: Trajectory) -> np.ndarray:
+    """Return the input, NaN where the infinite gain multiplies what the integrator does not resolve."""
+    u = np.array(trajectory.input)
+    if trajectory.held_input is not None:
+        return u
+    weights = abs(trajectory.graph.laplacian())
+    floor = RESOLVED_ERROR * trajectory.rtol * np.asarray(weights @ np.abs(trajectory.states))
+    lost = np.abs(trajectory.error) < floor
+    if trajectory.sliding:  # what answers the disturbance is resolved
+        u[lost] -= (trajectory.protocol.gain.value_at_remaining(trajectory.remaining) * trajectory.error)[lost]
+        lost &= u == 0
+    u[lost] = np.nan
+    return u
+
+
+def _energy(trajectory: Trajectory) -> np.ndarray:
+    """Return ``int ||u||^2 dt`` up to each instant, (M,).
+
+    Raises
+    ------
+    ValueError
+        With every second sample it would differ by more than a hundredth.
+    """
+    power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
+    if trajectory.held_input is not None:
+        return np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(trajectory.t))])
+    T, t, left = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
+    full = (trajectory.input**2).sum(axis=0)
+    every, some = (_integrated(power[::k], full[::k], t[::k], left[::k], T) for k in (1, 2))
+    if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
+        raise ValueError("these samples do not settle the energy: simulate with more, unless it is infinite")
+    return every
+
+
+def _integrated(power: np.ndarray, full: np.ndarray, t: np.ndarray, left: np.ndarray, T: float) -> np.ndarray:
+    """Integrate over time, before ``T`` over ``tau = -ln(left)``: exact for exponentials of ``tau``.
+
+    ``full`` holds besides ``power`` what is not resolved: it tells how fast ``power`` fell to there.
+    """
+    power = power.copy()
+    lost = 1 + np.flatnonzero((power[1:] == 0) & (power[:-1] > 0))
+    power[lost] = np.minimum(full[lost], power[lost - 1])
+    late = left[1:] <= 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tau = np.where(late, 0.0, np.log(left[:-1] / left[1:]))
+    early = _logarithmic_mean(power[:-1] * left[:-1], power[1:] * left[1:]) * T * tau
+    pieces = np.where(late, np.minimum(power[:-1], power[1:]) * np.diff(t), early)
+    return np.concatenate([[0.0], np.cumsum(pieces)])
+
+
+def _logarithmic_mean(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return ``(a - b) / ln(a/b)``, the mean of the exponential from ``a`` to ``b``; half the sum if one is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.log(a / b)
+        mean = (a - b) / ratio
+    return np.where(np.isfinite(ratio) & (np.abs(ratio) > 1e-6), mean, (a + b) / 2)
+
+
+def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float | None:
+    """Return the proved bound of ``|u_k|`` that holds for a run; None if there is none.
+
+    Raises
+    ------
+    ValueError
+        The certificate is of another graph, protocol or start.
+    """
+    effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
+    if effort is None:
+        return None
+    if actuator is None:
+        return None if effort.peak is None else float(effort.peak.largest)
+    if actuator.sample_period is not None:
+        return None
+    for entry in effort.residual:
+        same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
+        if same and entry.limits.sample_period is None and entry.largest is not None:
+            return float(entry.largest)
+    # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
+    return None if effort.peak is None else float(effort.peak.largest)
+
+
+def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effort | None:
+    """Return what is proved about the input of a run; None if that is of other starts, or the run is disturbed.
+
+    Raises
+    ------
+    ValueError
+        The certificate is of another graph, protocol or start.
+    """
+    for name in ("graph", "protocol"):
+        if getattr(certificate, name) != getattr(trajectory, name):
+            raise ValueError(f"the certificate is of another {name} than the trajectory")
+    starts = [("start", certificate.start, trajectory.states[:, :1])]
+    rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the start
+    unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
+    if (slid := trajectory.sliding) is not None:
+        sigma0 = slid.sigma0[:, None]
+        starts.append(("sigma(0)", certificate.sigma0, sigma0))
+        unproved = unproved or slid.boundary_layer is not None
+        rounding = rounding + np.abs(sigma0)  # the states are sums of two parts
+    for name, proved, run in starts if 0.0 in trajectory.t[:1] else ():
+        at = run if proved is None else np.array([[float(x)] for x in proved])
+        if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
+            raise ValueError(f"the certificate is of another {name} than the trajectory")
+    effort = certificate.effort
+    if effort is None or effort.starts is not None or certificate.start is None or unproved:
+        return None
+    return effort

@@ -1,0 +1,120 @@
+"""What decides the rate: eigenvalues, and the Lyapunov functions that are proved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lmi.exact.rounding import float_up
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
+from ptcc_certify.theorems.lemmas import laplacian_spectrum
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.protocols import Protocol
+
+#: Colour and marker of the classes of certificates.
+CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#009E73", "^"), "lmi": (RUN, "o"), "full": (BOUND, "D")}
+
+
+@styled
+def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the eigenvalues of ``L`` (numerical), and the line from which on the input stays bounded.
+
+    The zeros of balanced closed components are marked apart. From every start the input (its nominal part, under the
+    sliding-mode protocol) is bounded up to the deadline if all other eigenvalues lie right of ``1/(rho2 kappa)``; one
+    to its left leaves it unbounded. One unit is as long in both directions.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of strong components above 500 nodes only the eigenvalues nearest to 0 are computed.
+    protocol : NominalProtocol or SlidingModeProtocol, optional
+        Whose line is drawn; there is none with ``rho2 = 0``.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The eigenvalues were not found.
+
+    Examples
+    --------
+    >>> from ptcc_certify import SignedDigraph, analyse
+    >>> ax = plot_spectrum(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])))
+    >>> [(line.get_label(), line.get_xdata().round(6).tolist()) for line in ax.lines]
+    [('nonzero eigenvalues', [2.0, 4.0]), ('zero eigenvalues', [0.0])]
+    """
+    ax, spectrum = axes_of(ax), laplacian_spectrum(structure)
+    if spectrum.nonzero.size:
+        values = spectrum.nonzero
+        ax.plot(values.real, values.imag, "o", color=RUN, markersize=5, alpha=0.7, label="nonzero eigenvalues")
+    if spectrum.kernel_dimension:
+        many = "" if spectrum.kernel_dimension == 1 else f" ({spectrum.kernel_dimension})"
+        ax.plot([0.0], [0.0], "x", color=BEHIND, markersize=7, label=f"zero eigenvalues{many}")
+    if protocol is not None and protocol.prescribed:
+        least = float(1 / (protocol.rho2 * protocol.kappa))
+        name = r"$1/(\rho_2 \kappa)$: input bounded to the right"
+        ax.axvline(least, color=BOUND, linewidth=0.9, linestyle="--", label=name)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    return finished(ax, "real part of eigenvalue", "imaginary part of eigenvalue")
+
+
+@styled
+def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
+    """Draw rate against prefactor of all proved Lyapunov functions by class, and what no rate exceeds.
+
+    A function of rate ``b`` and prefactor ``c`` proves ``||z(t)||^2 <= c e^(-b s) ||z(0)||^2``, ``z`` being ``E``, or
+    the ``eps`` of Theorem 1.1 for the paper's own. The axis of the prefactor is logarithmic.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        With a proved Lyapunov function.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        There is nothing to draw.
+
+    Examples
+    --------
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> ax = plot_frontier(certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)))
+    >>> [line.get_label() for line in ax.lines]
+    ['paper', 'perron', 'no rate exceeds (proved)', 'spectral rate (numerical)']
+    """
+    members = certificate.envelope.members
+    if not members:
+        raise ValueError("the certificate holds no proved Lyapunov function")
+    ax = axes_of(ax)
+    ax.set_xscale("log")
+    for kind, (colour, marker) in CLASS_MARKERS.items():
+        own = [m for m in members if m.kind == kind]
+        if own:
+            points = [m.prefactor_above for m in own], [m.rate_below for m in own]
+            ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
+    rates = [m.rate_below for m in members]
+    if certificate.upper_bound is not None:
+        limit = float_up(certificate.upper_bound)
+        ax.axhline(limit, color=BEHIND, linewidth=2.2, alpha=0.6, label="no rate exceeds (proved)")
+        rates.append(limit)
+    if certificate.spectral_rate is not None:
+        rates.append(certificate.spectral_rate)
+        ax.axhline(rates[-1], color="black", linewidth=0.9, linestyle=":", label="spectral rate (numerical)")
+    low, high = min(0.0, *rates), max(0.0, *rates)
+    ax.set_ylim(low - 0.08 * (high - low) * (low < 0), high + 0.08 * (high - low))
+    return finished(ax, "prefactor of the squared norm", "proved rate")
