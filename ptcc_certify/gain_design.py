@@ -54,9 +54,9 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_bounds import BITS, InputBounds, Limits, Linear
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
+from ptcc_certify.graphs.rich_display import Shown
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols import NominalProtocol, Protocol
 from ptcc_certify.protocols.limits import GainLimits

@@ -18,10 +18,10 @@ from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rich_display import Shown
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: GB that the check of a large graph may take while it is certified.

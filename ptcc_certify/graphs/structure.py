@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.display import Shown
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.rich_display import Shown
 
 STABILITY = "stability"
 BIPARTITE_CONSENSUS = "bipartite consensus"

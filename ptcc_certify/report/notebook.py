@@ -1,6 +1,6 @@
 """What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
 
-Registered with :mod:`ptcc_certify.display`, which calls them for ``_repr_html_``; elsewhere the plain ``repr`` is
+Registered with :mod:`ptcc_certify.graphs.rich_display`, which calls them for ``_repr_html_``; elsewhere the plain ``repr`` is
 shown. Labels are escaped, figures are inline SVG images with a text in their place for those who do not see them.
 """
 
@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.display import shows
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.limits import SHOWN_NODES
+from ptcc_certify.graphs.rich_display import shows
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph

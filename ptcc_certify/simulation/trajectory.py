@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ptcc_certify.display import Shown
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rich_display import Shown
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
