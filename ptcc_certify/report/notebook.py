@@ -1,7 +1,8 @@
 """What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
 
 Registered with :mod:`ptcc_certify.graphs.rich_display`, which calls them for ``_repr_html_``; elsewhere the plain
-``repr`` is shown. Labels are escaped, figures are inline SVG images with a text in their place for those who do not see them.
+``repr`` is shown. Labels are escaped, figures are inline SVG images with a text in their place for those who
+do not see them.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ import pytest
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.fast import ArrayDigraph

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import ptcc_certify
-from ptcc_certify.certificate.certificate import certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph, select
 
 ROOT = Path(ptcc_certify.__file__).parents[1]

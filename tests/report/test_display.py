@@ -16,7 +16,7 @@ from ptcc_certify.gain_design import design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.nominal import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 
 PROTOCOL = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)

@@ -24,6 +24,7 @@ from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.protocols.limits import Actuator
 from ptcc_certify.protocols.nominal import NominalProtocol
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import EDGE_STYLES, HALO, plot_graph
@@ -31,7 +32,6 @@ from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import CAMP_COLOURS, DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, save_figure
 from ptcc_certify.report.plots.trajectory import plot_run, plot_trajectory
-from ptcc_certify.simulation.limited import Actuator
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
