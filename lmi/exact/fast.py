@@ -25,10 +25,9 @@ from lmi.exact.work import fits, spend
 
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
-#: Up to this many rows python-flint decides, by the characteristic polynomial; above, NumPy proposes a factor.
-FLINT_ROWS = 24
-#: python-flint is not asked about entries longer than these bits over the number of rows.
-FLINT_BITS = 40_000
+#: Up to this many rows python-flint decides, by the characteristic polynomial, unless entries are longer than so many
+#: bits over the number of rows; above, NumPy proposes a factor.
+FLINT_ROWS, FLINT_BITS = 24, 40_000
 #: Matrices with entries of more bits whose mean is shorter by this factor are not multiplied by python-flint.
 PADDED_BITS, PADDED = 4000, 8
 #: Bits of all entries up to which python-flint multiplies large matrices.
@@ -272,6 +271,8 @@ def factor(S: Any) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     exponents = np.array([-((length + 1) // 2) for length in lengths])
     T, down = _shifted(S, exponents, FACTOR_BITS)
+    if (T != T.T).any():
+        return None
     one = 2 * FACTOR_BITS + down  # the diagonal is in [2^(one - 2), 2^one), nothing above 2^one if S > 0
     try:
         unit = (T >> (one - 60)).astype(np.int64).astype(np.float64) * 2.0**-60
@@ -304,7 +305,8 @@ def dense_spare(S: Any, R: np.ndarray, exponents: Any, bits: int) -> list[int] |
     >>> dense_spare([[4, 2], [2, 5]], np.array([[31, 0], [16, 31]]), [0, 0], 4)
     [47, 47]
     """
-    return _spare(*_shifted(S, np.asarray(exponents), bits), R)
+    T, down = _shifted(S, np.asarray(exponents), bits)
+    return None if (T != T.T).any() else _spare(T, down, R)
 
 
 def _shifted(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]:
@@ -317,7 +319,7 @@ def _shifted(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]
 
 
 def _spare(T: np.ndarray, down: int, R: np.ndarray) -> list[int] | None:
-    if (T != T.T).any() or (whole := square(R)) is None:
+    if (whole := square(R)) is None:
         return None
     E = T - (whole << down if down else whole)
     diagonal = np.diag(E)
