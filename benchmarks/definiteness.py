@@ -4,9 +4,9 @@
 
 Dense matrices of 1,000 rows, matrices that dominate with 10^5 and 10^6 rows, and the largest strong component of
 Bitcoin OTC (``soc-sign-bitcoinotc.csv.gz`` in FOLDER; skipped without it) as a graph of its own. ``prove`` finds a
-witness from floats and proves it exactly (:mod:`lmi.exact.proofs`);
-``check`` judges it again by other code, from integers
-(:mod:`lmi.exact.sparse`). The matrices ``P L + L' P - b P`` are exact: ``p`` in integers, ``b`` dyadic.
+witness from floats, for which the kernel decides (:mod:`lmi.witness`); ``check`` hands the witness to the kernel alone,
+by the standard library or by its array twins (:mod:`lmi.exact`). The matrices ``P L + L' P - b P`` are exact: ``p`` in
+integers, ``b`` dyadic.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 import lmi
-from lmi.exact.sparse import dense_definite, dominates, residual_definite
+from lmi.exact import arithmetic
 from ptcc_certify import SignedDigraph, analyse, read_graph
 from ptcc_certify.theorems.lemmas import left_vector
 
@@ -86,7 +86,7 @@ def dense(name: str, S: np.ndarray, note: str) -> bool:
     proof, prove = timed(lmi.prove_positive_definite, S)
     values, _ = lmi.dyadic_integers(S.ravel())
     rows = [values[k : k + len(S)] for k in range(0, len(values), len(S))]
-    check, seconds = timed(dense_definite, rows)
+    check, seconds = timed(arithmetic().definite, rows)
     bits = max(map(abs, values)).bit_length()
     return report(name, prove, seconds, "5 s together", bool(proof) and check, f"{note}; entries to {bits} bits")
 
@@ -133,8 +133,9 @@ def dominance(n: int, plain: bool, goal: str) -> bool:
     columns = [sources, targets, weights, diagonal, proof.u, proof.v]
     if plain:
         columns = [column.tolist() for column in columns]
-    check, seconds = timed(dominates, n, columns[:3], *columns[3:], proof.rate)
-    wrong = dominates(n, columns[:3], *columns[3:], proof.rate * (1 + Fraction(1, 2**40)))
+    judge = arithmetic(stdlib=plain)
+    check, seconds = timed(judge.dominates, n, columns[:3], *columns[3:], proof.rate)
+    wrong = judge.dominates(n, columns[:3], *columns[3:], proof.rate * (1 + Fraction(1, 2**40)))
     path = "standard library" if plain else "NumPy"
     note = f"{len(sources)} edges, b = {float(proof.rate):.6g}" + ("; WRONG RATE PASSED" if wrong else "")
     return report(f"dominance {n:.0e}, check by {path}", prove, seconds, goal, check and not wrong, note)
@@ -161,18 +162,8 @@ def real_core(folder: Path) -> bool:
     values, power = lmi.dyadic_integers(lower.data)
     holds = True
     for path, numpy in (("NumPy", True), ("standard library", False)):
-        check, seconds = timed(
-            residual_definite,
-            core.n_nodes,
-            (lower.row, lower.col, values),
-            proof.order,
-            (proof.indptr, proof.indices, proof.data),
-            proof.exponents,
-            proof.bits,
-            power=power,
-            weights=proof.weights,
-            numpy=numpy,
-        )
+        judge = arithmetic(stdlib=not numpy).residual_definite
+        check, seconds = timed(judge, core.n_nodes, (lower.row, lower.col, values), proof, power)
         note = f"n {core.n_nodes}, factor {len(proof.data)} nonzeros at {proof.bits} bits"
         holds &= report(f"Bitcoin OTC core, check by {path}", prove if numpy else None, seconds, "", check, note)
     above = sparse.csc_array(S * 2**PLACES - P * (int(smallest * 2**PLACES) + 1))

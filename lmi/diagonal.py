@@ -10,7 +10,7 @@ import contextlib
 import importlib.util
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
-_RESOLVED = 100.0
+RESOLVED = 100.0
 #: Up to this many rows Clarabel climbs to the best rate; above, on a subspace, and in the blocks of a larger matrix,
 #: :mod:`lmi.interior_point` does.
 CLARABEL_ROWS = 20
@@ -154,17 +154,17 @@ def diagonal_lyapunov(
         raise MatrixError('basis and start belong to objective="rate"')
     if n == 1 or max_condition == 1:
         return _margin_certificate(A, np.ones(n))
-    scale, least = _scale(A), 0.0 if max_condition is None else 1 / max_condition
+    scale, least = largest_entry(A), 0.0 if max_condition is None else 1 / max_condition
     solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS else "interior-point")
     if solver == "interior-point":
         return _margin_certificate(A, maximise_margin(A / scale, np.ones(n), tolerance=tolerance, least=least).omega)
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
         omega, t = cp.Variable(n), cp.Variable()
-        S = _symmetric_product(cp, omega, A / scale)
+        S = symmetric_product(cp, omega, A / scale)
         return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= least, omega <= 1]), omega
 
-    omega = _positive(_solve(problem, tolerance, solver))
+    omega = positive(solve(problem, tolerance, solver))
     return _margin_certificate(A, np.maximum(omega, least * omega.max()))
 
 
@@ -280,7 +280,7 @@ def _climb(
         checkpoint()
         try:
             omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance, clarabel)
-            proposal = normalised(_positive(omega)) + frame
+            proposal = normalised(positive(omega)) + frame
         except NoCertificate:
             break
         proposal = proposal - proposal.max()
@@ -352,7 +352,7 @@ def _step(
     n = len(A)
     B = scaled(A, frame)
     diagonal = np.diag(B)
-    unit = 1 / np.sqrt(diagonal if (diagonal > 0).all() else np.full(n, _scale(B)))
+    unit = 1 / np.sqrt(diagonal if (diagonal > 0).all() else np.full(n, largest_entry(B)))
     S = unit[:, None] * B * unit
     square_unit = unit * unit
     weight = square_unit * np.exp(current - frame - (current - frame).max())
@@ -368,7 +368,7 @@ def _step(
 
     def problem(cp: Any) -> tuple[cp.Problem, cp.Expression]:
         omega, t = cp.Variable(n), cp.Variable()
-        form = _symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
+        form = symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
         constraints = [form >> 0, cp.sum(omega) == n, omega >= 0]
         if max_condition is not None:
             low = cp.Variable()
@@ -376,7 +376,7 @@ def _step(
             constraints += [cp.multiply(relative, omega) >= low, cp.multiply(relative, omega) <= max_condition * low]
         return cp.Problem(cp.Maximize(t), constraints), cp.hstack([omega, t])
 
-    solution = _solve(problem, tolerance, dual=True)
+    solution = solve(problem, tolerance, dual=True)
     return solution[0][:n], unit[:, None] * _dual_rows(solution[1], tail)
 
 
@@ -647,259 +647,15 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
         return _margin_certificate(A, closed_form)
 
 
-@dataclass(frozen=True)
-class FixedLeader:
-    """A leader block whose Lyapunov matrix is known up to the scale shared by all such blocks.
-
-    Attributes
-    ----------
-    omega : (k,) array
-        The diagonal of the Lyapunov matrix, positive.
-    decrease : (k,) array
-        Positive: the diagonal of a matrix that bounds the decrease of ``x' diag(omega) x`` from below on the states
-        that occur.
-
-    References
-    ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
-    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
-
-    Examples
-    --------
-    >>> two = FixedLeader(omega=np.array([1.0, 3.0]), decrease=np.full(2, 2.0))
-    >>> coupled_lyapunov([two], [[-1.0, 0.0]], [[1.0]]).leaders[0]  # kept as it is
-    array([1., 3.])
-    """
-
-    omega: np.ndarray
-    decrease: np.ndarray
-
-
-@dataclass(frozen=True)
-class FreeLeader:
-    """A leader block ``x' = -A x`` whose diagonal ``H`` is searched; its decrease counts as ``lmin(HA + A'H) I``.
-
-    Attributes
-    ----------
-    A : (k, k) array or sparse matrix
-        With a diagonal Lyapunov matrix.
-
-    References
-    ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
-    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
-
-    Examples
-    --------
-    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
-    >>> bool(found.leaders[0][0] > 0 and found.followers[0] > 0)
-    True
-    """
-
-    A: np.ndarray
-
-
-@dataclass(frozen=True)
-class CoupledCertificate:
-    """Diagonal Lyapunov matrices of leaders and followers, found together.
-
-    Attributes
-    ----------
-    leaders : tuple of (k,) arrays
-        For a fixed block its ``omega`` unchanged; for a free block relative to those.
-    followers : (n_F,) array
-        ``rho Omega_F``: the coupling factor is contained.
-
-    References
-    ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
-    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
-
-    Examples
-    --------
-    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
-    >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*found.leaders, found.followers])
-    >>> from lmi import diagonal_margin
-    >>> diagonal_margin(A, omega) > 0
-    True
-    """
-
-    leaders: tuple[np.ndarray, ...]
-    followers: np.ndarray
-
-
-def coupled_lyapunov(
-    leaders: Sequence[FixedLeader | FreeLeader], A_FL: Any, A_F: Any, *, tolerance: float = 1e-9
-) -> CoupledCertificate:
-    """Find free leader blocks, follower matrix and coupling factor in one semidefinite program.
-
-    With ``Gamma`` the block diagonal of ``s diag(decrease)`` (fixed blocks) and ``t_k I`` (free blocks,
-    ``H_k A_k + A_k' H_k >= t_k I``), solves
-
-        maximise t   subject to   [[Gamma, A_FL' Y], [Y A_FL, Y A_F + A_F' Y]] >= t I,   all diagonals <= 1,
-
-    whose optimum is the largest ``lmin(Pi) / lmax(H)`` of the paper over free blocks, ``Y = rho H_F`` and ``rho``.
-
-    Parameters
-    ----------
-    leaders : sequence of FixedLeader or FreeLeader
-    A_FL : (n_F, n_L) array
-        Columns in the order of the leader blocks.
-    A_F : (n_F, n_F) array
-        Of the followers.
-    tolerance : float
-        Relative gap asked of the solver.
-
-    Returns
-    -------
-    CoupledCertificate
-
-    Raises
-    ------
-    MatrixError
-        Shapes do not match, or there is no leader block.
-    NoCertificate
-        A free block or the follower block has no diagonal Lyapunov matrix that the solver can resolve.
-    NotAnHMatrix
-        The solver found no positive rate, and the follower block is not an H-matrix with positive diagonal.
-
-    References
-    ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
-    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
-
-    Examples
-    --------
-    >>> found = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
-    >>> (found.followers > 0).all()
-    np.True_
-    """
-    A_F = square(A_F, "A_F")
-    A_FL = np.asarray(A_FL.toarray() if hasattr(A_FL, "toarray") else A_FL, dtype=np.float64)
-    sizes = [len(block.omega) if isinstance(block, FixedLeader) else len(square(block.A)) for block in leaders]
-    n_L, n_F = sum(sizes), len(A_F)
-    fixed = [block for block in leaders if isinstance(block, FixedLeader)]
-    if any(not (b.omega.min() > 0 and b.decrease.min() > 0) for b in fixed if len(b.omega)):
-        raise MatrixError("a fixed leader block needs a positive omega and a positive decrease")
-    if n_L == 0:
-        raise MatrixError("there is no leader block; use h_matrix_lyapunov for followers alone")
-    if A_FL.shape != (n_F, n_L):
-        raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
-    # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
-    scale = max(_scale(A_F), *(_scale(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
-    fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
-    if n_L + n_F > CLARABEL_MARGIN_ROWS:
-        return _coupled_large(leaders, A_FL / scale, A_F / scale, scale, fixed_top, tolerance)
-
-    def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
-        s = cp.Variable() if fixed else cp.Constant(1.0)
-        t, Y = cp.Variable(), cp.Variable(n_F) if n_F else cp.Constant(np.zeros(0))
-        diagonal, constraints, free = [], [Y >= 0, Y <= 1] if n_F else [], []
-        if fixed:
-            constraints += [s >= 0, s <= 1]
-        for block, k in zip(leaders, sizes, strict=True):
-            if isinstance(block, FixedLeader):
-                diagonal.append(s * (block.decrease / (fixed_top * scale)))
-            else:
-                H, t_k = cp.Variable(k), cp.Variable()
-                constraints += [H >= 0, H <= 1]
-                if k > 1:
-                    constraints.append(_symmetric_product(cp, H, square(block.A) / scale) - t_k * np.eye(k) >> 0)
-                else:
-                    constraints.append(2 * H[0] * float(np.squeeze(block.A)) / scale >= t_k)
-                diagonal.append(t_k * np.ones(k))
-                free.append(H)
-        if n_F:
-            followers = _symmetric_product(cp, Y, A_F / scale)
-            coupling = cp.diag(Y) @ (A_FL / scale)
-            Pi = cp.bmat([[cp.diag(cp.hstack(diagonal)), coupling.T], [coupling, followers]])
-        else:
-            Pi = cp.diag(cp.hstack(diagonal))
-        constraints.append(Pi - t * np.eye(n_L + n_F) >> 0)
-        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free] if n_F else [s, t, *free])
-
-    values = _solve(problem, tolerance)
-    s, t, Y, rest = values[0], values[1], values[2 : 2 + n_F], values[2 + n_F :]
-    if not (t > _RESOLVED * tolerance and s > 0):
-        return _block_by_block(leaders, A_F, fixed_top, tolerance)
-    found, used = [], 0
-    unit = fixed_top / s if fixed else 1.0
-    for block, k in zip(leaders, sizes, strict=True):
-        if isinstance(block, FixedLeader):
-            found.append(block.omega)
-        else:
-            found.append(_positive(rest[used : used + k]) * unit)
-            used += k
-    return CoupledCertificate(tuple(found), _positive(Y) * unit if n_F else Y)
-
-
-def _coupled_large(
-    leaders: Sequence[FixedLeader | FreeLeader],
-    A_FL: np.ndarray,
-    A_F: np.ndarray,
-    scale: float,
-    top: float,
-    tolerance: float,
-) -> CoupledCertificate:
-    """Couple blocks by the interior-point method: free leader blocks at their own best margin, all scaled together.
-
-    The blocks are in units of ``scale``, fixed ones have ``top`` as their largest entry. A block of leaders is one
-    weight: ``Pi`` is ``W C + C'W`` with half its decrease on the diagonal of ``C``.
-    """
-    omegas, halves, groups = [], [], []
-    for k, block in enumerate(leaders, start=1):
-        if isinstance(block, FixedLeader):
-            omegas.append(block.omega / top)
-            halves.append(block.decrease / (2 * top * scale))
-        else:
-            found = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
-            omegas.append(found.omega)
-            halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
-        groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))
-    shared, n_L = np.unique(np.concatenate(groups), return_inverse=True)[1], sum(map(len, omegas))
-    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, len(A_F)))], [A_FL, A_F]])
-    own = np.concatenate([shared, shared.max() + 1 + np.arange(len(A_F))])
-    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
-    weights = _positive(solution.omega)
-    if not solution.t > _RESOLVED * tolerance:
-        return _block_by_block(leaders, A_F * scale, top, tolerance)
-    fixed = [i for i, group in enumerate(groups) if not group[0]]
-    starts = np.cumsum([0, *map(len, omegas)])
-    unit = top / weights[starts[fixed[0]]] if fixed else 1.0
-    return CoupledCertificate(
-        tuple(
-            block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
-            for block, omega, start in zip(leaders, omegas, starts, strict=False)
-        ),
-        weights[n_L:] * unit,
-    )
-
-
-def _block_by_block(
-    leaders: Sequence[FixedLeader | FreeLeader], A_F: np.ndarray, top: float, tolerance: float
-) -> CoupledCertificate:
-    """Find each block by itself, for when the best joint rate lies below what the solver resolves."""
-    found = tuple(
-        block.omega if isinstance(block, FixedLeader) else top * diagonal_lyapunov(block.A, tolerance=tolerance).omega
-        for block in leaders
-    )
-    followers = top * h_matrix_lyapunov(A_F, tolerance=tolerance).omega if len(A_F) else np.zeros(0)
-    return CoupledCertificate(found, followers)
-
-
 def _margin_certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
-    log_omega = normalised(_positive(omega))
+    log_omega = normalised(positive(omega))
     margin = diagonal_margin(A, np.exp(log_omega))
     if not margin > 0:
         raise NoCertificate(f"the best margin found is {margin:.3g}, which is not positive")
     return DiagonalCertificate(log_omega, margin)
 
 
-def _positive(omega: np.ndarray) -> np.ndarray:
+def positive(omega: np.ndarray) -> np.ndarray:
     """Lift entries that the solver left at or below zero."""
     top = float(np.max(omega, initial=0.0))
     if not (math.isfinite(top) and top > 0):
@@ -907,12 +663,12 @@ def _positive(omega: np.ndarray) -> np.ndarray:
     return np.maximum(omega, 1e-14 * top)
 
 
-def _scale(A: np.ndarray) -> float:
+def largest_entry(A: np.ndarray) -> float:
     """Return a unit in which the entries of ``A`` are at most 1."""
     return float(np.abs(A).max(initial=0.0)) or 1.0
 
 
-def _symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
+def symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
     """Return ``Omega A + A' Omega`` as a cvxpy expression that keeps the zeros of ``A``."""
     from scipy import sparse
 
@@ -920,7 +676,7 @@ def _symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
     return product + product.T
 
 
-def _solve(
+def solve(
     problem: Callable[[Any], tuple[cp.Problem, cp.Expression]],
     tolerance: float,
     solver: str = "clarabel",

@@ -407,7 +407,7 @@ class Arithmetic:
         >>> [float(x) for x in Arithmetic().above([[2, 1], [1, 1]], [[1, 0], [0, 2]])]
         [1.0, 8.0]
         """
-        factor = self.factor(S, bits)
+        factor = self.factor(S, bits) if symmetric(S) else None
         if factor is None:
             return None
         spend(len(D) * len(S) ** 2 // 2, factor.bits, factor.bits, "constants of many agents")

@@ -5,13 +5,12 @@ All in integers and rationals, with the standard library.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from numbers import Rational
 from operator import mul
 from typing import Any
-
-from lmi.exact.numbers import integers
 
 #: Numerators and positive denominators of the rates of the rows.
 Pairs = list[tuple[int, int]]
@@ -139,7 +138,7 @@ def bounds_diagonal_rates(A: Rows, Y: Rows, rate: Fraction) -> bool:
     >>> bounds_diagonal_rates([[one, -one], [-one, 2 * one]], [[one], [one]], Fraction(0))
     False
     """
-    (a, unit), (y, _) = integers(A), integers(Y)
+    (a, unit), (y, _) = _whole(A), _whole(Y)
     sizes = [sum(map(mul, row, row)) for row in y]
     columns = list(zip(*y, strict=True))
     moved = [
@@ -147,3 +146,9 @@ def bounds_diagonal_rates(A: Rows, Y: Rows, rate: Fraction) -> bool:
         for row, own in zip(a, y, strict=True)
     ]
     return any(sizes) and all(2 * m <= rate * unit * size for m, size in zip(moved, sizes, strict=True))
+
+
+def _whole(M: Rows) -> tuple[list[list[int]], int]:
+    """Return a rational matrix as integers over one denominator, and that."""
+    scale = math.lcm(*(x.denominator for row in M for x in row))
+    return [[x.numerator * (scale // x.denominator) for x in row] for row in M], scale

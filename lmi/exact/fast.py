@@ -19,7 +19,7 @@ import flint
 import numpy as np
 
 from lmi.exact import dominance
-from lmi.exact.definite import BITS, Arithmetic, Rows, Scaled, symmetric
+from lmi.exact.definite import BITS, LARGEST_BITS, Arithmetic, Rows, Scaled, symmetric
 from lmi.exact.numbers import longest
 from lmi.exact.work import fits, spend
 
@@ -38,7 +38,6 @@ SLICE, FACTOR_BITS = 21, 57
 #: Longest column of a sparse factor that is multiplied pair by pair, entries of the largest dense block at the end,
 #: pairs in all, and at a time.
 LONGEST_COLUMN, LARGEST_BLOCK, LARGEST_PAIRS, CHUNK = 4000, 2_000_000, 400_000_000, 2_000_000
-LARGEST_BITS = 400_000_000
 
 
 class FastArithmetic(Arithmetic):
@@ -104,10 +103,8 @@ class FastArithmetic(Arithmetic):
 
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
-        if len(S) > FLINT_ROWS and bits == BITS[0]:
-            values = _above_by_congruence(S, D)
-            if values is not None:
-                return values
+        if len(S) > FLINT_ROWS and bits == BITS[0] and symmetric(S):
+            return _above_by_congruence(S, D) or super().above(S, D, bits)
         return super().above(S, D, bits)
 
 
@@ -155,8 +152,6 @@ def unit_diagonal(S: Rows) -> tuple[np.ndarray, list[int]]:
 
 def _above_by_congruence(S: Rows, D: Rows) -> list[Fraction] | None:
     """Bound ``d'S^-1 d`` by ``|Y'd|^2 / least``, since ``Y'S Y >= least I`` is dominated by its diagonal."""
-    if any(row[i] <= 0 for i, row in enumerate(S)):
-        return None
     T, halves = unit_diagonal(S)
     try:
         found = np.linalg.inv(np.linalg.cholesky(T)).T
@@ -311,12 +306,11 @@ def _shifted(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]
 
 
 def _spare(T: np.ndarray, down: int, R: np.ndarray) -> list[int] | None:
-    if (whole := square(R)) is None:
+    if (T != T.T).any() or (whole := square(R)) is None:
         return None
     E = T - (whole << down if down else whole)
     diagonal = np.diag(E)
-    left: list[int] = (diagonal + np.abs(diagonal) - np.abs(E).sum(axis=1)).tolist()
-    return left
+    return list(diagonal + np.abs(diagonal) - np.abs(E).sum(axis=1))
 
 
 # ---------------------------------------------------------------------- sparse factors
@@ -343,8 +337,7 @@ class Remainder(NamedTuple):
         if m < self.n:
             diagonal = np.diag(self.block)
             left[m:] += (diagonal + np.abs(diagonal)) * d[m:] - np.abs(self.block) @ d[m:]
-        found: list[int] = left.tolist()
-        return found
+        return list(left)
 
 
 def remainder(S: Scaled) -> Remainder | None:

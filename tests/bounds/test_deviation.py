@@ -15,7 +15,8 @@ import pytest
 from balls import BITS, ball, clock, states
 from generators import all_classes, random_graph
 
-from lmi.exact.definite import NUMPY_ROWS, Flint, Standard
+from lmi.exact.definite import Arithmetic
+from lmi.exact.fast import FLINT_ROWS, FastArithmetic
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, certify
 from ptcc_certify.certificate.saved import read_certificate
@@ -51,7 +52,7 @@ def sparse(n: int, seed: int) -> SignedDigraph:
 @cache
 def slow() -> Certificate:
     """A graph of more nodes than the exact polynomial decides."""
-    graph = sparse(NUMPY_ROWS + 12, 3)
+    graph = sparse(FLINT_ROWS + 12, 3)
     return certify(graph, NOMINAL, numbers(np.random.default_rng(1), graph.n_nodes), method="full", simulation=False)
 
 
@@ -190,7 +191,7 @@ def test_a_constant_lowered_by_a_millionth_is_rejected(stdlib: bool):
                 assert report.rejected == f"distance of lyapunov.members[{k}]", (path, report.reason)
 
 
-@pytest.mark.parametrize("n", [3, NUMPY_ROWS, NUMPY_ROWS + 8])
+@pytest.mark.parametrize("n", [3, FLINT_ROWS, FLINT_ROWS + 8])
 def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
     """``d'S^-1 d`` for rows of a million sizes, and for rows and columns of ``S`` of many."""
     rng = np.random.default_rng(n)
@@ -206,7 +207,7 @@ def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
     D = [[int(x) * 10 ** int(rng.integers(0, 7)) for x in row] for row in rng.integers(-5, 6, (4, n))] + [[0] * n]
     solved = flint.fmpz_mat(S).solve(flint.fmpz_mat(D).transpose())
     exact = (flint.fmpq_mat(flint.fmpz_mat(D)) * solved).tolist()
-    for arithmetic in (Standard(), Flint()):
+    for arithmetic in (Arithmetic(), FastArithmetic()):
         values = arithmetic.above(S, D)
         assert values is not None and values[-1] == 0
         for k, value in enumerate(values[:-1]):
@@ -215,10 +216,10 @@ def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
 
 
 def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
-    n = NUMPY_ROWS + 6
+    n = FLINT_ROWS + 6
     S = [[int(i == j) * (1 if i else -1) for j in range(n)] for i in range(n)]
     singular = [[1] * n for _ in range(n)]
-    for arithmetic in (Standard(), Flint()):
+    for arithmetic in (Arithmetic(), FastArithmetic()):
         assert arithmetic.above(S, [[1] * n]) is None
         assert arithmetic.bounded(singular, [([1] * n, 10**9)]) == 0
 

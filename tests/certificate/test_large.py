@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import tracemalloc
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import eigs
 
 from lmi.errors import NoCertificate
-from lmi.exact.sparse import residual_definite
 from lmi.iterative import SparseHMatrix
 from ptcc_certify.bounds import final_state as outcomes
 from ptcc_certify.bounds.final_state import outcome
@@ -470,21 +468,6 @@ def test_ends_below_the_floats_are_kept():
     assert cert.outcome is not None and cert.outcome.degenerate == ()
     for value in (*cert.outcome.final_state, *cert.outcome.consensus_values):
         assert abs(Fraction(value) * 10**400 - 1) < 1e-9
-
-
-@pytest.mark.parametrize("numpy", [False, True])
-def test_factors_that_would_fill_the_memory_once_multiplied_are_not_judged(numpy: bool):
-    n, low = 250, -(2**16)
-    columns = [list(range(k, n)) for k in range(n)]
-    indices = [i for column in columns for i in column]
-    indptr = np.cumsum([0, *map(len, columns)]).tolist()
-    diagonal = list(range(n)), list(range(n)), [1] * n
-    tracemalloc.start()
-    factor = indptr, indices, [1] * len(indices)
-    assert not residual_definite(n, diagonal, list(range(n)), factor, [low] * n, low, power=low, numpy=numpy)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 10**8
 
 
 def test_an_interrupt_that_casadi_turns_into_any_error_is_not_lost():

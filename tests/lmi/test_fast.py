@@ -106,6 +106,20 @@ def test_nearly_equal_rates_are_told_apart():
     assert FAST.largest_rate(2, ([], [], []), huge, [1, 1], [1, 1]) == 2 * huge[1]
 
 
+def test_what_is_not_symmetric_is_neither_proved_nor_bounded():
+    """Dominance of the rows of ``E`` says nothing where it is not symmetric: ``x'Sx < 0`` at (1, 1, ..)."""
+    for n in (2, 30):
+        S = [[10**6 if i == j else 0 for j in range(n)] for i in range(n)]
+        S[0][1] = -(10**7)
+        assert fast.factor(S) is None
+        assert fast.dense_spare(S, np.zeros((n, n), dtype=np.int64), [0] * n, 0) is None
+        assert sum(map(sum, S)) < 0 or n > 2
+        for judge in (PLAIN, FAST):
+            assert not judge.definite(S) and judge.above(S, [[1] * n]) is None
+            assert judge.bounded(S, [([1] * n, 10**20)]) == 0
+        assert lmi.prove_generalized_margin(S, np.eye(n, dtype=int).tolist(), 1.0) is None
+
+
 # ---------------------------------------------------------------------- exact products
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
-from exact_cases import FEW, SEEDS, checked, judged, sparse_matrix
+from exact_cases import FAST, FEW, PLAIN, SEEDS, checked, judged, sparse_matrix
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
 import lmi
 from lmi.exact import fast
-from lmi.exact.definite import SparseFactor
+from lmi.exact.definite import Arithmetic, SparseFactor, eliminate
 
 
 @FEW
@@ -111,3 +113,25 @@ def test_a_sparse_matrix_indefinite_by_a_trillionth_is_refused():
         proof = lmi.prove_sparse_positive_definite(S)
         assert (proof is not None) == (margin > 0)
         assert proof is None or checked(S, proof)
+
+
+@pytest.mark.parametrize("judge", [PLAIN, FAST], ids=["plain", "fast"])
+def test_factors_that_would_fill_the_memory_once_multiplied_are_not_judged(judge: Arithmetic):
+    n, low = 250, -(2**16)
+    columns = [list(range(k, n)) for k in range(n)]
+    indices = [i for column in columns for i in column]
+    indptr = np.cumsum([0, *map(len, columns)]).tolist()
+    diagonal = list(range(n)), list(range(n)), [1] * n
+    tracemalloc.start()
+    factor = SparseFactor(list(range(n)), indptr, indices, [1] * len(indices), [low] * n, low)
+    assert not judge.residual_definite(n, diagonal, factor, low)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10**8
+
+
+def test_elimination_directions_and_factors_of_one_row():
+    assert eliminate([]) is None and eliminate([[3]]) is None and eliminate([[0]]) == 0
+    for judge in (PLAIN, FAST):
+        assert judge.residual_definite(0, ([], [], []), SparseFactor([], [0], [], [], [], 0))
+        assert not judge.residual_definite(1, ([0], [0], [4]), SparseFactor([0], [0, 1], [0], [2], [0], 0))

@@ -1,0 +1,267 @@
+"""Diagonal Lyapunov matrices of leaders and followers, found together in one semidefinite program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lmi.diagonal import (
+    CLARABEL_MARGIN_ROWS,
+    RESOLVED,
+    diagonal_lyapunov,
+    h_matrix_lyapunov,
+    largest_entry,
+    positive,
+    solve,
+    symmetric_product,
+)
+from lmi.errors import MatrixError
+from lmi.interior_point import maximise_margin
+from lmi.matrices import square
+
+
+@dataclass(frozen=True)
+class FixedLeader:
+    """A leader block whose Lyapunov matrix is known up to the scale shared by all such blocks.
+
+    Attributes
+    ----------
+    omega : (k,) array
+        The diagonal of the Lyapunov matrix, positive.
+    decrease : (k,) array
+        Positive: the diagonal of a matrix that bounds the decrease of ``x' diag(omega) x`` from below on the states
+        that occur.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> two = FixedLeader(omega=np.array([1.0, 3.0]), decrease=np.full(2, 2.0))
+    >>> coupled_lyapunov([two], [[-1.0, 0.0]], [[1.0]]).leaders[0]  # kept as it is
+    array([1., 3.])
+    """
+
+    omega: np.ndarray
+    decrease: np.ndarray
+
+
+@dataclass(frozen=True)
+class FreeLeader:
+    """A leader block ``x' = -A x`` whose diagonal ``H`` is searched; its decrease counts as ``lmin(HA + A'H) I``.
+
+    Attributes
+    ----------
+    A : (k, k) array or sparse matrix
+        With a diagonal Lyapunov matrix.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> bool(found.leaders[0][0] > 0 and found.followers[0] > 0)
+    True
+    """
+
+    A: np.ndarray
+
+
+@dataclass(frozen=True)
+class CoupledCertificate:
+    """Diagonal Lyapunov matrices of leaders and followers, found together.
+
+    Attributes
+    ----------
+    leaders : tuple of (k,) arrays
+        For a fixed block its ``omega`` unchanged; for a free block relative to those.
+    followers : (n_F,) array
+        ``rho Omega_F``: the coupling factor is contained.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*found.leaders, found.followers])
+    >>> from lmi import diagonal_margin
+    >>> diagonal_margin(A, omega) > 0
+    True
+    """
+
+    leaders: tuple[np.ndarray, ...]
+    followers: np.ndarray
+
+
+def coupled_lyapunov(
+    leaders: Sequence[FixedLeader | FreeLeader], A_FL: Any, A_F: Any, *, tolerance: float = 1e-9
+) -> CoupledCertificate:
+    """Find free leader blocks, follower matrix and coupling factor in one semidefinite program.
+
+    With ``Gamma`` the block diagonal of ``s diag(decrease)`` (fixed blocks) and ``t_k I`` (free blocks,
+    ``H_k A_k + A_k' H_k >= t_k I``), solves
+
+        maximise t   subject to   [[Gamma, A_FL' Y], [Y A_FL, Y A_F + A_F' Y]] >= t I,   all diagonals <= 1,
+
+    whose optimum is the largest ``lmin(Pi) / lmax(H)`` of the paper over free blocks, ``Y = rho H_F`` and ``rho``.
+
+    Parameters
+    ----------
+    leaders : sequence of FixedLeader or FreeLeader
+    A_FL : (n_F, n_L) array
+        Columns in the order of the leader blocks.
+    A_F : (n_F, n_F) array
+        Of the followers.
+    tolerance : float
+        Relative gap asked of the solver.
+
+    Returns
+    -------
+    CoupledCertificate
+
+    Raises
+    ------
+    MatrixError
+        Shapes do not match, or there is no leader block.
+    NoCertificate
+        A free block or the follower block has no diagonal Lyapunov matrix that the solver can resolve.
+    NotAnHMatrix
+        The solver found no positive rate, and the follower block is not an H-matrix with positive diagonal.
+
+    References
+    ----------
+    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
+    disturbances.
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
+
+    Examples
+    --------
+    >>> found = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
+    >>> (found.followers > 0).all()
+    np.True_
+    """
+    A_F = square(A_F, "A_F")
+    A_FL = np.asarray(A_FL.toarray() if hasattr(A_FL, "toarray") else A_FL, dtype=np.float64)
+    sizes = [len(block.omega) if isinstance(block, FixedLeader) else len(square(block.A)) for block in leaders]
+    n_L, n_F = sum(sizes), len(A_F)
+    fixed = [block for block in leaders if isinstance(block, FixedLeader)]
+    if any(not (b.omega.min() > 0 and b.decrease.min() > 0) for b in fixed if len(b.omega)):
+        raise MatrixError("a fixed leader block needs a positive omega and a positive decrease")
+    if n_L == 0:
+        raise MatrixError("there is no leader block; use h_matrix_lyapunov for followers alone")
+    if A_FL.shape != (n_F, n_L):
+        raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
+    # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
+    scale = max(largest_entry(A_F), *(largest_entry(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
+    fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
+    if n_L + n_F > CLARABEL_MARGIN_ROWS:
+        return _coupled_large(leaders, A_FL / scale, A_F / scale, scale, fixed_top, tolerance)
+
+    def problem(cp: Any) -> tuple[Any, Any]:
+        s = cp.Variable() if fixed else cp.Constant(1.0)
+        t, Y = cp.Variable(), cp.Variable(n_F) if n_F else cp.Constant(np.zeros(0))
+        diagonal, constraints, free = [], [Y >= 0, Y <= 1] if n_F else [], []
+        if fixed:
+            constraints += [s >= 0, s <= 1]
+        for block, k in zip(leaders, sizes, strict=True):
+            if isinstance(block, FixedLeader):
+                diagonal.append(s * (block.decrease / (fixed_top * scale)))
+            else:
+                H, t_k = cp.Variable(k), cp.Variable()
+                constraints += [H >= 0, H <= 1]
+                if k > 1:
+                    constraints.append(symmetric_product(cp, H, square(block.A) / scale) - t_k * np.eye(k) >> 0)
+                else:
+                    constraints.append(2 * H[0] * float(np.squeeze(block.A)) / scale >= t_k)
+                diagonal.append(t_k * np.ones(k))
+                free.append(H)
+        if n_F:
+            followers = symmetric_product(cp, Y, A_F / scale)
+            coupling = cp.diag(Y) @ (A_FL / scale)
+            Pi = cp.bmat([[cp.diag(cp.hstack(diagonal)), coupling.T], [coupling, followers]])
+        else:
+            Pi = cp.diag(cp.hstack(diagonal))
+        constraints.append(Pi - t * np.eye(n_L + n_F) >> 0)
+        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free] if n_F else [s, t, *free])
+
+    values = solve(problem, tolerance)
+    s, t, Y, rest = values[0], values[1], values[2 : 2 + n_F], values[2 + n_F :]
+    if not (t > RESOLVED * tolerance and s > 0):
+        return _block_by_block(leaders, A_F, fixed_top, tolerance)
+    found, used = [], 0
+    unit = fixed_top / s if fixed else 1.0
+    for block, k in zip(leaders, sizes, strict=True):
+        if isinstance(block, FixedLeader):
+            found.append(block.omega)
+        else:
+            found.append(positive(rest[used : used + k]) * unit)
+            used += k
+    return CoupledCertificate(tuple(found), positive(Y) * unit if n_F else Y)
+
+
+def _coupled_large(
+    leaders: Sequence[FixedLeader | FreeLeader],
+    A_FL: np.ndarray,
+    A_F: np.ndarray,
+    scale: float,
+    top: float,
+    tolerance: float,
+) -> CoupledCertificate:
+    """Couple blocks by the interior-point method: free leader blocks at their own best margin, all scaled together.
+
+    The blocks are in units of ``scale``, fixed ones have ``top`` as their largest entry. A block of leaders is one
+    weight: ``Pi`` is ``W C + C'W`` with half its decrease on the diagonal of ``C``.
+    """
+    omegas, halves, groups = [], [], []
+    for k, block in enumerate(leaders, start=1):
+        if isinstance(block, FixedLeader):
+            omegas.append(block.omega / top)
+            halves.append(block.decrease / (2 * top * scale))
+        else:
+            found = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
+            omegas.append(found.omega)
+            halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
+        groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))
+    shared, n_L = np.unique(np.concatenate(groups), return_inverse=True)[1], sum(map(len, omegas))
+    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, len(A_F)))], [A_FL, A_F]])
+    own = np.concatenate([shared, shared.max() + 1 + np.arange(len(A_F))])
+    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
+    weights = positive(solution.omega)
+    if not solution.t > RESOLVED * tolerance:
+        return _block_by_block(leaders, A_F * scale, top, tolerance)
+    fixed = [i for i, group in enumerate(groups) if not group[0]]
+    starts = np.cumsum([0, *map(len, omegas)])
+    unit = top / weights[starts[fixed[0]]] if fixed else 1.0
+    return CoupledCertificate(
+        tuple(
+            block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
+            for block, omega, start in zip(leaders, omegas, starts, strict=False)
+        ),
+        weights[n_L:] * unit,
+    )
+
+
+def _block_by_block(
+    leaders: Sequence[FixedLeader | FreeLeader], A_F: np.ndarray, top: float, tolerance: float
+) -> CoupledCertificate:
+    """Find each block by itself, for when the best joint rate lies below what the solver resolves."""
+    found = tuple(
+        block.omega if isinstance(block, FixedLeader) else top * diagonal_lyapunov(block.A, tolerance=tolerance).omega
+        for block in leaders
+    )
+    followers = top * h_matrix_lyapunov(A_F, tolerance=tolerance).omega if len(A_F) else np.zeros(0)
+    return CoupledCertificate(found, followers)
