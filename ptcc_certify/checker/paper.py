@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 from typing import Any, NamedTuple
 
-from lmi.exact.numbers import integers, sized
+from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.rounding import down
 from lmi.exact.work import spend
 from ptcc_certify.checker.document import Document
@@ -22,7 +23,7 @@ from ptcc_certify.checker.matrices import (
     need_rows,
     only,
 )
-from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Claim, Structure
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.
@@ -128,10 +129,10 @@ def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fr
 def deviation_form(paper: Paper) -> tuple[Matrix, Fraction]:
     """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale, and the scale."""
     p, gauge = paper.blocks[0].weights, paper.structure.gauges[0] or []
-    bits = 2 * length(p)
-    spend(4 * len(p) ** 2, bits, bits, "deviations")
-    sized(len(p) ** 2, 2 * bits, "deviations")
     (own,), scale = integers([p])
+    bits = longest(own) + len(own).bit_length()
+    spend(4 * len(own) ** 2, bits, bits, "deviations")
+    sized(len(own) ** 2, 2 * bits, "deviations")
     total = sum(own)
     Z = [
         [g * h * (total * x * (g_at == h_at) - x * y) for h_at, (h, y) in enumerate(zip(gauge, own, strict=True))]
@@ -202,6 +203,9 @@ def _coupled(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, 
     nodes, ((own,), scale) = list(weights), integers([list(weights.values())])
     S, unit = decrease(doc.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
     (tops,), other = integers([[*(gamma[v] * scale * unit for v in nodes if v in gamma)]])
+    bits, more = longest(chain.from_iterable(S)), other.bit_length()
+    sized(len(S) ** 2, bits + more, "the coupled blocks")
+    spend(len(S) ** 2, bits, more, "the coupled blocks")
     S = [[x * other for x in row] for row in S]
     leading = [i for i, v in enumerate(nodes) if v in gamma]
     for i, top in zip(leading, tops, strict=True):

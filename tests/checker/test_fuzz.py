@@ -610,7 +610,7 @@ HOSTILE = [cut, flipped, noise, wide, deep, long_numbers, many, labels, star, ly
 def worker() -> Iterator[Callable[[Path], Json]]:
     """Checks a file in a process of limited memory and time."""
     environment = {**os.environ, "PYTHONPATH": str(Path(ptcc_certify.__file__).parents[1])}
-    script = Path(__file__).with_name("hostile_worker.py")
+    script = Path(__file__).parents[1] / "hostile_worker.py"
     process = subprocess.Popen(
         [sys.executable, str(script), str(MEMORY), str(SECONDS)],
         stdin=subprocess.PIPE,

@@ -47,7 +47,6 @@ EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
 FLOATS = {
     ("lmi/exact/rounding.py", "float_up"): "the float next to a number",
     ("lmi/exact/rounding.py", "_written"): "prints a number; the digits come from a Decimal",
-    ("lmi/exact/work.py", "limited"): "GB that are allowed",
     ("ptcc_certify/checker/__init__.py", "main"): "GB that are allowed",
     ("ptcc_certify/checker/__init__.py", "read_and_check"): "tells the GB that were needed",
     ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",
