@@ -28,7 +28,7 @@ class Trajectory:
     Attributes
     ----------
     graph : SignedDigraph
-    protocol : NominalProtocol or SlidingModeProtocol
+    protocol : Protocol
     t : (M,) array
         Instants, in units of time.
     remaining : (M,) array
