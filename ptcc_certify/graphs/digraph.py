@@ -304,33 +304,30 @@ class SignedDigraph(Shown):
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
             labels, matrix = rows, _aligned_frame(matrix, rows)
         if hasattr(matrix, "tocoo"):
-            coo = matrix.tocoo()
-            if len(coo.shape) != 2:
-                raise GraphError(f"an adjacency matrix has two dimensions, not {len(coo.shape)}")
-            shape, row, column, values = coo.shape, coo.row, coo.col, coo.data
-            keep = values != 0
-            row, column, values = row[keep], column[keep], values[keep]
+            entries = matrix.tocoo()
         else:
             try:
-                dense = np.asarray(matrix)
+                entries = np.asarray(matrix)
             except ValueError:
                 raise GraphError("the adjacency matrix has rows of different lengths") from None
-            if dense.ndim != 2:
-                raise GraphError(f"an adjacency matrix has two dimensions, not {dense.ndim}")
-            shape = dense.shape
-            if dense.dtype.kind not in "biufO":
-                raise GraphError(f"an adjacency matrix holds real numbers, not {dense.dtype}")
+        shape = entries.shape
+        if len(shape) != 2:
+            raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
+        if entries.dtype.kind not in "biufO":
+            raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
+        if shape[0] != shape[1]:
+            raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
+        if isinstance(entries, np.ndarray):
             try:
-                row, column = np.nonzero(dense)
+                row, column = np.nonzero(entries)
             except (TypeError, ValueError):  # pandas' NA is neither zero nor not
                 raise GraphError(
                     "an entry of the adjacency matrix is missing; write 0 where there is no edge"
                 ) from None
-            values = dense[row, column]
-        if shape[0] != shape[1]:
-            raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
-        if values.dtype.kind not in "biufO":
-            raise GraphError(f"an adjacency matrix holds real numbers, not {values.dtype}")
+            values = entries[row, column]
+        else:
+            keep = entries.data != 0
+            row, column, values = entries.row[keep], entries.col[keep], entries.data[keep]
         names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")

@@ -198,19 +198,12 @@ class Ensemble:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parameters as JSON takes them; equal ensembles give equal ones."""
-        return {
-            "count": self.count,
-            "nodes": [self.nodes.start, self.nodes.stop, self.nodes.step, "range"]
-            if isinstance(self.nodes, range)
-            else list(self.nodes),
-            "seed": self.seed,
+        nodes = self.nodes
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {
+            "nodes": [nodes.start, nodes.stop, nodes.step, "range"] if isinstance(nodes, range) else list(nodes),
             "connectivity": list(self.connectivity),
             "balanced": list(self.balanced),
-            "mean_degree": self.mean_degree,
-            "negative": self.negative,
             "weight_range": [format_exact(x) for x in self.weight_range],
-            "weight_decades": self.weight_decades,
-            "undirected": self.undirected,
         }
 
     def __len__(self) -> int:
@@ -218,7 +211,8 @@ class Ensemble:
 
     def kind(self, i: int) -> tuple[str, bool]:
         """Return connectivity of graph ``i``, and whether its leaders are balanced."""
-        self._refuse_number(i)
+        if not 0 <= i < self.count:
+            raise ParameterError(f"there is no graph {i}; the ensemble has the numbers 0 to {self.count - 1}")
         c = len(self.connectivity)
         return self.connectivity[i % c], self.balanced[(i // c) % len(self.balanced)]
 
@@ -259,10 +253,6 @@ class Ensemble:
             return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in rng.uniform(size=m).tolist()]
         drawn = rng.uniform(float(low), float(high), m).tolist()
         return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
-
-    def _refuse_number(self, i: int) -> None:
-        if not 0 <= i < self.count:
-            raise ParameterError(f"there is no graph {i}; the ensemble has the numbers 0 to {self.count - 1}")
 
 
 # ---------------------------------------------------------------------- parameters

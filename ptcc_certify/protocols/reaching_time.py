@@ -104,7 +104,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
 
     Parameters
     ----------
-    protocol : SlidingModeProtocol
+    protocol : ReachingProtocol
     sigma0 : sequence of N Fraction
 
     Returns
@@ -207,7 +207,7 @@ class ReachingProblem:
 
     Parameters
     ----------
-    protocol : SlidingModeProtocol
+    protocol : ReachingProtocol
     sigma0 : (N,) array
     disturbance : Disturbance
 

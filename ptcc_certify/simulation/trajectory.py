@@ -29,7 +29,7 @@ class Trajectory(Shown):
     Attributes
     ----------
     graph : SignedDigraph
-    protocol : NominalProtocol or SlidingModeProtocol
+    protocol : Protocol
     t : (M,) array
         Instants, in units of time.
     remaining : (M,) array
