@@ -26,6 +26,7 @@ import numpy as np
 from lmi.exact.rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.checker.input_bounds import PrescribedGain, Starts
+from ptcc_certify.errors import ExitCode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 from ptcc_certify.protocols.nominal import SlidingModeProtocol
@@ -45,7 +46,7 @@ _LARGEST_CLOCK = 1e12
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 
-OK, VIOLATED, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 3, 4
+OK, VIOLATED, REFUTED_EXPECTATION, UNDECIDED = ExitCode.OK, ExitCode.VIOLATED, ExitCode.REFUTED, ExitCode.UNDECIDED
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import click
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.options import READING, number
-from ptcc_certify.cli.terminal import INTERRUPTED, OK, counting
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.terminal import counting
+from ptcc_certify.errors import ExitCode, ParameterError
 
 #: How many threads linear algebra uses, which NumPy reads when it is loaded.
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -65,7 +65,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
             if value is not None:
                 raise ParameterError(f"{flag} has no effect beside --write-graphs; leave it out")
         click.echo(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
-        return OK
+        return ExitCode.OK
     if scheduler is not None and workers is not None:
         raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
     if restart and output is None:
@@ -92,7 +92,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
             kept = _kept(found, total, output, restart)
             click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
         if stopped:
-            return INTERRUPTED
+            return ExitCode.INTERRUPTED
         raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)
