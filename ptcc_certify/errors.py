@@ -1,11 +1,37 @@
-"""Every exception this package raises on purpose, and what is said of one that stops the work.
+"""Every exception this package raises on purpose, what is said of one that stops the work, and every exit code.
 
 Each class inherits :class:`PTCCError` and the built-in exception that fits, so that callers may catch either.
 A message is one line: what is wrong, where, and how to mend it.
 """
 
 import traceback
+from enum import IntEnum
 from pathlib import Path
+
+
+class ExitCode(IntEnum):
+    """What ``ptcc`` and its checker exit with; the worst of several is told by :mod:`ptcc_certify.certificate.verdict`.
+
+    Examples
+    --------
+    >>> int(ExitCode.UNDECIDED)
+    4
+    """
+
+    OK = 0
+    """Proved, and everything asked holds."""
+    VIOLATED = 1
+    """A simulated run exceeds a proved bound, or a certificate is rejected."""
+    BAD_INPUT = 2
+    """Bad input or usage."""
+    REFUTED = 3
+    """An expectation is refuted."""
+    UNDECIDED = 4
+    """Undecided, or an expectation is left open."""
+    INTERNAL_ERROR = 70
+    """An error of this program."""
+    INTERRUPTED = 130
+    """Ctrl-C, or SIGTERM."""
 
 
 class PTCCError(Exception):

@@ -81,7 +81,8 @@ def _on_cluster(
     one at a time, where nothing else can have died.
     """
     try:
-        import distributed  # noqa: F401
+        with _interrupts_kept_back():  # Python forgets that one was handled which came while an import ran a text
+            import distributed  # noqa: F401
     except ImportError:
         raise ParameterError(f"several workers, or a scheduler, need Dask; {INSTALL}, or say --workers 1") from None
     if scheduler is None:

@@ -54,39 +54,27 @@ class Journal:
     def _read(self, header: dict[str, Any], restart: bool) -> None:
         data = self._file.read()
         self.new = not data
-        whole = data.rfind(b"\n") + 1
-        lines = data[:whole].split(b"\n")[:-1]
         mark = b'{"schema": "ptcc-batch/'  # how the first line begins, of which a part may be missing
         if data[: len(mark)] != mark[: len(data)]:
             raise ParameterError(f"{self.name}: is no journal of ptcc batch; name another -o")
-        whole = 0 if restart else whole
+        whole = 0 if restart else data.rfind(b"\n") + 1
         self._file.seek(whole)
         self._file.truncate()
         if not whole:
             self._write(header)
             return
-        self._refuse_other(self._object(1, lines[0]), header)
-        for number, line in enumerate(lines[1:], start=2):
-            entry = self._object(number, line)
+        first, *lines = data[:whole].split(b"\n")[:-1]
+        before = _entry(first)
+        mend = "go on with that, name another -o, or drop the journal with --restart"
+        for key, wanted in header.items():
+            if before.get(key) != wanted:
+                old, new = (shorten(json.dumps(x), 60) for x in (before.get(key), wanted))
+                raise ParameterError(f"{self.name}: was begun with {key} {old}, not {new}; {mend}")
+        for number, line in enumerate(lines, start=2):
+            entry = _entry(line)
             if not _intact(entry):
                 raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
             self._rows[entry["of"]] = entry["row"]
-
-    def _object(self, number: int, line: bytes) -> dict[str, Any]:
-        try:
-            entry = json.loads(line, parse_constant=_refuse_constant)
-        except (ValueError, RecursionError):
-            entry = None
-        if isinstance(entry, dict):
-            return entry
-        raise ParameterError(f"{self.name}, line {number}: is no row; begin again with --restart")
-
-    def _refuse_other(self, old: dict[str, Any], new: dict[str, Any]) -> None:
-        mend = "go on with that, name another -o, or drop the journal with --restart"
-        for key in new:
-            if old.get(key) != new[key]:
-                before, now = (shorten(json.dumps(x), 60) for x in (old.get(key), new[key]))
-                raise ParameterError(f"{self.name}: was begun with {key} {before}, not {now}; {mend}")
 
     def current(self) -> dict[int, Row]:
         """Return the rows of the graphs of the list, by their numbers in it; files must be what they were."""
@@ -119,6 +107,15 @@ class Journal:
         if self._empty:
             self.remove()
         self._file.close()
+
+
+def _entry(line: bytes) -> dict[str, Any]:
+    """Return the object of a line; an empty one of a line that is none, or holds what is no finite number."""
+    try:
+        entry = json.loads(line, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError):
+        return {}
+    return entry if isinstance(entry, dict) else {}
 
 
 def _refuse_constant(name: str) -> NoReturn:

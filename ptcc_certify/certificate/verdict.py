@@ -27,6 +27,7 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.content import Content
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_bounds import Starts, root_above
+from ptcc_certify.errors import ExitCode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 from ptcc_certify.theorems.lemmas import EXACT_NODES
@@ -42,8 +43,6 @@ _LARGEST_CLOCK = 1e12
 MANY_DECADES = 8
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
-#: Exit codes.
-OK, VIOLATED, REFUTED_EXPECTATION, NOTHING_DECIDED = 0, 1, 3, 4
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,7 @@ def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
     >>> exit_code(False, True, True), exit_code(False, False, False)
     (3, 0)
     """
-    return VIOLATED if violated else REFUTED_EXPECTATION if refuted else NOTHING_DECIDED if left_open else OK
+    return ExitCode.VIOLATED if violated else ExitCode.REFUTED if refuted else ExitCode.UNDECIDED if left_open else ExitCode.OK
 
 
 def worst_code(codes: Iterable[int]) -> int:
@@ -174,7 +173,7 @@ def worst_code(codes: Iterable[int]) -> int:
     (3, 0)
     """
     found = set(codes)
-    return exit_code(VIOLATED in found, REFUTED_EXPECTATION in found, NOTHING_DECIDED in found)
+    return exit_code(ExitCode.VIOLATED in found, ExitCode.REFUTED in found, ExitCode.UNDECIDED in found)
 
 
 def assess(certificate: Content, report: CheckReport | None) -> Assessment:

@@ -21,8 +21,7 @@ from ptcc_certify.cli.many import batch
 from ptcc_certify.cli.paper import cite, examples
 from ptcc_certify.cli.runs import simulate
 from ptcc_certify.cli.structures import classify
-from ptcc_certify.cli.terminal import BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, OK
-from ptcc_certify.errors import PTCCError, explain, one_line
+from ptcc_certify.errors import ExitCode, PTCCError, explain, one_line
 
 __all__ = ["cli", "main"]
 
@@ -59,25 +58,25 @@ def main() -> None:
     except click.ClickException as error:
         if isinstance(error, _NO_ARGUMENTS):
             click.echo(error.format_message(), err=True)
-            code = BAD_INPUT
+            code = ExitCode.BAD_INPUT
         else:
             code = _refuse(error.format_message())
     except (PTCCError, OverflowError, MemoryError) as error:
         code = _refuse(explain(error))
     except (KeyboardInterrupt, click.Abort):
         click.echo("ptcc: interrupted", err=True)
-        code = INTERRUPTED
+        code = ExitCode.INTERRUPTED
     except BrokenPipeError:
-        code = OK
+        code = ExitCode.OK
         sys.stderr.close()
     except OSError as error:
         code = _refuse(f"the result cannot be written ({error.strerror or error})")
     except Exception as error:
         click.echo(f"ptcc: {explain(error)}", err=True)
-        code = INTERNAL_ERROR
-    sys.exit(code if isinstance(code, int) else OK)
+        code = ExitCode.INTERNAL_ERROR
+    sys.exit(code if isinstance(code, int) else ExitCode.OK)
 
 
 def _refuse(message: str) -> int:
     click.echo(f"ptcc: {one_line(message)}", err=True)
-    return BAD_INPUT
+    return ExitCode.BAD_INPUT

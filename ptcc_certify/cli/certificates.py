@@ -10,8 +10,8 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.terminal import OK, REJECTED, UNDECIDED, print_json, print_lines, progress, refuse_output
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.terminal import print_json, print_lines, progress, refuse_output
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
@@ -100,8 +100,8 @@ def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_j
     else:
         print_lines([*(f"graph      {how[key]}" for key in how), *report.lines()])
     if not report.accepted:
-        return REJECTED
-    return OK if report.verdict == "certified" else UNDECIDED
+        return ExitCode.VIOLATED
+    return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED
 
 
 def _same_graph(
@@ -147,6 +147,6 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
             verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
     except RejectedCertificate as error:
         click.echo(f"rejected: {error}", err=True)
-        return REJECTED
+        return ExitCode.VIOLATED
     click.echo(f"{verdict:<10} {output}")
-    return {"certified": OK, "undecided": UNDECIDED}.get(verdict, REJECTED)
+    return {"certified": ExitCode.OK, "undecided": ExitCode.UNDECIDED}.get(verdict, ExitCode.VIOLATED)

@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ptcc_certify.cli.options import Options, flag_of, graph_options, json_option, number, read
-from ptcc_certify.cli.terminal import (
-    FIGURES,
-    OK,
-    REFUTED_EXPECTATION,
-    UNDECIDED,
-    print_json,
-    print_lines,
-    refuse_output,
-)
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.terminal import FIGURES, print_json, print_lines, refuse_output
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.gain_design import Design
@@ -70,7 +62,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, **o
         elif found.protocol is not None:
             why = "certify finds other functions for these gains, which prove less"
             click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
-    return {MET: OK, INFEASIBLE: REFUTED_EXPECTATION}.get(found.verdict, UNDECIDED)
+    return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(found.verdict, ExitCode.UNDECIDED)
 
 
 def _certify_command(found: Design, graph: str, options: Options) -> str | None:

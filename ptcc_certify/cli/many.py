@@ -12,8 +12,8 @@ import click
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.options import READING, number
-from ptcc_certify.cli.terminal import INTERRUPTED, OK, counting
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.terminal import counting
+from ptcc_certify.errors import ExitCode, ParameterError
 
 #: Options that are settings of a row by the same name.
 _SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", *READING[1:])
@@ -61,7 +61,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
             if value is not None:
                 raise ParameterError(f"{flag} has no effect beside --write-graphs; leave it out")
         click.echo(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
-        return OK
+        return ExitCode.OK
     if scheduler is not None and workers is not None:
         raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
     if restart and output is None:
@@ -88,7 +88,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
             kept = _kept(found, total, output, restart)
             click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
         if stopped:
-            return INTERRUPTED
+            return ExitCode.INTERRUPTED
         raise
     if output is None:
         click.echo(many.table_bytes(rows, ".csv").decode(), nl=False, color=True)

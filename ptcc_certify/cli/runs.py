@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.terminal import FIGURES, OK, refuse_output
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.terminal import FIGURES, refuse_output
+from ptcc_certify.errors import ExitCode, ParameterError
 
 _TABLES = ("", ".csv", ".txt")
 
@@ -66,4 +66,4 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
         click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
-    return OK
+    return ExitCode.OK

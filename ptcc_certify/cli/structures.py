@@ -7,7 +7,8 @@ from typing import Any
 import click
 
 from ptcc_certify.cli.options import expected_behaviour, graph_options, json_option, read
-from ptcc_certify.cli.terminal import OK, REFUTED_EXPECTATION, print_json, print_lines
+from ptcc_certify.cli.terminal import print_json, print_lines
+from ptcc_certify.errors import ExitCode
 
 
 @click.command()
@@ -28,13 +29,13 @@ def classify(graph: str, as_json: bool, **options: Any) -> int:
     else:
         print_lines(structure_lines(structure, graph))
     if expected is None:
-        return OK
+        return ExitCode.OK
     from ptcc_certify.certificate.verdict import MET, judge_behaviour
 
     answer = judge_behaviour(structure, expected)
     if answer.status != MET:
         click.echo(f"{answer.status}: {answer}", err=True)
-        return REFUTED_EXPECTATION
+        return ExitCode.REFUTED
     if len(structure.components) > 1:
         click.echo(f"note: {expected} holds in each of the components by itself", err=True)
-    return OK
+    return ExitCode.OK

@@ -1,4 +1,4 @@
-"""What the commands print, exit with, and refuse to write to."""
+"""What the commands print, and refuse to write to."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ import click
 
 from ptcc_certify.errors import ParameterError
 
-OK, REJECTED, BAD_INPUT, REFUTED_EXPECTATION, UNDECIDED = 0, 1, 2, 3, 4  # ptcc_certify.certificate.verdict has them too
-INTERNAL_ERROR, INTERRUPTED = 70, 130
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")
 

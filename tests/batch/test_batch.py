@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ import pytest
 from bad_inputs import ptcc
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from lmi.apart import apart
 from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, batch, certify, certify_many
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
@@ -451,6 +453,33 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
     Path("lost.csv").unlink()
     assert names() == ["a.csv", "bad.csv", "dask.csv", "spec.toml"]  # no worker writes anything
     assert read_csv("dask.csv") == texts(here)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not copied")
+def test_a_worker_ends_native_code_at_a_time_limit(monkeypatch: pytest.MonkeyPatch):
+    """It computes rows in another thread than its main one, and may copy its process there all the same."""
+
+    def elsewhere(*args: Any) -> Row:
+        (process,) = apart(lambda: [os.getpid()])
+        return {"process": process}
+
+    monkeypatch.setattr(backends, "certified_row", elsewhere)
+    settings = batch.Settings.of(PROTOCOL)
+    with ThreadPoolExecutor(1) as pool:
+        row = pool.submit(backends._row_of, "a", pickle.dumps(TRIANGLE), settings).result()
+    assert row["process"] != os.getpid()
+
+
+def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
+    call = f"certify_many(['fig1a', 'fig1b'], {PROTOCOL!r}, method='perron', workers=2)"
+    Path("script.py").write_text(f"from ptcc_certify import NominalProtocol, certify_many\n{call}\n")
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 1 and "under if __name__ == '__main__'" in done.stderr.splitlines()[-1]
+
+
+def test_an_unknown_setting_is_refused():
+    with pytest.raises(TypeError, match="speed"):
+        quickly(TRIANGLE, speed=3)
 
 
 def test_csv_and_parquet_hold_the_same():
