@@ -161,7 +161,8 @@ def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
     >>> exit_code(False, True, True), exit_code(False, False, False)
     (3, 0)
     """
-    return ExitCode.VIOLATED if violated else ExitCode.REFUTED if refuted else ExitCode.UNDECIDED if left_open else ExitCode.OK
+    found = ((violated, ExitCode.VIOLATED), (refuted, ExitCode.REFUTED), (left_open, ExitCode.UNDECIDED))
+    return next((code for holds, code in found if holds), ExitCode.OK)
 
 
 def worst_code(codes: Iterable[int]) -> int:
