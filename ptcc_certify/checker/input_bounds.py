@@ -218,7 +218,7 @@ class Limits:
         return min(ends, default=None)
 
     def top(self, gain: PrescribedGain) -> Fraction:
-        """Return the largest gain that acts.
+        """Return the largest gain that acts of ``gain``.
 
         Raises
         ------

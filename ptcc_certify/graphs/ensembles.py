@@ -210,7 +210,13 @@ class Ensemble:
         return self.count
 
     def kind(self, i: int) -> tuple[str, bool]:
-        """Return connectivity of graph ``i``, and whether its leaders are balanced."""
+        """Return connectivity of graph ``i``, and whether its leaders are balanced.
+
+        Raises
+        ------
+        ParameterError
+            There is no such graph.
+        """
         if not 0 <= i < self.count:
             raise ParameterError(f"there is no graph {i}; the ensemble has the numbers 0 to {self.count - 1}")
         c = len(self.connectivity)
