@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -73,7 +72,7 @@ def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
         print(f"{name:<26} N {graph.n_nodes:>3}  nothing decays, or nothing was proved")
         return None
     k = OVER * 2 / proved.rate.limit_denominator(10**9)
-    cert = replace(proved, protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), starts=None)
+    cert = proved.changed(protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), starts=None)
     rng = np.random.default_rng(graph.n_nodes)
     starts = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
     boxed = cert.changed(starts=starts_within(cert.structure, 1))
