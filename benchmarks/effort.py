@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -73,17 +72,17 @@ def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
         print(f"{name:<26} N {graph.n_nodes:>3}  nothing decays, or nothing was proved")
         return None
     k = OVER * 2 / proved.rate.limit_denominator(10**9)
-    cert = replace(proved, protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), starts=None)
+    cert = proved.changed(protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), starts=None)
     rng = np.random.default_rng(graph.n_nodes)
     starts = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
-    boxed = replace(cert, starts=starts_within(cert.structure, 1))
+    boxed = cert.changed(starts=starts_within(cert.structure, 1))
     assert boxed.starts is not None
     worst = worst_start(cert.structure, cert.protocol, boxed.starts)
     points = np.column_stack([starts, worst.x0])
     seen = motion(graph, cert.protocol, points)  # type: ignore[arg-type]
     alone: Ratios = {kind: [] for kind in KINDS}
     for i in range(STARTS + 1):
-        effort = replace(cert, start=tuple(Fraction(float(x)) for x in points[:, i])).effort
+        effort = cert.changed(start=tuple(Fraction(float(x)) for x in points[:, i])).effort
         assert effort is not None
         one = (seen[0][:, i : i + 1], *(x[i : i + 1] for x in seen[1:]))
         if one[1].max() > 0:

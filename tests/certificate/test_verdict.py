@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -134,7 +133,7 @@ def test_what_was_asked_is_in_the_line_and_the_exit_code_agrees(
     asked = {key: ASKED[status][key] for key, status in wanted.items() if status is not None}
     if most in ("met", "left open"):
         asked["max_input"] = peak if most == "met" else peak * Fraction(99, 100)
-    found = replace(strong(), expectations=Expectations(**asked)).assessment
+    found = strong().changed(expectations=Expectations(**asked)).assessment
     statuses = {status for status in wanted.values() if status}
     assert {answer.status for answer in found.answers} == statuses and len(found.answers) == len(asked)
     worst = next((s for s in ("refuted", "left open") if s in statuses), None)
