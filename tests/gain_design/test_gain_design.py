@@ -26,7 +26,7 @@ from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
 TRIO = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
-RANDOM = [f"random{seed}" for seed in range(7)]
+RANDOM = [f"random{seed}" for seed in range(0, 7, 2)]
 
 
 @functools.cache
@@ -109,8 +109,8 @@ def gain_at_clock(a, k, clocks):
 # ---------------------------------------------------------------------- what is met
 
 TASKS = [(name, 10, 1, {}) for name in (*GRAPHS, *RANDOM, "pair", "trio")]
-TASKS += [(name, "7.5", "3/2", {"input_norm": 2}) for name in (*GRAPHS, "trio", "random3")]
-TASKS += [(name, 20, 3, {"residual": "0.1"}) for name in (*GRAPHS, "random1")]
+TASKS += [(name, "7.5", "3/2", {"input_norm": 2}) for name in ("fig1a", "fig3b", "fig5a", "trio")]
+TASKS += [(name, 20, 3, {"residual": "0.1"}) for name in ("fig1b", "fig3a", "fig5b", "random1")]
 TASKS += [(name, 20, 3, {"residual": "2.9"}) for name in ("pair", "trio", "fig1b", "fig3a")]
 TASKS += [("fig1b", 20, 3, {"residual": "2.9", "input_norm": 2}), ("pair", 1, 3, {"residual": "2"})]
 TASKS += [(name, 10, 1, {"deadline": 8}) for name in (*GRAPHS, "pair", "random2")]
@@ -130,7 +130,7 @@ def test_a_design_is_certified_and_holds_in_simulations(name, U, R, asked):
         assert found.peak >= found.asked.max_input * Fraction(999_999, 10**6)
 
 
-@pytest.mark.parametrize("file", ["highland_tribes", "sampson_t4", "regulatory_007", "regulatory_109", "bales"])
+@pytest.mark.parametrize("file", ["highland_tribes", "sampson_t4", "regulatory_007"])
 def test_real_graphs(real_data, file):
     graph = read_graph(real_data / f"{file}.csv")
     found = design(graph, max_input=100, initial_bound=1)
