@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from generators import Made, all_classes, class_cases, made_graphs, random_graph
 from generators import smallest as smallest_size
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_latex import read, rows_of
 
@@ -239,6 +239,7 @@ def certified_rate(graph: SignedDigraph) -> float | None:
     return None if rate is None else float(rate)
 
 
+@settings(max_examples=25)
 @given(made_graphs(max_nodes=8, weights=("units", "small ints")), st.integers(0, 2**32 - 1))
 def test_relabelling_scaling_and_switching_change_no_rate(made: Made, seed: int):
     rng = np.random.default_rng(seed)
