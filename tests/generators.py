@@ -689,7 +689,7 @@ KINDS = (
 
 
 def class_cases(by_default: Sequence[str] = KINDS, names: Sequence[str] | None = None) -> list[Any]:
-    """Cases ``(name, kwargs)`` of a test: all classes, or those of ``names``; the campaign has those not in the first."""
+    """Cases ``(name, kwargs)`` of a test, of all classes or of ``names``; those not in the first, in campaigns only."""
     return [
         pytest.param(name, kwargs, id=name, marks=() if name in by_default else pytest.mark.campaign)
         for name, kwargs in all_classes()
