@@ -192,10 +192,10 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     return ratios
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases())
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::2]))
 def test_no_input_of_any_class_is_above_its_bounds(name: str, kwargs: dict):
     number = list(CLASSES).index(name)
-    place = KINDS.index(name) if name in KINDS else number
+    place = KINDS.index(name) // 2 if name in KINDS else number
     judge(random_graph(np.random.default_rng(number), **kwargs).graph, 5, [OVER[place % 4]])
 
 
@@ -757,8 +757,12 @@ def test_every_example_has_its_effort(number: int):
 # ---------------------------------------------------------------------- measurement noise
 
 
-@pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig3b", "fig5b"])
-@pytest.mark.parametrize("actuator", [Actuator(gain_cap=15), Actuator(stop_before="0.02")], ids=str)
+@pytest.mark.parametrize(
+    ("name", "actuator"),
+    [(name, Actuator(gain_cap=15)) for name in ("fig1a", "fig3b", "fig5b")]
+    + [(name, Actuator(stop_before="0.02")) for name in ("fig1b", "fig3a")],
+    ids=str,
+)
 def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: Actuator):
     graph, protocol, nu = load_graph(name), NominalProtocol(1, 1, 1, 2), 0.05
     x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)
