@@ -177,17 +177,18 @@ def test_work_apart_takes_many_open_files_and_large_values():
 
 @linux
 def test_an_interrupt_while_a_process_is_made_is_not_lost():
-    fork = os.fork
+    fork, made = os.fork, []
 
     def interrupted() -> int:
         signal.raise_signal(signal.SIGINT)  # comes once both processes are ready
-        return fork()
+        made.append(fork())
+        return made[-1]
 
     with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(os, "fork", interrupted)
         list(apart(lambda: iter(range(3))))
     with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+        os.waitpid(made[0], os.WNOHANG)
 
 
 @linux
