@@ -21,8 +21,9 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.report import report_html, report_latex
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
+from ptcc_certify.report.statement import report_latex
 
 CLASSES = dict(all_classes())
 NUMBER = r"(-?[0-9.]+(?:e[-+]?[0-9]+)?)"

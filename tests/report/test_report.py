@@ -34,9 +34,9 @@ from ptcc_certify.checker import digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.report import report_html, report_latex, write_report
-from ptcc_certify.report.page import ROWS, _environment
-from ptcc_certify.report.statement import _tex
+from ptcc_certify.report.document import write_report
+from ptcc_certify.report.page import ROWS, _environment, report_html
+from ptcc_certify.report.statement import _tex, report_latex
 from ptcc_certify.report.texts import LISTED, printable
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
