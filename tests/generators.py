@@ -19,6 +19,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
@@ -651,3 +652,45 @@ def made_graphs(
     law = draw(st.sampled_from(list(weights)))
     seed = draw(st.integers(0, 2**32 - 1))
     return random_graph(np.random.default_rng(seed), **dict(kwargs, n=n, weights=law))
+
+
+#: One of each kind: every row of the theory, every form of leaders and followers, every special case.
+KINDS = (
+    "1.1 one node",
+    "1.1",
+    "1.1 undirected",
+    "1.1 positive",
+    "1.2",
+    "1.2 nearly undirected",
+    "1.2 opposite mutual",
+    "2.1 K=1",
+    "2.1 K=1 chain",
+    "2.1 K>=2 irreducible followers",
+    "2.1 K>=2 reducible followers",
+    "2.1 K>=2 whole",
+    "2.2",
+    "2.2 reducible followers",
+    "2.2 sign-symmetric",
+    "3.1 all single",
+    "3.1 no single reducible followers",
+    "3.1 no single positive",
+    "3.1 mixed chain",
+    "3.1 mixed no single",
+    "3.1 mixed several",
+    "3.2",
+    "3.2 irreducible followers",
+    "3.2 opposite mutual",
+    "disconnected mixed",
+    "disconnected isolated only",
+    "disconnected 1.1 and isolated",
+    "disconnected 1.2 2.2",
+    "disconnected 2.1 3.2 chains",
+)
+
+
+def class_cases(by_default: Sequence[str] = KINDS) -> list[Any]:
+    """All classes as cases of a test ``(name, kwargs)``; those not named are left to the campaign."""
+    return [
+        pytest.param(name, kwargs, id=name, marks=() if name in by_default else pytest.mark.campaign)
+        for name, kwargs in all_classes()
+    ]

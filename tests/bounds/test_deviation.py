@@ -31,7 +31,6 @@ from ptcc_certify.protocols.limits import Actuator
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 REMAINING = [1.0, 0.99, 0.9, 0.7, 0.5, 0.1, 1e-3]
-REAL = Path(__file__).parents[2] / "shared" / "data" / "real"
 
 
 def numbers(rng: np.random.Generator, n: int, largest: int = 1000) -> list[Fraction]:
@@ -142,16 +141,14 @@ def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
         assert (a.rate, a.prefactor) == (b.rate, b.prefactor)
 
 
-def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median():
+def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real_data: Path):
     """The largest deviation at half time from a random start: its bound over the exact one."""
     names = ("sampson_t4", "sampson_sanctions", "regulatory_007", "regulatory_013", "regulatory_123")
-    if not all((REAL / f"{name}.csv").exists() for name in names):
-        pytest.skip("needs ../shared/data/real")
     from scipy.linalg import expm
 
     ratios = []
     for name in names:
-        graph = read_graph(REAL / f"{name}.csv")
+        graph = read_graph(real_data / f"{name}.csv")
         x0 = [x for (x,) in random_states(0, graph.n_nodes)]
         cert = certify(graph, NOMINAL, x0, method="full", simulation=False)
         assert cert.outcome is not None
