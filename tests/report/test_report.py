@@ -482,14 +482,14 @@ def test_numbers_beyond_floats_are_shown(tmp_path: Path):
 
 
 def test_the_page_of_a_large_graph_stays_small(tmp_path: Path):
-    n = 10_000
+    n = 4_000
     graph = sparse_digraph(np.random.default_rng(2), n, 1.2)
     made = certify(graph, NOMINAL, list(range(n)), simulation=False, method="perron")
     source = reported(made, tmp_path)
     page = sound(source)
     assert len(source.encode()) < 2_000_000
     assert len(rows(source, "Where the agents end")) == ROWS
-    assert f"The first {ROWS} of 10,000 agents" in page.text and page.named("figure") == []
+    assert f"The first {ROWS} of 4,000 agents" in page.text and page.named("figure") == []
     assert "repeated only where that is asked for" in page.text
 
 
