@@ -688,9 +688,10 @@ KINDS = (
 )
 
 
-def class_cases(by_default: Sequence[str] = KINDS) -> list[Any]:
-    """All classes as cases of a test ``(name, kwargs)``; those not named are left to the campaign."""
+def class_cases(by_default: Sequence[str] = KINDS, names: Sequence[str] | None = None) -> list[Any]:
+    """Cases ``(name, kwargs)`` of a test, of all classes or of ``names``; those not in the first, in campaigns only."""
     return [
         pytest.param(name, kwargs, id=name, marks=() if name in by_default else pytest.mark.campaign)
         for name, kwargs in all_classes()
+        if names is None or name in names
     ]

@@ -55,8 +55,7 @@ class SymbolicLyapunov:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
     >>> form = symbolic_lyapunov(st, theorem_for(st).lyapunov(st), NominalProtocol(T=1, rho1=1, rho2=0, kappa=1))
     >>> import casadi as ca
@@ -126,8 +125,7 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
     >>> V = theorem_for(st).lyapunov(st)
     >>> form = symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2))

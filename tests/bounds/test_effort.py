@@ -6,12 +6,11 @@ import json
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from generators import all_classes, random_graph, smallest
+from generators import KINDS, all_classes, class_cases, random_graph, smallest
 from mutations import at, changed, resealed
 from scipy.linalg import expm
 
@@ -193,15 +192,16 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     return ratios
 
 
-@pytest.mark.parametrize(("number", "name"), list(enumerate(CLASSES)))
-def test_no_input_of_any_class_is_above_its_bounds(number: int, name: str):
-    rng = np.random.default_rng(number)
-    judge(random_graph(rng, **CLASSES[name]).graph, 5, [OVER[number % 4]])
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::2]))
+def test_no_input_of_any_class_is_above_its_bounds(name: str, kwargs: dict):
+    number = list(CLASSES).index(name)
+    place = KINDS.index(name) // 2 if name in KINDS else number
+    judge(random_graph(np.random.default_rng(number), **kwargs).graph, 5, [OVER[place % 4]])
 
 
-@pytest.mark.parametrize("name", GRAPHS)
-def test_no_input_on_a_packaged_graph_is_above_its_bounds(name: str):
-    judge(load_graph(name), 6)
+@pytest.mark.parametrize(("name", "over"), [(name, over) for k, name in enumerate(GRAPHS) for over in OVER[k % 4 :: 3]])
+def test_no_input_on_a_packaged_graph_is_above_its_bounds(name: str, over: Fraction):
+    judge(load_graph(name), 6, [over])
 
 
 @pytest.mark.campaign
@@ -241,8 +241,18 @@ def sliding(rng: np.random.Generator, graph: SignedDigraph, over: Fraction, powe
     return SlidingModeProtocol(**times, **gains, mu1="1.5", mu2="0.5", delta=1)
 
 
-@pytest.mark.parametrize("power", [F(1, 2), F(1), F(5, 2)])
-@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "3.2", "disconnected mixed"])
+POWERS = (F(1, 2), F(1), F(5, 2))
+SLIDING = ("1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "3.2", "disconnected mixed")
+
+
+@pytest.mark.parametrize(
+    ("name", "power"),
+    [
+        pytest.param(name, power, marks=() if power == POWERS[k % 3] else pytest.mark.campaign)
+        for k, name in enumerate(SLIDING)
+        for power in POWERS
+    ],
+)
 def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Fraction):
     rng = np.random.default_rng(len(name))
     graph = random_graph(rng, **CLASSES[name], n=max(6, smallest(**CLASSES[name]))).graph
@@ -298,7 +308,7 @@ def test_the_energy_of_one_start_is_at_most_twice_what_is_spent(name: str):
     graph = random_graph(rng, **dict(CLASSES[name], n=max(6, smallest(**CLASSES[name])))).graph
     x0 = rationals(rng, graph.n_nodes)
     proved = certify(graph, NominalProtocol(1, 1, 1, 1), x0, simulation=False)
-    for over, share in product((F(3, 5), F(1), F(3)), (F(1, 100), F(1), F(10))):
+    for over, share in zip((F(3, 5), F(1), F(3)), rng.permutation([F(1, 100), F(1), F(10)]).tolist(), strict=True):
         k = over / F(slowest(graph)).limit_denominator(10**6)
         cert = proved.changed(protocol=NominalProtocol(1, share * k, k, 1))
         assert cert.effort is not None and isinstance(cert.effort.energy, EnergyIntegral)
@@ -352,13 +362,13 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
     protocol = NominalProtocol("0.6", "0.2", "0.5", 1)
     size = float(np.linalg.norm(graph.laplacian() @ floats(x0)))
     left = []
-    for period in ("0.001", "0.0001", "0.00001"):
+    for period in ("0.001", "0.0001"):
         cert = certify(graph, protocol, x0, limits=[Limits(None, None, F(period))], simulation=False)
         assert cert.verdict == "certified" and cert.effort is not None and cert.effort.longest_period is None
         left.append(float(cert.effort.residual[0].norm))
         run = simulate(graph, protocol, x0, actuator=Actuator(sample_period=period), past=0)
         assert np.linalg.norm(graph.laplacian() @ run.final_state) <= left[-1]
-    assert size > left[0] > 100 * left[1] > 10**4 * left[2]
+    assert size > left[0] > 100 * left[1]
     proved = certify(graph, protocol, x0, limits=[Limits(None, None, F(1, 10))], simulation=False)
     assert proved.effort is not None and proved.effort.residual == ()
     longest = proved.effort.longest_period
@@ -400,8 +410,8 @@ def small_graphs(count: int) -> list[SignedDigraph]:
 
 
 def test_the_input_stays_bounded_from_the_threshold_on():
-    graphs = small_graphs(230)
-    assert len(graphs) >= 200
+    graphs = small_graphs(80)
+    assert len(graphs) >= 70
     grown = []
     for graph in graphs:
         least = slowest(graph)
@@ -414,7 +424,7 @@ def test_the_input_stays_bounded_from_the_threshold_on():
     assert np.abs(table - [0.1, -0.1]).max() < 0.04
 
 
-@pytest.mark.parametrize("seed", range(0, 40, 2))
+@pytest.mark.parametrize("seed", range(0, 40, 6))
 def test_certificates_tell_the_threshold_too(seed: int):
     graph = small_graphs(seed + 1)[-1]
     least = slowest(graph)
@@ -510,7 +520,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
 LIMITED = [name for name, kwargs in CLASSES.items() if smallest(**kwargs) <= 8 and not kwargs.get("isolated")]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(0, 8, 2))
 def test_limited_gains_leave_no_more_than_certified(seed: int):
     """Ten runs each, less what sampling too slow leaves uncertified."""
     kwargs = CLASSES[[name for name in LIMITED if name != "1.1 one node"][7 * seed]]
@@ -533,7 +543,7 @@ def test_limited_gains_leave_no_more_than_certified_on_hundreds_of_runs():
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
-@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.2", "disconnected mixed"])
+@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "3.1 mixed", "disconnected mixed"])
 def test_disturbances_add_no_more_than_certified(name: str):
     rng = np.random.default_rng(3 + len(name))
     graph = random_graph(rng, **dict(CLASSES[name], n=max(6, smallest(**CLASSES[name])))).graph
@@ -657,7 +667,7 @@ def assert_no_forgery_passes(data: dict[str, Any]) -> set[str]:
     return tried
 
 
-@pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "disconnected mixed"])
+@pytest.mark.parametrize("name", ["1.1", "1.2", "3.1 mixed", "disconnected mixed"])
 def test_certificates_of_the_input_are_checked(name: str):
     data = written(nominal_certificate(name))
     effort = data["effort"]
@@ -747,8 +757,12 @@ def test_every_example_has_its_effort(number: int):
 # ---------------------------------------------------------------------- measurement noise
 
 
-@pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig3b", "fig5b"])
-@pytest.mark.parametrize("actuator", [Actuator(gain_cap=15), Actuator(stop_before="0.02")], ids=str)
+@pytest.mark.parametrize(
+    ("name", "actuator"),
+    [(name, Actuator(gain_cap=15)) for name in ("fig1a", "fig3b", "fig5b")]
+    + [(name, Actuator(stop_before="0.02")) for name in ("fig1b", "fig3a")],
+    ids=str,
+)
 def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: Actuator):
     graph, protocol, nu = load_graph(name), NominalProtocol(1, 1, 1, 2), 0.05
     x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from generators import Made, made_graphs
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -217,6 +217,7 @@ def test_the_definitions_on_states():
     assert not is_interval_bipartite_consensus([2, -3, 0], chain)
 
 
+@settings(max_examples=40)
 @given(made_graphs(max_nodes=6, weights=("units", "small ints")), SEEDS)
 def test_the_definitions_on_trajectories(made: Made, seed: int):
     structure = analyse(made.graph)

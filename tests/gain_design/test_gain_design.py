@@ -26,7 +26,7 @@ from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
 TRIO = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
-RANDOM = [f"random{seed}" for seed in range(7)]
+RANDOM = [f"random{seed}" for seed in range(0, 7, 2)]
 
 
 @functools.cache
@@ -109,12 +109,13 @@ def gain_at_clock(a, k, clocks):
 # ---------------------------------------------------------------------- what is met
 
 TASKS = [(name, 10, 1, {}) for name in (*GRAPHS, *RANDOM, "pair", "trio")]
-TASKS += [(name, "7.5", "3/2", {"input_norm": 2}) for name in (*GRAPHS, "trio", "random3")]
-TASKS += [(name, 20, 3, {"residual": "0.1"}) for name in (*GRAPHS, "random1")]
+TASKS += [(name, "7.5", "3/2", {"input_norm": 2}) for name in ("fig1a", "fig3b", "fig5a", "trio")]
+TASKS += [(name, 20, 3, {"residual": "0.1"}) for name in ("fig1b", "fig3a", "fig5b", "random1")]
 TASKS += [(name, 20, 3, {"residual": "2.9"}) for name in ("pair", "trio", "fig1b", "fig3a")]
 TASKS += [("fig1b", 20, 3, {"residual": "2.9", "input_norm": 2}), ("pair", 1, 3, {"residual": "2"})]
 TASKS += [(name, 10, 1, {"deadline": 8}) for name in (*GRAPHS, "pair", "random2")]
 TIGHTENED = [task for task in TASKS if "deadline" not in task[3] and (not task[3] or "fig5" not in task[0])]
+CAMPAIGN = [task for k, task in enumerate(TIGHTENED) if k % 2]  # each kind of task is among the others too
 
 
 @pytest.mark.parametrize(("name", "U", "R", "asked"), TASKS, ids=str)
@@ -130,7 +131,7 @@ def test_a_design_is_certified_and_holds_in_simulations(name, U, R, asked):
         assert found.peak >= found.asked.max_input * Fraction(999_999, 10**6)
 
 
-@pytest.mark.parametrize("file", ["highland_tribes", "sampson_t4", "regulatory_007", "regulatory_109", "bales"])
+@pytest.mark.parametrize("file", ["highland_tribes", "sampson_t4", "regulatory_007"])
 def test_real_graphs(real_data, file):
     graph = read_graph(real_data / f"{file}.csv")
     found = design(graph, max_input=100, initial_bound=1)
@@ -138,7 +139,11 @@ def test_real_graphs(real_data, file):
     assert_holds_in_simulations(graph, found, 1)
 
 
-@pytest.mark.parametrize(("name", "U", "R", "asked"), TIGHTENED, ids=str)
+@pytest.mark.parametrize(
+    ("name", "U", "R", "asked"),
+    [pytest.param(*task, marks=pytest.mark.campaign if task in CAMPAIGN else ()) for task in TIGHTENED],
+    ids=str,
+)
 def test_what_binds_cannot_be_tightened(name, U, R, asked):
     found = designed(name, U, R, **asked)
     less = Fraction(95, 100)

@@ -8,7 +8,7 @@ import flint
 import numpy as np
 import pytest
 from balls import ball, clock, form_value, states
-from generators import all_classes, random_graph
+from generators import KINDS, all_classes, class_cases, random_graph
 
 import lmi
 from ptcc_certify import NominalProtocol, SignedDigraph, SlidingModeProtocol, analyse, certify
@@ -76,13 +76,12 @@ def test_the_exact_basis_lies_in_the_range_of_the_laplacian(name: str):
 # ---------------------------------------------------------------------- what the classes reach
 
 
-def test_a_composite_reaches_its_slowest_block():
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::2]))
+def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
     """The full class at a useful prefactor, and the diagonal one against its own limit, over every row."""
-    for name, kwargs in all_classes():
-        structure = analyse(random_graph(np.random.default_rng(8), **dict(kwargs, weights="decimals")).graph)
-        system = ErrorSystem(structure)
-        if not system.nodes:
-            continue
+    structure = analyse(random_graph(np.random.default_rng(8), **dict(kwargs, weights="decimals")).graph)
+    system = ErrorSystem(structure)
+    if system.nodes:
         found = sharpen(system, "best", CLOCKS)
         assert all("needs a prefactor above" in note for note in found.notes), (name, found.notes)
         spectral = certify(structure.graph, P, simulation=False, method="paper").spectral_rate
@@ -95,13 +94,11 @@ def test_a_composite_reaches_its_slowest_block():
 
 
 def test_the_instant_asked_for_is_bounded_best():
-    for name in ("1.2", "2.1 K>=2", "3.1 mixed"):
-        graph = of_class(name)
-        for at in ("0.1", "0.7", "0.95"):
-            q = float(1 - Fraction(at))
-            plain = certify(graph, P, simulation=False).envelope.residual(q)
-            asked = certify(graph, P, simulation=False, at=at).envelope.residual(q)
-            assert asked <= plain * (1 + 1e-9)
+    for name, at in (("1.2", "0.1"), ("2.1 K>=2", "0.7"), ("3.1 mixed", "0.95"), ("2.1 K>=2", "0.95")):
+        graph, q = of_class(name), float(1 - Fraction(at))
+        plain = certify(graph, P, simulation=False).envelope.residual(q)
+        asked = certify(graph, P, simulation=False, at=at).envelope.residual(q)
+        assert asked <= plain * (1 + 1e-9)
 
 
 def test_choice_prefers_the_smaller_prefactor_among_equal_rates():
@@ -208,7 +205,7 @@ def test_agents_that_keep_their_state_are_where_they_end():
 
 def test_the_reported_prefactor_is_not_decided_by_rounding():
     """Members whose rates differ by less than 1e-6 share the smaller one, so that the smaller prefactor is reported."""
-    for name, kwargs in all_classes()[:20]:
+    for name, kwargs in all_classes()[1:24:3]:
         cert = certify(random_graph(np.random.default_rng(6), **kwargs).graph, P, simulation=False)
         rates = [(m.rate, m.prefactor) for m in cert.sharpening.members]
         for rate, prefactor in rates:
