@@ -427,12 +427,11 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
 
     write_graph(TRIANGLE, "a.csv")
     Path("bad.csv").write_text("1,2,0\n")
-    Path("spec.toml").write_text(SPEC)
     sources = ["a.csv", "bad.csv", "fig5a", "spec.toml"]
     here = facts(quickly(sources))
     assert [row["error"] is None for row in here] == [True, False] + [True] * 9
     assert facts(quickly(sources, workers=2)) == here
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
         scale(cluster, 0)
         monkeypatch.setattr(backends, "PATIENCE", 3)
