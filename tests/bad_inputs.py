@@ -378,7 +378,7 @@ SLIDING = [
     _disturbed("beyond delta for one agent", "agent 6", "k/5.5"),
     _disturbed("beyond delta late", "0.9", "t/0.99"),
     _disturbed("empty", "number", ""),
-    _disturbed("two words", "missing after sin", "sin t t"),
+    _disturbed("two words", r"cannot stand here; .* sin\(\.\.\.\) for a function", "sin t t"),
     _disturbed("an open parenthesis", "never closed", "sin(t"),
     _disturbed("a comma", ",", "sin(t, 1)"),
     _disturbed("a caret", "write a power", "t^2"),

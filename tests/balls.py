@@ -8,8 +8,8 @@ from fractions import Fraction
 import flint
 
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.theorems import LyapunovFunction
 
 BITS = 512
 

@@ -45,8 +45,7 @@ from ptcc_certify.lyapunov.rate_bound import RateLimit
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.theorems import Obligation, RateProof
-from ptcc_certify.theorems.base import ExactInterval
+from ptcc_certify.theorems.base import ExactInterval, Obligation, RateProof
 
 _LIMITS = ("gain_cap", "stop_before", "sample_period")
 
@@ -175,6 +174,7 @@ def _write_paper(content: Content) -> dict[str, Any] | None:
 
 
 def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
+    where = Writer(out.labels) if V.kind == "paper" else out  # as the section "paper" has it
     distance = V.deviation and {
         "agents": dict(zip(out.labels, map(format_exact, V.deviation.agents), strict=True)),
         "norm": format_exact(V.deviation.norm),
@@ -182,7 +182,7 @@ def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
     return {
         "class": V.kind,
         "coordinates": V.coordinates,
-        "blocks": [_write_block(block, out) for block in V.blocks],
+        "blocks": [_write_block(block, where) for block in V.blocks],
         "rho": text(V.rho),
         "rate": text(V.rate),
         "prefactor": format_exact(V.prefactor),

@@ -87,7 +87,7 @@ def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_j
     Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
     certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
     """
-    from ptcc_certify.checker import read_and_check
+    from ptcc_certify.certificate.checking import read_and_check
 
     with progress(("independent check",)) as begin:
         begin("independent check")
@@ -140,7 +140,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     certificate the page tells the reason and no claim.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
-    from ptcc_certify.report import write_report
+    from ptcc_certify.report.document import write_report
 
     try:
         with progress(("independent check", "simulation", "report")) as begin:

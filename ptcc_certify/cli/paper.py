@@ -52,7 +52,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @click.argument("theorem", required=False)
 def cite(theorem: str | None) -> int:
     """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
-    from ptcc_certify.theorems import THEOREMS
+    from ptcc_certify.theorems.table import THEOREMS
 
     note = "Manuscript"
     if theorem is not None:

@@ -29,7 +29,7 @@ from ptcc_certify.report import texts
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.screen import remarks_on, structure_text
 from ptcc_certify.report.texts import LISTED, above, agent_parts, enclosed, printable, rational
-from ptcc_certify.theorems import THEOREMS
+from ptcc_certify.theorems.table import THEOREMS
 
 #: Rows of agents, and of leader groups, that are written out.
 ROWS, GROUPS = 200, 40

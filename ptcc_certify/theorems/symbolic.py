@@ -9,9 +9,10 @@ import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.latex import to_latex
-from ptcc_certify.theorems import LyapunovFunction, theorem_for
+from ptcc_certify.theorems.table import theorem_for
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from generators import all_classes, random_graph, smallest
+from generators import KINDS, all_classes, random_graph, smallest
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, containers, leaves
 from side_files import with_factors, with_side_files
@@ -101,7 +102,12 @@ def test_the_schema_is_a_strict_schema():
 
 
 @pytest.mark.parametrize(
-    ("name", "slides"), [*((name, False) for name in CLASSES), *((name, True) for name in list(CLASSES)[::3])]
+    ("name", "slides"),
+    [
+        pytest.param(name, slides, marks=() if name in KINDS[slides::2] else pytest.mark.campaign)
+        for name in CLASSES
+        for slides in (False, True)
+    ],
 )
 def test_certificates_of_every_class_are_valid(name: str, slides: bool):
     data = made(name, slides)
@@ -172,26 +178,35 @@ def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
 def test_another_key_or_one_less_is_not_valid(name: str, slides: bool):
     data = made(name, slides)
     labels, count = set(data["graph"]["nodes"]), 0
+    seen: set[Any] = set()
     for path in containers({k: v for k, v in data.items() if k != "unverified"}):
         value = at(data, path)
         if isinstance(value, dict):
+            one_of_a_kind = *(step for step in path if isinstance(step, str)), *value, value.get("kind")
+            if one_of_a_kind in seen:
+                continue
+            seen.add(one_of_a_kind)
             assert not valid(changed(data, path, {**value, "more": {}})), path
             # Which agents, and whether there is a rho or an end of its interval, is for the checker.
             for key in value:
                 if key not in labels and not (path[-1:] == ("numbers",) and key in ("rho", "printed", "exact")):
                     assert not valid(changed(data, path, {k: v for k, v in value.items() if k != key})), (path, key)
                     count += 1
-    assert count > 100
+    assert count > 60
 
 
 @pytest.mark.parametrize(("name", "slides"), SAMPLE)
 def test_a_number_outside_the_grammar_is_not_valid(name: str, slides: bool):
     data = made(name, slides)
-    count = 0
+    count, seen = 0, Counter[Any]()
     for path, value in leaves({k: v for k, v in data.items() if k not in ("unverified", "digest", "producer")}):
         try:
             exact(value)
         except RejectedError:
+            continue
+        kind = tuple(step for step in path if isinstance(step, str))
+        seen[kind] += 1
+        if seen[kind] > 3:
             continue
         bad = BAD_NUMBERS[count % len(BAD_NUMBERS)]
         assert not valid(changed(data, path, bad)), (path, bad)

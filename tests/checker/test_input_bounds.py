@@ -33,7 +33,7 @@ from ptcc_certify.checker.input_bounds import (
 from ptcc_certify.graphs.structure import analyse
 
 F = Fraction
-SEEDS = range(60)
+SEEDS = range(25)
 #: What floating point may be off by, relative.
 SLACK = 1e-11
 
@@ -496,7 +496,7 @@ def test_sliding_variables_move_until_the_instant_is_quiet():
     assert early.decay((F(1, 2), F(1, 2))) == (0, 0) and early.decay((F(1), F(1)))[1] == pytest.approx(1)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_no_sliding_variable_moves_the_error_further(seed: int):
     """``dE = -L E ds - L d sigma``, ``sigma' = -(mu2 + power/(T_r - t)) sigma - s f`` with ``f`` that switches."""
     rng = np.random.default_rng(seed)
@@ -541,7 +541,7 @@ def test_no_sliding_variable_moves_the_error_further(seed: int):
         assert np.trapezoid(norm**2, t) <= energy * 1.01 and np.trapezoid(norm, t) <= length * 1.01
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_no_disturbance_adds_more_to_the_input(seed: int):
     """``dE/ds = -L E - L d / gain`` from 0, with disturbances that switch: constant gains over short steps of ``z``."""
     rng = np.random.default_rng(seed)

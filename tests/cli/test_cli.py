@@ -96,7 +96,7 @@ def test_the_names_of_the_table_differ():
     assert len({case.name for case in BAD_INPUTS}) == len(BAD_INPUTS) >= 45
 
 
-SAMPLE = ("weight NaN", "directory", "gzip cut short", "XML entity bomb", "T NaN", "x0 too short", "unknown command")
+SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
@@ -387,15 +387,14 @@ def test_of_one_mode_the_mean_eigenvalue_is_the_limit():
 
 def test_a_class_that_is_not_proved_for_a_large_graph_leaves_it_undecided():
     name = save("ring.csv", ring(121))
-    assert ptcc("certify", name).code == 0
-    run = ptcc("certify", name, "--method", "full")
+    run = ptcc("certify", name, "--method", "full", "--no-simulation")
     assert run.code == 4
     assert "the paper's certificate is proved up to 120 nodes" in run.out
     assert "not proved; numerically" in run.out
-    assert ptcc("certify", name, "--method", "full", "--min-rate", "0.001").code == 4
+    assert ptcc("certify", name, "--method", "full", "--min-rate", "0.001", "--no-simulation").code == 4
     assert ptcc("certify", name, "--min-rate", "0.001").code == 0
-    assert ptcc("certify", name, "--min-rate", "1000").code == 3
-    assert ptcc("certify", name, "--expect", "stability").code == 3
+    assert ptcc("certify", name, "--min-rate", "1000", "--no-simulation").code == 3
+    assert ptcc("certify", name, "--expect", "stability", "--no-simulation").code == 3
     assert ptcc("classify", name).code == 0
 
 
@@ -578,11 +577,10 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
 
 def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
     name = save("labels.csv", [("中", "b", -1), ("b", "中", -1)])
-    for encoding in ("cp1252", "latin-1"):
-        env = {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
-        assert process("certify", name, env=env).code == 0
-        assert one_object(process("certify", name, "--json", env=env).out)["graph"]["nodes"] == ["中", "b"]
-        assert process("classify", "中.csv", env=env).code == 2
+    env = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    assert process("certify", name, env=env).code == 0
+    assert one_object(process("certify", name, "--json", env=env).out)["graph"]["nodes"] == ["中", "b"]
+    assert process("classify", "中.csv", env=env).code == 2
 
 
 def test_a_reader_that_stops_early_is_no_error():
@@ -811,14 +809,14 @@ def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
 
 def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
     rng, capped = np.random.default_rng(1), 0
-    graphs = [*GRAPHS]
-    for seed in range(0, 45, 9):
+    graphs = ["fig1a", "fig3b", "fig5b"]
+    for seed in (9, 27):
         _, kwargs = all_classes()[seed]
         write_graph(random_graph(rng, n=8, **{k: v for k, v in kwargs.items() if k != "n"}).graph, f"r{seed}.csv")
         graphs.append(f"r{seed}.csv")
     tasks = [("--shortest-deadline",), ("--shortest-deadline", "--input-norm", "2"), ("--deadline", "20/3")]
     tasks += [("--shortest-deadline", "--residual", "4"), ("--deadline", "4.1", "--residual", "0.01")]
-    for graph, task in zip(graphs, tasks * 3, strict=False):
+    for graph, task in zip(graphs, tasks, strict=True):
         asked = ("design", graph, "--max-input", "50", "--initial-bound", "2.3", *task)
         found = one_object(ptcc(*asked, "--json").out)
         word, *command = shlex.split(found["command"])

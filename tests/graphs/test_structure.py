@@ -384,7 +384,7 @@ def flags(structure: Structure) -> tuple[str, bool, bool, bool, bool]:
     return s.connectivity, s.balanced, s.sign_symmetric, s.undirected, s.all_positive
 
 
-many = settings(max_examples=80, deadline=None)
+many = settings(max_examples=30, deadline=None)
 
 
 @many

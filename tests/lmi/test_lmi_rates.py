@@ -64,7 +64,7 @@ def m_matrix_gap(seed: int) -> float:
 
 
 def test_the_best_diagonal_rate_of_an_m_matrix_is_twice_its_smallest_eigenvalue():
-    gaps = [m_matrix_gap(seed) for seed in range(120)]
+    gaps = [m_matrix_gap(seed) for seed in range(40)]
     assert max(gaps) <= 1e-6, int(np.argmax(gaps))
 
 
@@ -75,7 +75,7 @@ def test_the_best_diagonal_rate_of_a_thousand_m_matrices():
     assert max(gaps) <= 1e-6
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=12)
 @given(SEEDS, st.integers(2, 10), st.sampled_from([1.0, 6.0]))
 def test_the_optimum_lies_between_a_matrix_and_its_dual_bound(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)
@@ -90,7 +90,7 @@ def test_the_optimum_lies_between_a_matrix_and_its_dual_bound(seed, n, decades):
     assert found.rate <= 2 * np.linalg.eigvals(A).real.min() * (1 + 1e-6)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(SEEDS, st.integers(2, 8))
 def test_the_best_rate_is_invariant(seed, n):
     """Permutation, diagonal similarity and gauge change nothing; a factor scales the rate."""
@@ -139,9 +139,9 @@ def test_a_chain_of_two_thousand_followers_has_a_certificate():
     assert lmi.diagonal_rate(A, capped.log_omega) >= capped.rate * (1 - 1e-9)
 
 
-@pytest.mark.parametrize("n", [4, 24, 40])
+@pytest.mark.parametrize("n", [4, 40])
 def test_interior_points_and_clarabel_agree(n: int, monkeypatch: pytest.MonkeyPatch):
-    for seed in range(3):
+    for seed in range(2):
         A = signed_laplacian(np.random.default_rng(100 * n + seed), n)
         rates = []
         for rows in (0, 100):
@@ -164,7 +164,7 @@ def test_a_singular_matrix_has_no_rate():
 # ---------------------------------------------------------------------- rate against prefactor
 
 
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=6)
 @given(SEEDS, st.integers(2, 8), st.sampled_from([1.0, 4.0]))
 def test_the_frontier_is_monotone_and_bounds_the_motion(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)

@@ -140,7 +140,7 @@ def test_v_dot_of_proposition_1_is_below_its_bounding_form():
 
 def test_on_the_manifold_the_lyapunov_function_is_that_of_the_nominal_protocol():
     from ptcc_certify.graphs.structure import analyse
-    from ptcc_certify.theorems import theorem_for
+    from ptcc_certify.theorems.table import theorem_for
 
     structure = analyse(SignedDigraph.from_edges([(1, 2, 3), (2, 1, -1), (2, 3, 1)]))
     V = theorem_for(structure, "sliding-mode").lyapunov(structure)

@@ -366,7 +366,7 @@ def test_without_widgets_there_is_a_static_view(
 def test_responses_are_told(explorer: Explorer, capsys: pytest.CaptureFixture[str]):
     """Prints seconds; benchmarks/explorer.py measures them in earnest."""
     panel = Panel(explorer, SLIDING)
-    moves = [("graph", name) for name in GRAPHS] + [("mu1", 3.0), ("rho1", 1.0), ("disturbance", "telegraph")]
+    moves = [("graph", "fig5a"), ("rho1", 1.0), ("disturbance", "telegraph")]
     told = []
     for name, value in moves:
         image, verdict = panel.set(name, value)

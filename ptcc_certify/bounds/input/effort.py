@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ptcc_certify.checker.input_bounds import Limits, Rows, Starts
-from ptcc_certify.theorems import Obligation
+from ptcc_certify.theorems.base import Obligation
 
 
 @dataclass(frozen=True)

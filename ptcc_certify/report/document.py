@@ -1,0 +1,123 @@
+"""A certificate written as a page or a statement: checked first, its run repeated for the figures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.report.figures import draw
+from ptcc_certify.report.page import rejected_html, report_html
+from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.statement import report_latex
+
+#: What a report is written as.
+SUFFIXES = (".html", ".htm", ".tex")
+
+
+def write_report(
+    certificate: str | Path,
+    output: str | Path,
+    *,
+    simulation: bool | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+    memory: float = 1,
+) -> str:
+    """Check a certificate's file and write a report of it: a page (``.html``) or a statement in LaTeX (``.tex``).
+
+    A statement has its figures beside it, ``<name>_graph.pdf`` and ``<name>_decay.pdf``. Of a certificate that the
+    check rejects there is a page that says so and shows nothing else of it, and no statement.
+
+    Parameters
+    ----------
+    certificate : path
+        A file of schema ``ptcc-certificate/1``.
+    output : path
+        The suffix decides what is written.
+    simulation : bool, optional
+        Whether to repeat the CVODES run for the figures; by default up to 1,000 agents.
+    progress : callable
+        Told which of ``independent check``, ``simulation``, ``report`` begins.
+    memory : float
+        GB that the check may take; see :func:`ptcc_certify.checker.check`.
+
+    Returns
+    -------
+    str
+        ``certified``, ``undecided`` or ``rejected``.
+
+    Raises
+    ------
+    ParameterError
+        Another suffix, or ``output`` is the certificate.
+    FormatError
+        The file cannot be read as a certificate, or the report not be written.
+    RejectedCertificate
+        A statement is asked of a certificate that the check rejects.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> with TemporaryDirectory() as folder:
+    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
+    ...     write_report(f"{folder}/c.json", f"{folder}/c.html", simulation=False)
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    'certified'
+    ['c.html', 'c.json']
+    """
+    path, suffix = Path(output), Path(output).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
+    if path.is_file() and Path(certificate).is_file() and path.samefile(certificate):
+        raise ParameterError(f"{output}: is the certificate itself; name another file")
+    if not path.parent.is_dir():
+        raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if suffix == ".tex" and not re.fullmatch(r"[A-Za-z0-9_.-]+", path.stem):
+        raise ParameterError(f"{output}: LaTeX wants a plain name; use letters, digits, -, _ and .")
+    progress("independent check")
+    try:
+        saved = read_certificate(certificate, memory=memory)
+    except RejectedCertificate as error:
+        if suffix == ".tex":
+            raise
+        write_atomically(path, rejected_html(error))
+        return "rejected"
+    progress("simulation")
+    saved, why = _with_run(saved, simulation)
+    progress("report")
+    if suffix == ".tex":
+        drawn = draw(saved, ("graph", "decay"))
+        files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
+        if folder := next((file for file in files.values() if file.is_dir()), None):
+            raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
+        text = report_latex(saved, {name: file.name for name, file in files.items()})
+        contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
+        for file, content in contents.items():
+            write_atomically(file, content)
+        write_atomically(path, text)
+    else:
+        write_atomically(path, report_html(saved, no_run=why))
+    return saved.verdict
+
+
+def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate, str]:
+    """Repeat the run, if there is one to repeat; return why there is none."""
+    n = saved.graph.n_nodes
+    if simulation is False:
+        return saved, "it was left out (--no-simulation)"
+    if saved.start is None:
+        return saved, "the certificate names no start"
+    if simulation is None and n > REPEATED_NODES:
+        return saved, f"above {REPEATED_NODES} agents it is repeated only where that is asked for"
+    try:
+        return saved.with_simulation(samples=201 if n <= INPUT_NODES else 101), ""
+    except (SimulationError, ParameterError) as error:
+        return saved, f"it failed: {error}"
+    except OverflowError:
+        return saved, "a number of the start is beyond the range of float64"
