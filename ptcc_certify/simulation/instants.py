@@ -75,7 +75,8 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     if T_r:
         marks = np.array([T * (1 - left) for left in _MARKS])
         early = np.append(grid, 1 - marks[marks < T_r] / T_r)
-        parts.append(np.stack([T_r * (1 - early), (T_s + T_r * early) / T, early]))
+        left = np.minimum((T_s + T_r * early) / T, 1.0)  # 0.8 + 0.9 is more than 1.7 in floats
+        parts.append(np.stack([T_r * (1 - early), left, early]))
     table = np.concatenate(parts, axis=1)
     table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
     fresh = np.append(True, np.diff(table, axis=1).any(axis=0))

@@ -24,7 +24,7 @@ Pair = tuple[int, int]
 Weighted = dict[Pair, Fraction]  # (source, target) -> weight
 
 CLASSES = dict(all_classes())
-PER_CLASS = 32
+PER_CLASS = 13
 
 
 def weights_of(graph: SignedDigraph) -> Weighted:
@@ -270,12 +270,12 @@ def test_the_constructed_graphs_cover_every_class_and_size():
             theorems.update(made.theorems)
             sizes[made.graph.n_nodes] += 1
             mixtures.add(tuple(sorted(set(made.theorems))))
-    assert sum(cells.values()) >= 2000
+    assert sum(cells.values()) >= 1000
     assert set(cells) == {
         *product(("strong", "quasi-strong"), ("balanced", "unbalanced")),
         *product(("weak", "disconnected"), ("balanced", "unbalanced", "mixed")),
     }
-    assert min(cells.values()) >= 100
+    assert min(cells.values()) >= 50
     assert set(theorems) == {"1.1", "1.2", "2.1", "2.2", "3.1", "3.2"}
     assert set(sizes) == set(range(1, 13))
     assert len([m for m in mixtures if len(m) > 1]) >= 12

@@ -110,7 +110,7 @@ def test_the_best_rate_is_invariant(seed, n):
 
 def test_a_reducible_matrix_decays_like_its_slowest_block():
     rng = np.random.default_rng(3)
-    for _ in range(10):
+    for _ in range(4):
         blocks = [signed_laplacian(rng, int(rng.integers(2, 5))) for _ in range(3)]
         n = sum(map(len, blocks))
         A, start = np.tril(rng.normal(size=(n, n)), -1) * 5, 0
@@ -196,7 +196,7 @@ def test_a_largest_condition_is_kept(condition: float, objective: str):
         assert found.rate == pytest.approx(free.rate, rel=1e-5)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=20)
 @given(SEEDS, st.integers(1, 12))
 def test_full_matrices_are_what_they_say(seed, n):
     rng = np.random.default_rng(seed)
@@ -233,7 +233,7 @@ def test_a_jordan_chain_has_full_matrices_below_its_rate():
 def test_a_witness_shows_that_no_diagonal_solution_exists():
     """Matrices built around ``diag(A X) < 0``: the witness is found and checked in rationals."""
     found = 0
-    for seed in range(120):
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         A = without_diagonal_solution(rng, int(rng.integers(2, 9)))
         Y = lmi.refute_diagonal_lyapunov(A)
@@ -242,10 +242,10 @@ def test_a_witness_shows_that_no_diagonal_solution_exists():
             assert lmi.no_diagonal_rate_above(exact(A), Y, Fraction(0))
         with pytest.raises(lmi.NoCertificate):
             lmi.diagonal_lyapunov(A)
-    assert found >= 115, found
+    assert found >= 39, found
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(SEEDS, st.integers(1, 8))
 def test_no_witness_is_reported_where_a_diagonal_solution_exists(seed, n):
     A = diagonally_stable(np.random.default_rng(seed), n)
@@ -263,8 +263,8 @@ def rate_refuted(seed: int) -> bool:
 
 
 def test_a_rational_witness_excludes_rates_just_above_the_optimum():
-    refuted = [rate_refuted(seed) for seed in range(60)]
-    assert sum(refuted) >= 58, [seed for seed, done in enumerate(refuted) if not done]
+    refuted = [rate_refuted(seed) for seed in range(20)]
+    assert sum(refuted) == 20, [seed for seed, done in enumerate(refuted) if not done]
 
 
 def test_a_wrong_witness_proves_nothing():

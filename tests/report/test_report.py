@@ -582,7 +582,7 @@ def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp
     assert after and not set(after) & set("[*")
 
 
-@pytest.mark.parametrize("size", ["1e300", "1e160", "1e-250", "0"])
+@pytest.mark.parametrize("size", ["1e300", "1e-250", "0", pytest.param("1e160", marks=pytest.mark.campaign)])
 def test_starts_of_any_size_are_reported(size: str, tmp_path: Path):
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     start = [Fraction(size), -Fraction(size)]
