@@ -4,9 +4,9 @@
 
 Dense matrices of 1,000 rows, matrices that dominate with 10^5 and 10^6 rows, and the largest strong component of
 Bitcoin OTC (``soc-sign-bitcoinotc.csv.gz`` in FOLDER; skipped without it) as a graph of its own. ``prove`` finds a
-witness from floats, for which the kernel decides (:mod:`lmi.witness`); ``check`` hands the witness to the kernel alone,
-by the standard library or by its array twins (:mod:`lmi.exact`). The matrices ``P L + L' P - b P`` are exact: ``p`` in
-integers, ``b`` dyadic.
+witness from floats, for which the kernel decides (:mod:`lmi.definiteness_proofs`); ``check`` hands it to the kernel
+alone, by the standard library or by its array twins (:mod:`lmi.exact`). The matrices ``P L + L' P - b P`` are exact:
+``p`` in integers, ``b`` dyadic.
 """
 
 from __future__ import annotations

@@ -3,8 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python benchmarks/effort.py [--real FOLDER]
 
 The packaged graphs, and the real graphs of up to 105 nodes of a folder if it is given. ``rho2 kappa`` is 1.5 times the
-threshold of each graph. For all starts with ``||X(0)||_inf <= 1`` and for 20 random ones of them alone, and the worst:
-the proved bound over what the motion does, from matrix exponentials at 2000 instants. Then the paper's Examples 1 to 3.
+threshold of each graph. For all initial states with ``||X(0)||_inf <= 1`` and for 20 random ones of them alone, and the
+worst: the proved bound over what the motion does, from matrix exponentials at 2000 instants. Then the paper's Examples
+1 to 3.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
-from ptcc_certify.bounds.input import Effort, starts_within, worst_start
+from ptcc_certify.bounds.input import Effort, initial_set_within, worst_initial_state
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 
@@ -33,11 +34,11 @@ KINDS = ("peak of an agent", "largest peak", "peak of the norm", "energy", "path
 Ratios = dict[str, list[float]]
 
 
-def motion(graph: SignedDigraph, protocol: NominalProtocol, starts: np.ndarray) -> tuple[np.ndarray, ...]:
+def motion(graph: SignedDigraph, protocol: NominalProtocol, initial_set: np.ndarray) -> tuple[np.ndarray, ...]:
     """Sizes of every agent's input at most (N, S), of the norm, energy and path length (S,)."""
     L, still = graph.laplacian().toarray(), sum(c.balanced for c in analyse(graph).closed_components)
     basis = np.linalg.svd(L)[0][:, : graph.n_nodes - still]  # of what decays
-    inside, E = basis.T @ L @ basis, -basis.T @ L @ starts
+    inside, E = basis.T @ L @ basis, -basis.T @ L @ initial_set
     gain, T = protocol.gain, float(protocol.T)
     s, before = gain.clock_at_tau(Z), 0.0
     u = gain.value_at_remaining(1.0) * np.abs(basis @ E)
@@ -65,20 +66,20 @@ def ratios(effort: Effort, seen: tuple[np.ndarray, ...]) -> Ratios:
 
 
 def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
-    """Ratios for single starts, and for the box with the worst start among those tried."""
+    """Ratios for single initial states, and for the box with the worst initial state among those tried."""
     began = time.perf_counter()
     proved = certify(graph, NominalProtocol(1, 1, 1, 1), [0] * graph.n_nodes, simulation=False)
     if proved.rate is None:
         print(f"{name:<26} N {graph.n_nodes:>3}  nothing decays, or nothing was proved")
         return None
     k = OVER * 2 / proved.rate.limit_denominator(10**9)
-    cert = proved.changed(protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), starts=None)
+    cert = proved.changed(protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), initial_set=None)
     rng = np.random.default_rng(graph.n_nodes)
-    starts = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
-    boxed = cert.changed(starts=starts_within(cert.structure, 1))
-    assert boxed.starts is not None
-    worst = worst_start(cert.structure, cert.protocol, boxed.starts)
-    points = np.column_stack([starts, worst.x0])
+    initial_set = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
+    boxed = cert.changed(initial_set=initial_set_within(cert.structure, 1))
+    assert boxed.initial_set is not None
+    worst = worst_initial_state(cert.structure, cert.protocol, boxed.initial_set)
+    points = np.column_stack([initial_set, worst.x0])
     seen = motion(graph, cert.protocol, points)  # type: ignore[arg-type]
     alone: Ratios = {kind: [] for kind in KINDS}
     for i in range(STARTS + 1):
@@ -121,10 +122,10 @@ def main() -> None:
             continue
         if graph.n_nodes <= LARGEST:
             graphs.append((path.name, graph))
-    print("all starts within 1: proved over the largest seen of 20 random starts and the worst")
+    print("all initial states within 1: proved over the largest seen of 20 random initial states and the worst")
     found = [pair for name, graph in graphs if (pair := examine(name, graph)) is not None]
-    broken = report("every start alone", [alone for alone, _ in found])
-    broken += report("all starts within 1", [together for _, together in found])
+    broken = report("every initial state alone", [alone for alone, _ in found])
+    broken += report("all initial states within 1", [together for _, together in found])
     print(f"\nviolations: {broken}\n\nExamples 1 to 3: rho2 kappa min Re lambda, bounded from 1 on")
     for number in (1, 2, 3):
         for name in EXAMPLES[number].graphs:

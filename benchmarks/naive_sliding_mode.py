@@ -1,7 +1,7 @@
 """Example 4, event by event and the naive way: errors, evaluations and seconds from one run.
 
 The naive way integrates (47)-(48) as printed, ``x' = u + d`` and ``varsigma' = -u^nom``, in plain time with NumPy's
-``sign``: by SciPy's adaptive methods and by RK4 with a fixed step. The yardstick is the exact outcome
+``sign``: by SciPy's adaptive methods and by RK4 with a fixed step. The yardstick is the exact final state
 ``Q (x(0) - sigma(0))`` at ``T_r + T_s``. Every row runs in a process of its own, and a naive run that stalls is
 stopped by a cap of seconds or of evaluations.
 
@@ -147,8 +147,8 @@ def measure(send: Any, graph_name: str, label: str, cap: float, most: int) -> No
     """Run a method, in its own process, and again if it is fast; send the run with the median of the seconds."""
     np.seterr(all="ignore")
     graph, (method, options) = load_graph(graph_name), METHODS[label]
-    outcome = ptcc.outcome(ptcc.analyse(graph), (X0 - SIGMA0).astype(int).tolist())
-    exact = np.array(outcome.final_state, dtype=float)
+    final_state = ptcc.final_state(ptcc.analyse(graph), (X0 - SIGMA0).astype(int).tolist())
+    exact = np.array(final_state.final_state, dtype=float)
     if method == "ours":
         first = ours(graph, exact, options)
         seconds = [first.seconds, *(ours(graph, exact, options).seconds for _ in range(4))]

@@ -2,8 +2,8 @@
 
     OPENBLAS_NUM_THREADS=1 python benchmarks/real_graphs.py FOLDER.. [--json FILE] [--before FILE] [--cap 60]
 
-``certify`` with everything: best method, CVODES run, independent check; default gains, ``rho2 kappa = 2``, a start
-drawn at random. Each graph in a process of its own, which is ended after ``--cap`` seconds; CPU seconds are those of
+``certify`` with everything: best method, CVODES run, independent check; default gains, ``rho2 kappa = 2``, a random
+initial state. Each graph in a process of its own, which is ended after ``--cap`` seconds; CPU seconds are those of
 the one call and its processes, without imports. Bound over true: the energy of the input, and the largest deviation
 of an agent from its final state at T/2, by matrix exponentials. ``--before`` compares with the JSON of an earlier
 run, such as one of another version (PYTHONPATH) on the same machine.
@@ -33,7 +33,7 @@ DZ = (np.diff(EDGES)[:, None] * WEIGHTS / 2).ravel()
 
 
 def energy(L: np.ndarray, still: int, protocol: Any, x: np.ndarray) -> float:
-    """``int ||u||^2 dt`` of a start."""
+    """``int ||u||^2 dt`` of an initial state."""
     basis = np.linalg.svd(L)[0][:, : len(L) - still]  # of what decays
     inside, E, gain, T = basis.T @ L @ basis, -basis.T @ (L @ x), protocol.gain, float(protocol.T)
     total, before = 0.0, 0.0
@@ -63,9 +63,9 @@ def one(path: str) -> dict[str, Any]:
     verdict = cert.verdict
     seconds, wall = sum(os.times()[:4]) - began, time.perf_counter() - wall
     L = graph.laplacian().toarray()
-    ends = np.array([float(v) for v in cert.outcome.values])  # type: ignore[union-attr]
+    ends = np.array([float(v) for v in cert.final_state.values])  # type: ignore[union-attr]
     true = np.abs(expm(-L * protocol.gain.clock(0.5)) @ np.array(x0) - ends)
-    bound = cert.outcome_distance([0.5])[:, 0]
+    bound = cert.deviation_bound([0.5])[:, 0]
     effort = cert.effort
     proved = effort.energy.value if effort is not None and effort.energy is not None else math.nan
     seen = energy(L, sum(c.balanced for c in cert.structure.closed_components), protocol, np.array(x0))

@@ -3,10 +3,10 @@
     OPENBLAS_NUM_THREADS=1 python benchmarks/simulation.py [--largest 100000] [--cap SECONDS] [--json FILE]
 
 The states at 50 instants, uniform in tau = -ln(1 - t/T), T = 1, gain 1 + 2/(1 - t), are wanted to within 1e-6 of the
-largest entry of the start. Every integrator begins with rtol = atol = 1e-6 and goes on to 1e-7 .. 1e-11 until it is
-that accurate; the row is that last run, the median of three if it is short. Each row runs in a process of its own; a
-run that takes longer than the cap, or needs more than 12 GB, is stopped. Seconds are CPU time of one thread, so that
-other work on the machine disturbs them little; the cap is on the wall clock.
+largest entry of the initial state. Every integrator begins with rtol = atol = 1e-6 and goes on to 1e-7 .. 1e-11 until
+it is that accurate; the row is that last run, the median of three if it is short. Each row runs in a process of its
+own; a run that takes longer than the cap, or needs more than 12 GB, is stopped. Seconds are CPU time of one thread, so
+that other work on the machine disturbs them little; the cap is on the wall clock.
 
 Graphs: those of scale.py, a tenth of the agents listening to nobody, a twentieth in rings of four, the others to seven
 random agents. *mild*: weights 0.5 to 2; *stiff*: weights log-uniform over three decades, 0.1 to 100.

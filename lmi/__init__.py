@@ -9,18 +9,19 @@ from typing import Any
 
 _MODULES = {
     "errors": "LMIError MatrixError NoCertificate NotAnHMatrix NotAnMMatrix OutOfTime",
-    "deadline": "time_limit",
-    "certificate": "DiagonalCertificate diagonal_margin diagonal_rate",
-    "matrices": "comparison_matrix irreducible_blocks is_h_matrix is_m_matrix is_z_matrix m_matrix_witness",
+    "search_time": "time_limit",
+    "diagonal_certificate": "DiagonalCertificate diagonal_margin diagonal_rate",
+    "matrix_classes": "comparison_matrix irreducible_blocks is_h_matrix is_m_matrix is_z_matrix m_matrix_witness",
     "closed_form": "h_matrix_certificate h_matrix_frontier h_matrix_diagonal "
     "m_matrix_certificate perron_certificate perron_vectors",
-    "coupled": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
+    "leader_follower": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
     "diagonal": "diagonal_lyapunov diagonal_rate_limit h_matrix_lyapunov rate_frontier refute_diagonal_lyapunov",
     "full": "FullCertificate full_frontier",
-    "coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",
-    "witness": "DefinitenessProof ResidualWitness definite_by_polynomial "
+    "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",
+    "definiteness_proofs": "DefinitenessProof ResidualWitness definite_by_polynomial "
     "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite",
-    "sparse_witness": "DominanceProof SparseDefinitenessProof prove_dominance prove_sparse_positive_definite",
+    "sparse_definiteness_proofs": "DominanceProof SparseDefinitenessProof "
+    "prove_dominance prove_sparse_positive_definite",
     "exact.numbers": "dyadic_integers round_to_bits",
 }
 _EXPORTS = {name: f"lmi.{module}" for module, names in _MODULES.items() for name in names.split()}

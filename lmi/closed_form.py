@@ -11,10 +11,10 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, eigsh, splu
 
-from lmi.certificate import DiagonalCertificate
-from lmi.deadline import checkpoint
+from lmi.diagonal_certificate import DiagonalCertificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
-from lmi.matrices import comparison_matrix, m_matrix_witness, square
+from lmi.matrix_classes import comparison_matrix, m_matrix_witness, square
+from lmi.search_time import checkpoint
 
 #: Up to this many rows a tight rate is the eigenvalue of a dense matrix.
 DENSE_ROWS = 1500
@@ -287,8 +287,9 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     Returns
     -------
     DiagonalCertificate
-        ``rate`` is the tight rate of this ``Omega`` (see :func:`lmi.certificate.diagonal_rate`), lowered by its
-        rounding up to 1,500 rows and by its residual above; ``upper`` is infinite, ``witness`` is ``(log u, log v)``.
+        ``rate`` is the tight rate of this ``Omega`` (see :func:`lmi.diagonal_certificate.diagonal_rate`), lowered by
+        its rounding up to 1,500 rows and by its residual above; ``upper`` is infinite, ``witness`` is ``(log u, log
+        v)``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The search for diagonal Lyapunov matrices, with cvxpy and Clarabel or, for larger ones, :mod:`lmi.interior_point`.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
-certificate is proved elsewhere (:mod:`lmi.witness`).
+certificate is proved elsewhere (:mod:`lmi.definiteness_proofs`).
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
-from lmi.coupling import couple_blocks
-from lmi.deadline import checkpoint, seconds_left
+from lmi.definiteness_proofs import no_diagonal_rate_above
+from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact.numbers import round_to_bits
 from lmi.interior_point import maximise_margin
-from lmi.matrices import block_columns, irreducible_blocks, square
-from lmi.witness import no_diagonal_rate_above
+from lmi.matrix_classes import block_columns, irreducible_blocks, square
+from lmi.schur_coupling import couple_blocks
+from lmi.search_time import checkpoint, seconds_left
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -526,10 +526,11 @@ def rate_frontier(
     best: DiagonalCertificate | None = None,
     tolerance: float = 1e-9,
 ) -> tuple[DiagonalCertificate, ...]:
-    """Return rate against prefactor: diagonal matrices, each the fastest at its condition number.
+    """Return rate against overshoot constant: diagonal matrices, each the fastest at its condition number.
 
-    At clock value ``s`` a member bounds ``||x||^2`` by ``condition * exp(-rate s) ||x(0)||^2``; early the small
-    conditions are best, late the large rates, and the pointwise minimum of a few members is much better than either.
+    At clock value ``s`` a Lyapunov function bounds ``||x||^2`` by ``condition * exp(-rate s) ||x(0)||^2``; early the
+    small conditions are best, late the large rates, and the pointwise minimum of a few Lyapunov functions is much
+    better than either.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Full (non-diagonal) Lyapunov matrices: every rate below the spectral one, at the smallest prefactor found.
+"""Full (non-diagonal) Lyapunov matrices: every rate below the spectral one, at the smallest overshoot constant found.
 
 Two steps, both without a solver. The slow and the fast modes are split by a basis ``X`` of invariant subspaces, so that
 ``X^-1 A X = diag(A_1 .. A_m)``; on each block the identity is corrected until it decays at the wanted rate:
@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from lmi.deadline import checkpoint
 from lmi.errors import MatrixError, NoCertificate
-from lmi.matrices import square
+from lmi.matrix_classes import square
+from lmi.search_time import checkpoint
 
-#: Relative distances of the wanted rate from the spectral one.
+#: Relative deviations of the wanted rate from the spectral one.
 LOSSES = (1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
 #: Modes whose decay rates differ by more than this factor are split; 1 splits all that are distinct.
 SPLITS = (np.inf, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.05, 1.0)
 #: A basis of invariant subspaces with a larger condition number is not used.
 _LARGEST_BASIS = 1e7
-#: A rate that is larger by less, relatively, is not worth a larger prefactor.
+#: A rate that is larger by less, relatively, is not worth a larger overshoot constant.
 _SAME_RATE = 1e-6
 
 
@@ -42,7 +42,7 @@ class FullCertificate:
     rate : float
         Smallest eigenvalue of ``(P A + A' P, P)``, per unit of the clock.
     condition : float
-        ``lmax(P) / lmin(P)``, the prefactor of the squared norm.
+        ``lmax(P) / lmin(P)``, the overshoot constant of the squared norm.
 
     References
     ----------
@@ -65,7 +65,7 @@ class FullCertificate:
 def full_frontier(
     A: Any, *, decay: float | None = None, losses: Sequence[float] = LOSSES
 ) -> tuple[FullCertificate, ...]:
-    """Return rate against prefactor over full Lyapunov matrices; see the module for how they are made.
+    """Return rate against overshoot constant over full Lyapunov matrices; see the module for how they are made.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def full_frontier(
         ``min Re lambda``, if it is known better than from the eigenvalues of ``A`` (block by block of a reducible
         matrix, whose Jordan chains cost digits); per unit of the clock.
     losses : sequence of float
-        Wanted distances ``1 - a / decay``.
+        Wanted deviations ``1 - a / decay``.
 
     Returns
     -------

@@ -35,8 +35,8 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import blas, eigh_tridiagonal, lapack
 
-from lmi.deadline import checkpoint
 from lmi.errors import NoCertificate
+from lmi.search_time import checkpoint
 
 #: Share of the way to the boundary that a step goes.
 _STEP = 0.95

@@ -73,7 +73,7 @@ class GraphError(PTCCError, ValueError):
 
 
 class FormatError(GraphError):
-    """A file cannot be read as a graph, a start or a certificate; the message names file and line.
+    """A file cannot be read as a graph, an initial state or a certificate; the message names file and line.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class FormatError(GraphError):
 
 
 class ParameterError(PTCCError, ValueError):
-    """A protocol parameter, a start or an option is outside its domain.
+    """A protocol parameter, an initial state or an option is outside its domain.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """Gains, and the shortest deadline, for which an input is proved to stay within what the actuators give.
 
 With ``k = rho2 kappa`` and ``a = rho1 T`` the gain is ``(a + k e^z)/T`` at ``z = ln(T/(T - t))``, and the stretched
-clock ``s = a (1 - e^-z) + k z``, which knows no ``T``. So a bound of the input over a set of starts is ``phi(a, k)/T``
-exactly: smallest peak and shortest deadline are one question, ``T = phi/U``. Of every agent ``|e_v|`` is at most
+clock ``s = a (1 - e^-z) + k z``, which knows no ``T``. So a bound of the input over a set of initial states is ``phi(a,
+k)/T`` exactly: smallest peak and shortest deadline are one question, ``T = phi/U``. Of every agent ``|e_v|`` is at most
 ``held_v``, and ``B_vi e^(-rate_i s/2)`` for each proved Lyapunov function ``i``. The bounded input up to ``T`` needs
 ``rate_i k >= 2``; then the peak is the gain where both meet, at the clock ``sigma_vi = (2/rate_i) ln(B_vi/held_v)``:
 
@@ -16,7 +16,7 @@ Which function serves an agent best depends on ``k`` only, by ``rate_i k >= 2``.
   ``a e^-z + k`` grows; a maximum of convex functions is convex.
 * For one agent the smallest admissible ``k = 2/rate_i`` is best: at a fixed ``z`` clock costs peak
   ``1/(1 - e^-z) = e^z/(e^z - 1)`` by ``a`` and ``e^z/z``, which is more, by ``k``. With several agents,
-  whose ``z_v`` differ, that is not proved; each member's
+  whose ``z_v`` differ, that is not proved; each Lyapunov function's
   ``2/rate_i`` is tried, and nothing between.
 
 Where a residual is allowed at the deadline, the gain may be constant instead: a cap ``g`` that always acts gives the
@@ -26,7 +26,7 @@ residual, ``sqrt(c_v) start_i e^(-rate_i s/2) <= r``.
 Two bounds hold for all gains of the protocol, whatever the certificate:
 
 * without a residual the input must stay bounded, hence ``k >= 1/min Re lambda >= 2/limit``, and
-  ``u(0) = (a + k)/T e(0)``: ``U T > (2/limit) sup |e_v(0)|``. This needs a set of starts with inner points.
+  ``u(0) = (a + k)/T e(0)``: ``U T > (2/limit) sup |e_v(0)|``. This needs a set of initial states with inner points.
 * an agent moves at most ``U T``: ``U T >= sup |x_v(0) - (Q X(0))_v| - r``.
 
 The search is in floating point; what is answered is then proved: a
@@ -45,21 +45,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lmi.exact.enclosure import rounded, sqrt
-from lmi.exact.rounding import down, float_up, up
-from ptcc_certify.bounds.input import Starts, WorstStart, starts_within, worst_start
+from lmi.exact.directed_rounding import down, float_up, up
+from lmi.exact.elementary_enclosures import rounded, sqrt
+from ptcc_certify.bounds.input import InitialSet, WorstInitialState, initial_set_within, worst_initial_state
 from ptcc_certify.bounds.input.initial_set import ways
-from ptcc_certify.bounds.input.search import decaying, log, usable_members
+from ptcc_certify.bounds.input.tightest_bound import decaying, log, usable_functions
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.checker.input_bounds import BITS, InputBounds, Limits, Linear
+from ptcc_certify.checker.input_formulas import BITS, InputBounds, Limits, Linear
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten
-from ptcc_certify.graphs.rich_display import Shown
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols import NominalProtocol, Protocol
-from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
@@ -98,7 +98,7 @@ class Asked:
         ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input.
     input_norm : {2, None}
         None: of every agent's input.
-    starts : Starts
+    initial_set : InitialSet
         For all of which it is to hold.
     deadline, residual : Fraction or None
         In units of time and of the states; None where nothing is asked.
@@ -106,7 +106,7 @@ class Asked:
 
     max_input: Fraction
     input_norm: int | None
-    starts: Starts
+    initial_set: InitialSet
     deadline: Fraction | None
     residual: Fraction | None
 
@@ -137,7 +137,7 @@ class Design(Shown):
     peak : Fraction or None
         The certified peak of the input at ``deadline``, also if it is too large.
     residual : Fraction or None
-        How far from its outcome an agent is at the deadline, at most; 0 without a cap.
+        How far from its final state an agent is at the deadline, at most; 0 without a cap.
     product : Fraction or None
         ``phi``, peak times deadline: what the gains found certify at any deadline.
     lower_product : Fraction or None
@@ -190,9 +190,9 @@ class Design(Shown):
         Whether every agent is within :attr:`residual` at the deadline, or the norm of the input within its limit,
         cannot be asked there: both are proved all the same.
         """
-        starts = self.asked.starts
-        R = max(starts.radius, default=Fraction(0))
-        about_zero = not any(starts.center) and R > 0 and min(starts.radius) == R
+        initial_set = self.asked.initial_set
+        R = max(initial_set.radius, default=Fraction(0))
+        about_zero = not any(initial_set.center) and R > 0 and min(initial_set.radius) == R
         if not (self.repeatable and about_zero and self.protocol is not None and self.certificate is not None):
             return None
         p, effort = self.protocol, self.certificate.effort
@@ -224,15 +224,15 @@ class Design(Shown):
         return float_up(self.product / self.lower_product)
 
     @cached_property
-    def worst(self) -> WorstStart | None:
+    def worst(self) -> WorstInitialState | None:
         """The start from which the input gets largest under these gains (numerical); None without gains."""
         if self.certificate is None:
             return None
-        structure, protocol, starts = self.certificate.structure, self.certificate.protocol, self.asked.starts
+        structure, protocol, initial_set = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
         if self.limits is None or self.limits.gain_cap is None:
-            return worst_start(structure, protocol, starts)
+            return worst_initial_state(structure, protocol, initial_set)
         # The gain is constant, and max |e_k| never grows.
-        first = worst_start(structure, protocol, starts, samples=1)
+        first = worst_initial_state(structure, protocol, initial_set, samples=1)
         return replace(first, size=first.size * float(self.limits.gain_cap / protocol.gain.first))
 
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
@@ -300,7 +300,7 @@ class Design(Shown):
         if self.peak is not None:
             found.append(("peak input", f"{up(self.peak)} at most"))
         if self.residual is not None:
-            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its outcome"
+            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its final state"
             found.append(("left at the deadline", left))
         if self.shortest_certified is not None:
             found.append(("shortest deadline", f"{up(self.shortest_certified, DIGITS)} certified"))
@@ -365,7 +365,7 @@ def design(
     graph: SignedDigraph,
     *,
     max_input: Exact,
-    initial_bound: Exact | Starts,
+    initial_bound: Exact | InitialSet,
     deadline: Exact | None = None,
     residual: Exact | None = None,
     input_norm: int | None = None,
@@ -377,13 +377,13 @@ def design(
     graph : SignedDigraph
         Up to 400 agents.
     max_input : int, float, str or Fraction
-        Positive: bound of ``|u_k|`` for all agents, at all times, from all starts.
-    initial_bound : int, float, str, Fraction or Starts
-        All starts with ``||X(0)||_inf`` up to this; or another set.
+        Positive: bound of ``|u_k|`` for all agents, at all times, from all initial states.
+    initial_bound : int, float, str, Fraction or InitialSet
+        All initial states with ``||X(0)||_inf`` up to this; or another set.
     deadline : int, float, str or Fraction, optional
         ``T``, in units of time: the gains with the smallest peak are sought. Without it the shortest one is.
     residual : int, float, str or Fraction, optional
-        Positive: how far every agent may be from its outcome at the deadline. Then the gain may be capped.
+        Positive: how far every agent may be from its final state at the deadline. Then the gain may be capped.
     input_norm : {2}, optional
         ``max_input`` bounds ``||u||_2`` instead.
 
@@ -395,7 +395,7 @@ def design(
     Raises
     ------
     ParameterError
-        A number that is not positive, another norm, or starts of the wrong length.
+        A number that is not positive, another norm, or initial states of the wrong length.
 
     References
     ----------
@@ -423,9 +423,11 @@ one asked for)
     if input_norm not in (None, 2):
         raise ParameterError(f"input_norm = {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
     structure = analyse(graph)
-    starts = initial_bound if isinstance(initial_bound, Starts) else starts_within(structure, initial_bound)
-    asked = Asked(U, input_norm, starts, T, r)
-    begin: dict[str, Any] = {"x0": starts.center} if starts.point else {"starts": starts}
+    initial_set = (
+        initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
+    )
+    asked = Asked(U, input_norm, initial_set, T, r)
+    begin: dict[str, Any] = {"x0": initial_set.center} if initial_set.point else {"initial_set": initial_set}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
     lower, why = _lower_product(base, asked)
     blank = Design(UNPROVED, "", asked, T, lower_product=lower, lower_by=why)
@@ -497,75 +499,75 @@ def _unusable(base: Certificate) -> str | None:
     return None
 
 
-def _bounds(base: Certificate, starts: Starts) -> InputBounds:
+def _bounds(base: Certificate, initial_set: InitialSet) -> InputBounds:
     """Return what bounds the input."""
     constants = base.effort.constants if base.effort is not None else ()
     rows = base.graph.exact_rows(range(base.graph.n_nodes))
-    return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, starts)
+    return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, initial_set)
 
 
 def _lower_product(base: Certificate, asked: Asked) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
-    best, why, starts, graph = Fraction(0), "", asked.starts, base.graph
+    best, why, initial_set, graph = Fraction(0), "", asked.initial_set, base.graph
     agents = [shorten(label) for label in graph.labels]
     if base.influence.exact and graph.n_nodes <= INPUT_NODES:
-        for agent, row in zip(agents, ways(starts, base.influence), strict=True):
-            way = _largest_below(starts, row) - (asked.residual or 0)
+        for agent, row in zip(agents, ways(initial_set, base.influence), strict=True):
+            way = _largest_below(initial_set, row) - (asked.residual or 0)
             if way > best:
-                best, why = way, f"the way of agent {agent} to its outcome"
+                best, why = way, f"the way of agent {agent} to its final state"
     limit = base.upper_bound
-    if asked.residual is None and limit and _has_inner_points(starts):
+    if asked.residual is None and limit and _has_inner_points(initial_set):
         for agent, heard in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
-            first = 2 / limit * _largest_below(starts, heard)
+            first = 2 / limit * _largest_below(initial_set, heard)
             if first > best:
                 best, why = first, f"the input of agent {agent} at the start"
     return (rounded(best, _KEPT_BITS) if best > 0 else None), why
 
 
-def _largest_below(starts: Starts, row: Linear) -> Fraction:
+def _largest_below(initial_set: InitialSet, row: Linear) -> Fraction:
     """Bound the largest size of a linear function over the set from below; exact but for an ellipsoid's root."""
-    if not starts.axes:
-        return starts.largest(row)
-    size = abs(sum((x * starts.center[j] for j, x in row.items()), Fraction(0)))
-    shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in starts.axes]
+    if not initial_set.axes:
+        return initial_set.largest(row)
+    size = abs(sum((x * initial_set.center[j] for j, x in row.items()), Fraction(0)))
+    shares = [sum((x * axis[j] for j, x in row.items()), Fraction(0)) for axis in initial_set.axes]
     return size + sqrt(rounded(sum((x * x for x in shares), Fraction(0)), BITS), BITS)[0]
 
 
-def _has_inner_points(starts: Starts) -> bool:
-    """Tell whether the set spans all directions, so that an input bounded on it is bounded for every start."""
-    if not starts.axes:
-        return bool(starts.radius) and min(starts.radius) > 0
+def _has_inner_points(initial_set: InitialSet) -> bool:
+    """Tell whether the set spans all directions, so that an input bounded on it is bounded for every initial state."""
+    if not initial_set.axes:
+        return bool(initial_set.radius) and min(initial_set.radius) > 0
     import flint
 
-    rows = [[flint.fmpq(x.numerator, x.denominator) for x in axis] for axis in starts.axes]
-    return flint.fmpq_mat(rows).rank() == len(starts.center)
+    rows = [[flint.fmpq(x.numerator, x.denominator) for x in axis] for axis in initial_set.axes]
+    return flint.fmpq_mat(rows).rank() == len(initial_set.center)
 
 
 # ---------------------------------------------------------------------- search
 
 
 def _options(base: Certificate, asked: Asked) -> list[Option]:
-    """Return gains by increasing ``phi``: the best without a cap, and a cap for each member if a residual is allowed.
+    """Return gains by increasing ``phi``: the best without a cap, and a cap for each function if a residual is allowed.
 
     In units of ``k`` and the largest ``held`` everything is free of dimensions.
     """
-    bounds, residual = _bounds(base, asked.starts), asked.residual
-    members = usable_members(bounds)
+    bounds, residual = _bounds(base, asked.initial_set), asked.residual
+    functions = usable_functions(bounds)
     agents: list[int | None] = [None] if asked.input_norm == 2 else [*range(len(bounds.rows))]
     held = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
     top = max(held)
-    if base.constant or top == 0 or not members:
+    if base.constant or top == 0 or not functions:
         return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
-    rates = {i: bounds.form(i).rate for i in members}
-    decay = {i: [decaying(bounds, i, v) for v in agents] for i in members}
-    moving = [j for j, h in enumerate(held) if h and all(decay[i][j] for i in members)]
+    rates = {i: bounds.form(i).rate for i in functions}
+    decay = {i: [decaying(bounds, i, v) for v in agents] for i in functions}
+    moving = [j for j, h in enumerate(held) if h and all(decay[i][j] for i in functions)]
     size = np.array([nearest_float(held[j] / top) for j in moving])
-    over = {i: np.array([log(decay[i][j] / held[j]) for j in moving]) for i in members}
+    over = {i: np.array([log(decay[i][j] / held[j]) for j in moving]) for i in functions}
     least = 2 / max(rates.values())
     best = (math.inf, 1.0, least)
-    for i in members:
+    for i in functions:
         k = _decimal(2 / rates[i], up=True)
-        may = [j for j in members if rates[j] * k >= 2]
+        may = [j for j in functions if rates[j] * k >= 2]
         # The clock of the crossing, over k.
         clocks = np.array([over[j] * nearest_float(2 / (rates[j] * k)) for j in may])
         which, every = clocks.argmin(axis=0), np.arange(len(moving))
@@ -579,7 +581,7 @@ def _options(base: Certificate, asked: Asked) -> list[Option]:
     if math.isfinite(product):
         options.append(Option(_decimal(Fraction(a) * k), k, None, Fraction(product) * least * top))
     if residual is not None:
-        for i in members:
+        for i in functions:
             bound = base.functions[i].deviation
             if bound is None:
                 continue
@@ -660,13 +662,13 @@ def _fit_of(cert: Certificate, asked: Asked) -> Fit:
     T, effort, by_norm = cert.protocol.T, cert.effort, asked.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
-            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, asked.starts).held) else None, Fraction(0))
+            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, asked.initial_set).held) else None, Fraction(0))
         return Fit(T, cert, effort.peak.norm if by_norm else effort.peak.largest, Fraction(0))
     cap = cert.limits[0].gain_cap
     entries = effort.residual if effort is not None else ()
     if cap is None or not entries or entries[0].agents is None:
         return Fit(T, cert, None, None)
-    peak = cap * _bounds(cert, asked.starts).held_norm if by_norm else entries[0].largest
+    peak = cap * _bounds(cert, asked.initial_set).held_norm if by_norm else entries[0].largest
     return Fit(T, cert, peak, max(entries[0].agents))
 
 

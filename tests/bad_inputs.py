@@ -270,7 +270,7 @@ OPTIONS = [
     BadInput("missing certificate", ("check", "nowhere.json"), "nowhere.json: not a readable certificate"),
     BadInput("certificate that is a folder", ("check", "c.json"), "directory", (("c.json", _folder),)),
     BadInput("certificate cut short", ("check", "c.json"), "not a readable", (("c.json", '{"schema": "ptcc-'),)),
-    BadInput("another schema", ("check", "c.json"), "ptcc-certificate/1", (("c.json", '{"schema": "x/9"}'),)),
+    BadInput("another schema", ("check", "c.json"), "ptcc-certificate/2", (("c.json", '{"schema": "x/9"}'),)),
     BadInput("a graph for a certificate", ("check", "g.csv"), "not a readable certificate", _PAIR),
     BadInput("no graph", ("certify",), "GRAPH"),
     BadInput("unknown command", ("predict", "fig1b"), "predict"),
@@ -302,7 +302,7 @@ def _input(name: str, says: str, *args: str, command: str = "certify") -> BadInp
 
 
 INPUT = [
-    _input("initial-bound of 0", "bound of starts", "--initial-bound", "0"),
+    _input("initial-bound of 0", "bound of initial states", "--initial-bound", "0"),
     _input("initial-bound of words", "--initial-bound", "--initial-bound", "far"),
     _input("max-input of words", "--max-input", "--max-input", "1 V"),
     _input("max-input of 0", "--max-input", "--max-input", "0"),

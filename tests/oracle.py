@@ -124,8 +124,8 @@ class Oracle:
         for claim in (
             self.structure,
             self.claims,
-            self.outcome,
-            self.members,
+            self.final_state,
+            self.functions,
             self.paper,
             self.rates,
             self.reaching,
@@ -258,40 +258,39 @@ class Oracle:
 
     @cached_property
     def sigma0(self) -> Vector:
-        said = self.data["sigma0"]
+        said = self.data["sliding_variable"]
         return [Fraction(0)] * self.n if said is None else self.vector(said)
 
-    def outcome(self) -> None:
-        said = self.data["outcome"]
-        proved = self.data["rates"]["certified"] is not None or not self.weights
+    def final_state(self) -> None:
+        said, state = self.data["influence"], self.data["final_state"]
+        proved = self.data["rates"]["proved"] is not None or not self.weights
         self.require((self.data["verdict"] == "certified") == (proved and said is not None), "verdict")
         if said is None:
             return
         if self.start is not None:
             moved = [x - s for x, s in zip(self.start, self.sigma0, strict=True)]
             end = [sum((q * x for q, x in zip(row, moved, strict=True)), Fraction(0)) for row in self.Q]
-            state = said["final_state"]
             if list(state) == ["mid", "radius"] and isinstance(state["mid"], dict):
                 mid, radius = self.column(state["mid"]), self.column(state["radius"])
                 inside = all(abs(x - m) <= r for x, m, r in zip(end, mid, radius, strict=True))
             else:
                 inside = all(self.holds(state[label], x) for label, x in zip(self.labels, end, strict=True))
                 for component in self.data.get("components") or ():
-                    own = isinstance(component, dict) and component["outcome"]
+                    own = isinstance(component, dict) and component["final_state"]
                     ends = {label: end[self.index[label]] for label in own} if own else {}
                     inside = inside and all(self.holds(own[label], x) for label, x in ends.items())
             self.require(inside, "final state")
             zero = [k for k, p in enumerate(self.closed, 1) if self.camps(p) is not None and end[p[0]] == 0]
             self.require(said["degenerate"] == zero, "degenerate")
         balanced = [p for p in self.closed if self.camps(p) is not None]
-        grouped = said["influence"]["followers"] is None
+        grouped = said["containment_weights"] is None
         groups = [p for p in balanced if len(p) > 1 or not grouped]
-        listed = said["influence"]["components"]
+        listed = said["components"]
         self.require([self.nodes(c["nodes"]) for c in listed] == groups, "groups")
         for p, c in zip(groups, listed, strict=False):
-            fits = all(self.holds(x, self.Q[p[0]][v]) for x, v in zip(c["voices"], p, strict=True))
-            self.require(fits, "voices")
-        for label, row in {} if grouped else said["influence"]["followers"].items():
+            fits = all(self.holds(x, self.Q[p[0]][v]) for x, v in zip(c["left_null_vector"], p, strict=True))
+            self.require(fits, "left_null_vector")
+        for label, row in {} if grouped else said["containment_weights"].items():
             for p, x in zip(balanced, row, strict=True):
                 camps = self.camps(p) or {}
                 weight = sum((self.Q[self.index[label]][v] * camps[v] * camps[p[0]] for v in p), Fraction(0))
@@ -299,20 +298,20 @@ class Oracle:
 
     # ------------------------------------------------------------------ decay
 
-    def form(self, member: Json) -> tuple[Matrix, Matrix, Matrix, list[int]]:
+    def form(self, function: Json) -> tuple[Matrix, Matrix, Matrix, list[int]]:
         """``V = x'F x = z'P z``, ``z = A x``: return ``F``, ``P``, ``A`` and the nodes."""
         nodes, diagonal, rows = [], [], None
-        for block in member["blocks"]:
+        for block in function["blocks"]:
             nodes += self.nodes(block["nodes"])
             if "diagonal" in block:
-                rho = number(member["rho"]) if block["times_rho"] else 1
+                rho = number(function["rho"]) if block["times_rho"] else 1
                 diagonal += [w * rho for w in self.listed(block["diagonal"])]
             else:
                 lower = [list(map(number, row)) for row in block["lower_triangle"]]
                 rows = [[lower[max(i, j)][min(i, j)] for j in range(len(lower))] for i in range(len(lower))]
         P = rows or [[w * (i == j) for j in range(len(nodes))] for i, w in enumerate(diagonal)]
         A = [self.L[v] for v in nodes]
-        if member["coordinates"] == "eps":
+        if function["coordinates"] == "eps":
             camps, total = self.camps(nodes) or {}, sum(diagonal)
             first = camps[nodes[0]]
             A = [
@@ -332,26 +331,28 @@ class Oracle:
 
     @cached_property
     def forms(self) -> list[tuple[Matrix, Matrix, Matrix, list[int]]]:
-        return [self.form(member) for member in self.data["lyapunov"]["members"]]
+        return [self.form(function) for function in self.data["lyapunov"]["functions"]]
 
-    def members(self) -> None:
+    def functions(self) -> None:
         away = [[(i == j) - x for j, x in enumerate(row)] for i, row in enumerate(self.Q)]
-        for k, (member, (F, P, _, nodes)) in enumerate(zip(self.data["lyapunov"]["members"], self.forms, strict=True)):
-            at, rate = f"lyapunov.members[{k}]", number(member["rate"])
+        for k, (function, (F, P, _, nodes)) in enumerate(
+            zip(self.data["lyapunov"]["functions"], self.forms, strict=True)
+        ):
+            at, rate = f"lyapunov.functions[{k}]", number(function["rate"])
             self.require(sorted(nodes) == [v for v in range(self.n) if self.L[v][v]] or k == 0, f"{at}: nodes")
             self.require(self.decays(F, self.L, rate), f"{at}: rate")
-            high = number(member["prefactor"])
-            steps = [s for s in self.data["proof"] if s["kind"] == "prefactor" and s["of"] == at]
+            high = number(function["overshoot"])
+            steps = [s for s in self.data["proof"] if s["kind"] == "overshoot" and s["of"] == at]
             low = number(steps[0]["numbers"]["lowest"]) if steps else min(P[i][i] for i in range(len(P)))
             within = [[(high * low * (i == j) - x) for j, x in enumerate(row)] for i, row in enumerate(P)]
             above = [[x - low * (i == j) for j, x in enumerate(row)] for i, row in enumerate(P)]
             self.require(low > 0 and semidefinite(above) and semidefinite(within), f"{at}: prefactor")
-            if member["distance"] is not None:
+            if function["deviation"] is not None:
                 for d, label in zip(away, self.labels, strict=True):
-                    c = number(member["distance"]["agents"][label])
+                    c = number(function["deviation"]["agents"][label])
                     least = [[c * x - a * b for x, b in zip(row, d, strict=True)] for row, a in zip(F, d, strict=True)]
                     self.require(semidefinite(least), f"{at}: distance of {label}")
-                gram, c = times(transposed(away), away), number(member["distance"]["norm"])
+                gram, c = times(transposed(away), away), number(function["deviation"]["norm"])
                 least = [[c * x - y for x, y in zip(r, g, strict=True)] for r, g in zip(F, gram, strict=True)]
                 self.require(semidefinite(least), f"{at}: distance of the norm")
 
@@ -360,8 +361,8 @@ class Oracle:
         said = self.data["paper"]
         if said is None or said["rate"] is None:
             return
-        first = self.data["lyapunov"]["members"][0]
-        same = all(first[key] == said[key] for key in ("coordinates", "blocks", "rho", "rate", "prefactor"))
+        first = self.data["lyapunov"]["functions"][0]
+        same = all(first[key] == said[key] for key in ("coordinates", "blocks", "rho", "rate", "overshoot"))
         self.require(same and number(said["rate"]) > 0, "the paper's certificate")
         steps = {s["of"]: s for s in self.data["proof"] if s["kind"] in ("leader-decrease", "leader-margin")}
         gamma: dict[int, Fraction] = {}
@@ -418,23 +419,23 @@ class Oracle:
         return min(parts, key=lambda part: float(part.mid())) if parts else None
 
     def rates(self) -> None:
-        said, members = self.data["rates"], self.data["lyapunov"]["members"]
-        known = [(number(m["rate"]), m["class"]) for m in members]
-        for key, kinds in (("diagonal", ("perron", "lmi")), ("certified", None), ("paper", ("paper",))):
+        said, functions = self.data["rates"], self.data["lyapunov"]["functions"]
+        known = [(number(m["rate"]), m["class"]) for m in functions]
+        for key, kinds in (("diagonal", ("perron", "lmi")), ("proved", None), ("paper", ("paper",))):
             best = max((r for r, kind in known if r > 0 and (kinds is None or kind in kinds)), default=None)
             self.require((None if said[key] is None else number(said[key])) == best, f"rates.{key}")
-        if said["limit"] is not None:
-            self.require(self.slowest is not None and not ball(said["limit"]) < 2 * self.slowest, "rates.limit")
-        if (prefactor := self.data["prefactor"]) is not None:
+        if said["upper_bound"] is not None:
+            self.require(self.slowest is not None and not ball(said["upper_bound"]) < 2 * self.slowest, "rates.limit")
+        if (overshoot := self.data["overshoot"]) is not None:
             fits = [
                 m
-                for m in members
+                for m in functions
                 if m["rate"]
-                and number(m["rate"]) == number(said["certified"] or "0")
-                and number(m["prefactor"]) <= number(prefactor["value"])
-                and f"||{m['coordinates']}||^2" == prefactor["of"]
+                and number(m["rate"]) == number(said["proved"] or "0")
+                and number(m["overshoot"]) <= number(overshoot["value"])
+                and f"||{m['coordinates']}||^2" == overshoot["of"]
             ]
-            self.require(fits, "prefactor")
+            self.require(fits, "overshoot")
 
     # ------------------------------------------------------------------ sliding variables
 
@@ -496,18 +497,18 @@ class Oracle:
     def from_known(self) -> bool:
         return "mu1" not in self.gains or not any(self.sigma0)
 
-    def states(self, starts: Any) -> np.ndarray:
+    def states(self, initial_set: Any) -> np.ndarray:
         """Starts of the set, one a column: corners of a box, points of an ellipsoid's boundary."""
         rng = np.random.default_rng(0)
         own = np.array([float(x) for x in self.sigma0])
-        if starts is None:
+        if initial_set is None:
             return np.array([[float(x) for x in self.start or ()]]).T - own[:, None]
-        center = np.array([float(x) for x in self.vector(starts["center"])])
-        if "radius" in starts:
-            radius = np.array([float(x) for x in self.vector(starts["radius"])])
+        center = np.array([float(x) for x in self.vector(initial_set["center"])])
+        if "radius" in initial_set:
+            radius = np.array([float(x) for x in self.vector(initial_set["radius"])])
             signs = rng.choice([-1.0, 1.0], (self.n, 64))
             return center[:, None] + radius[:, None] * signs - own[:, None]
-        axes = np.array([[float(x) for x in self.vector(axis)] for axis in starts["axes"]]).T
+        axes = np.array([[float(x) for x in self.vector(axis)] for axis in initial_set["axes"]]).T
         v = rng.normal(size=(axes.shape[1], 64)) if axes.size else np.zeros((0, 1))
         spread = axes @ (v / np.maximum(np.linalg.norm(v, axis=0), 1e-300)) if axes.size else 0
         return center[:, None] + spread - own[:, None]
@@ -516,7 +517,7 @@ class Oracle:
     def sampled(self) -> list[tuple[float, float, float, np.ndarray]]:
         """``z``, gain, ``s`` and the inputs of the nominal part, one start a column."""
         T, rho1, k = map(float, self.gain)
-        X, found = self.states(self.data["effort"]["starts"]), []
+        X, found = self.states(self.data["input"]["initial_set"]), []
         for z in INSTANTS:
             s, gain = rho1 * T * -math.expm1(-z) + k * z, rho1 + k / T * math.exp(z)
             if s > self.latest:
@@ -530,7 +531,7 @@ class Oracle:
             self.require(number(said) >= Fraction(seen) * (1 - Fraction(share)), f"{claim}: {said} below {seen!r}")
 
     def effort(self) -> None:
-        said = self.data["effort"]
+        said = self.data["input"]
         if said is None:
             return
         k, slowest = self.gain[2], self.slowest
@@ -552,7 +553,7 @@ class Oracle:
             push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
             for s, x in zip(self.sigma0, self.vector(own["agents"]) if own["agents"] is not None else [], strict=False):
                 self.require(x >= g["mu1"] + push * abs(s), "sliding: agents")
-        if self.from_known and (said["starts"] is not None or self.start is not None) and self.n <= 60:
+        if self.from_known and (said["initial_set"] is not None or self.start is not None) and self.n <= 60:
             self.sizes(said)
         for entry in said["residual"]:
             self.limited(entry, said)
@@ -577,7 +578,7 @@ class Oracle:
 
     def integrated(self, power: int) -> np.ndarray:
         T, rho1, k = map(float, self.gain)
-        X = self.states(self.data["effort"]["starts"])
+        X = self.states(self.data["input"]["initial_set"])
         x, w = np.polynomial.legendre.leggauss(4)
         total = np.zeros(X.shape[1])
         for a, b in pairwise((0.0, 0.1, 0.3, 0.7, 1.5, 3.0, 6.0)):
@@ -605,7 +606,7 @@ class Oracle:
         turn = min(T - k / (g - rho1), end) if g > rho1 + k / T else 0.0
         clock = (rho1 * turn + k * math.log(T / (T - turn)) if turn > 0 else 0.0) + g * (end - max(turn, 0.0))
         self.require(number(said["clock"]) <= Fraction(clock) * (1 + Fraction(1, 10**9)), "clock")
-        X, L = self.states(effort["starts"]), np.array([[float(x) for x in row] for row in self.L])
+        X, L = self.states(effort["initial_set"]), np.array([[float(x) for x in row] for row in self.L])
         if period is None and clock > self.latest:
             return
         if period is None:

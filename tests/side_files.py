@@ -78,28 +78,28 @@ def with_side_files(data: Json) -> tuple[Json, dict[str, bytes]]:
             data["graph"]["edges"] = {"count": len(edges), "scale": str(scale), **columns_of}
     label(data["structure"], "leaders")
     label(data["structure"], "followers")
-    for key in ("initial_state", "sigma0"):
+    for key in ("initial_state", "sliding_variable"):
         if data[key] is not None:
             move(data, key)
     if isinstance(data.get("components"), dict):
         number = {index[x]: k for k, nodes in enumerate(data["components"]["nodes"]) for x in nodes}
         data["components"]["nodes"] = side.integers([number[v] for v in range(len(index))])
-    if data["outcome"] is not None and data["outcome"]["final_state"] is not None:
-        data["outcome"]["final_state"] = side.balls(list(data["outcome"]["final_state"].values()))
+    if data["final_state"] is not None:
+        data["final_state"] = side.balls(list(data["final_state"].values()))
         for component in data.get("components", []):
             if isinstance(component, dict):
-                component["outcome"] = None
+                component["final_state"] = None
     for step in data["proof"]:
         if step["kind"] == "dominance":
             move(step["witness"], "vector")
-        if step["kind"] == "outcome" and step["witness"] is not None:
+        if step["kind"] == "final-state" and step["witness"] is not None:
             move(step["witness"], "u")
     dominated = {step["of"] for step in data["proof"] if step["kind"] == "dominance"}
-    for k, member in enumerate(data["lyapunov"]["members"]):
-        if member["class"] != "paper":
-            label(member["blocks"][0], "nodes")
-        if f"lyapunov.members[{k}]" in dominated:
-            move(member["blocks"][0], "diagonal")
+    for k, function in enumerate(data["lyapunov"]["functions"]):
+        if function["class"] != "paper":
+            label(function["blocks"][0], "nodes")
+        if f"lyapunov.functions[{k}]" in dominated:
+            move(function["blocks"][0], "diagonal")
     return resealed(data), side.files
 
 
@@ -113,18 +113,18 @@ def with_factors(data: Json) -> Json:
     for s, t, w in data["graph"]["edges"]:
         heard[t][s] = exact(w)
     groups = [c for c in data["structure"]["closed_components"] if len(c["nodes"]) > 1]
-    for key in ("diagonal", "certified"):
+    for key in ("diagonal", "proved"):
         data["rates"][key] = str(exact(data["rates"][key]) * slower)
-    lower = exact(data["effort"]["threshold"]["lower"]) * slower
-    data["effort"]["threshold"]["lower"] = str(lower)
-    if data["effort"]["bounded"] and lower < 1:
-        data["effort"]["bounded"] = None
+    lower = exact(data["input"]["threshold"]["lower"]) * slower
+    data["input"]["threshold"]["lower"] = str(lower)
+    if data["input"]["bounded"] and lower < 1:
+        data["input"]["bounded"] = None
         data["proof"] = [step for step in data["proof"] if step["kind"] != "input-threshold"]
     for step in data["proof"]:
         if step["kind"] == "dominance":
-            member = data["lyapunov"]["members"][int(step["of"][len("lyapunov.members[") : -1])]
-            member["rate"] = step["numbers"]["b"] = str(exact(member["rate"]) * slower)
-            block = member["blocks"][0]
+            function = data["lyapunov"]["functions"][int(step["of"][len("lyapunov.functions[") : -1])]
+            function["rate"] = step["numbers"]["b"] = str(exact(function["rate"]) * slower)
+            block = function["blocks"][0]
             weight = dict(zip(block["nodes"], map(exact, block["diagonal"]), strict=True))
             for k, (text, c) in enumerate(zip(step["witness"]["groups"], groups, strict=True)):
                 nodes, rate = c["nodes"], exact(text) * room

@@ -45,7 +45,7 @@ NO_SOURCE = {
     "files and numbers are converted": {"read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits"},
     "figures, pages and tables show what was computed elsewhere": of_modules("plots", "report", "explorer", "batch"),
     "certificates that are read back state what was proved before": {"read_certificate", "RejectedCertificate"},
-    "sets of starts are what their definition says": {"Starts", "starts_within", "box", "ellipsoid"},
+    "sets of starts are what their definition says": {"InitialSet", "initial_set_within", "box", "ellipsoid"},
     "disturbances and random graphs are data": {
         *("ExpressionDisturbance", "SampledDisturbance", "StateDependent", "telegraph_noise"),
         *of_modules("ensembles"),
@@ -145,13 +145,13 @@ def ours(function: Any) -> bool:
     return isinstance(function, FunctionType) and module.split(".")[0] in ROOTS
 
 
-def plain(member: Any) -> Any:
+def plain(function: Any) -> Any:
     """Return the function behind a method, property or cached property."""
-    if isinstance(member, classmethod | staticmethod):
-        return member.__func__
-    if isinstance(member, property):
-        return member.fget
-    return member.func if isinstance(member, cached_property) else member
+    if isinstance(function, classmethod | staticmethod):
+        return function.__func__
+    if isinstance(function, property):
+        return function.fget
+    return function.func if isinstance(function, cached_property) else function
 
 
 def own_docs(cls: type, name: str | None = None) -> list[str]:
@@ -231,15 +231,15 @@ def faults_of_type(name: str, kind: str, annotation: str) -> Iterator[str]:
             found = re.search(rf"\b({word})\b", said)
             if found and not known & types:
                 yield f"{name} is documented as {found[0]}, not {annotation}"
-    for member in union(ast.parse(annotation, mode="eval").body):
-        head = member.split("[")[0]
+    for function in union(ast.parse(annotation, mode="eval").body):
+        head = function.split("[")[0]
         if head in SAID and not re.search(SAID[head], kind):
             yield f"{name} is {head}, its entry does not say so"
-        public = member.removeprefix("lmi.") in {name for _, name in PUBLIC}
-        if public and not re.search(rf"\b{re.escape(member)}\b", kind):
-            yield f"{name} is {member}, its entry does not say so"
-        if member.startswith("Literal["):
-            choices = ast.literal_eval(member.removeprefix("Literal"))
+        public = function.removeprefix("lmi.") in {name for _, name in PUBLIC}
+        if public and not re.search(rf"\b{re.escape(function)}\b", kind):
+            yield f"{name} is {function}, its entry does not say so"
+        if function.startswith("Literal["):
+            choices = ast.literal_eval(function.removeprefix("Literal"))
             if choices_of(kind) != {*choices}:
                 yield f"{name} has other choices than documented"
 
@@ -351,7 +351,7 @@ def fields_of(cls: type) -> dict[str, inspect.Parameter]:
     kinds: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         kinds |= inspect.get_annotations(base)
-        properties = {name: plain(member) for name, member in vars(base).items() if ours(plain(member))}
+        properties = {name: plain(function) for name, function in vars(base).items() if ours(plain(function))}
         kinds |= {
             name: inspect.signature(function).return_annotation
             for name, function in properties.items()
@@ -397,24 +397,24 @@ def faults_of_class(cls: type, found: NumpyDocString) -> Iterator[str]:
     if not is_shown(cls, that_run(found)):
         yield "its example does not show it"
     for name in dir(cls):
-        member = inspect.getattr_static(cls, name)
-        if not name.startswith("_") and ours(plain(member)):
-            yield from (f"{name}: {fault}" for fault in faults_of_member(member, own_docs(cls, name)))
+        function = inspect.getattr_static(cls, name)
+        if not name.startswith("_") and ours(plain(function)):
+            yield from (f"{name}: {fault}" for fault in faults_of_member(function, own_docs(cls, name)))
 
 
-def faults_of_member(member: Any, docs: list[str]) -> Iterator[str]:
+def faults_of_member(function: Any, docs: list[str]) -> Iterator[str]:
     """Compare a method or property with its docstring and those of what it overrides."""
     if not docs or not re.search(r"[.:](\s|$)", docs[0]):
         yield "no docstring of one sentence"
         return
     found = [parsed(doc) for doc in docs]
     documented = entries(found[0]["Parameters"])
-    function = plain(member)
+    function = plain(function)
     yield from faults_of_entries(documented, inspect.signature(function).parameters, aliases(function.__module__))
     yield from faults_of_result(function, found[0])
     if raises(function) and not any(one["Raises"] for one in found):
         yield "no Raises"
-    if not isinstance(member, property | cached_property):
+    if not isinstance(function, property | cached_property):
         there = parameters(function)
         named = {name for one in found for name in entries(one["Parameters"])}
         named |= {

@@ -21,7 +21,7 @@ from math import isqrt
 from operator import mul
 from typing import Any, NamedTuple
 
-from lmi.exact import dominance
+from lmi.exact import row_dominance as dominance
 from lmi.exact.polynomials import characteristic
 from lmi.exact.work import affordable, fits, spend
 
@@ -363,11 +363,11 @@ class Arithmetic:
         return None if E is None else spare(E, S.weights)
 
     def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.dominance.dominates`."""
+        """See :func:`lmi.exact.row_dominance.dominates`."""
         return dominance.dominates(n, edges, diagonal, u, v, rate)
 
     def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.dominance.largest_rate`."""
+        """See :func:`lmi.exact.row_dominance.largest_rate`."""
         return dominance.largest_rate(n, edges, diagonal, u, v)
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import flint
 import numpy as np
 
-from lmi.exact import dominance
+from lmi.exact import row_dominance as dominance
 from lmi.exact.definite import BITS, LARGEST_BITS, Arithmetic, Rows, Scaled, symmetric
 from lmi.exact.numbers import longest
 from lmi.exact.work import fits, spend
@@ -82,12 +82,12 @@ class FastArithmetic(Arithmetic):
         return None if E is None else E.spare(S.weights)
 
     def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.dominance.dominates`."""
+        """See :func:`lmi.exact.row_dominance.dominates`."""
         pairs, ratio = _pairs(n, edges, diagonal, u, v), dominance.ratio_of(rate)
         return pairs is not None and ratio is not None and _at_least(*pairs, *ratio)
 
     def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.dominance.largest_rate`."""
+        """See :func:`lmi.exact.row_dominance.largest_rate`."""
         pairs = _pairs(n, edges, diagonal, u, v)
         if pairs is None or n == 0:
             return None
@@ -436,7 +436,7 @@ def _pair_products(
 
 
 def _pairs(n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return numerators and denominators of the rates of the rows; see :mod:`lmi.exact.dominance`."""
+    """Return numerators and denominators of the rates of the rows; see :mod:`lmi.exact.row_dominance`."""
     try:
         sources, targets, weights, diagonal, u, v = map(_integers, (*edges, diagonal, u, v))
     except (TypeError, ValueError):

@@ -74,7 +74,7 @@ def certify_many(
     **settings : keywords of :class:`Settings`
         What a row depends on besides its graph and the protocol; here with the defaults:
 
-        - ``x0="random"``, ``seed=0``, ``sigma0=None``: the start, and the sliding variables at 0, as numbers in node
+        - ``x0="random"``, ``seed=0``, ``sigma0=None``: initial state and sliding variables at 0, as numbers in node
           order, by label, or ``"random"``: then every graph has its own, a function of ``seed`` and the graph;
         - ``disturbance=None``: what a simulated run meets under the sliding-mode protocol;
         - ``method="best"``, ``simulation=False``, ``time_limit=None`` (seconds for each graph), ``expect=None``,

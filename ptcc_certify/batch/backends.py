@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from multiprocessing import resource_tracker
 from typing import Any
 
-from lmi.apart import any_thread
+from lmi.child_process import any_thread
 from ptcc_certify.batch.rows import Row, certified_row, failed_row, package_version
 from ptcc_certify.batch.settings import INSTALL, Settings
 from ptcc_certify.batch.sources import Task
@@ -137,9 +137,9 @@ def _end(cluster: Any) -> None:
 
 @contextmanager
 def _interrupts_kept_back() -> Iterator[None]:
-    """Keep Ctrl-C back, and from the threads that start meanwhile for ever, which hand this on to their processes.
+    """Keep Ctrl-C back, and from the threads that begin meanwhile for ever, which hand this on to their processes.
 
-    A terminal sends it to every process, and those that start do not know yet what to do about it.
+    A terminal sends it to every process, and those that begin do not know yet what to do about it.
     """
     if os.name != "posix" or threading.current_thread() is not threading.main_thread():
         yield

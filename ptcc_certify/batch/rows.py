@@ -21,21 +21,21 @@ verdict             text   certified or undecided
 useful              bool   whether the bound leaves at most 1 % at 0.99 T with these gains; empty if undecided
 asked               text   met, refuted or left open: what was expected, and the least rate; empty if nothing was
 rate                float  proved, rounded down; per unit of the stretched clock
-upper_bound         float  proved: no rate exceeds it; rounded up
+upper_bound         float  proved upper bound on the decay rate, rounded up
 optimality_ratio    float  rate over upper_bound, rounded down
 fastest             text   class of the Lyapunov function with that rate: paper, perron, lmi or full
-prefactor           float  its prefactor, rounded up
+overshoot           float  its overshoot constant, rounded up
 paper_rate          float  of the paper's own certificate, proved, rounded down
 diagonal_rate       float  largest proved rate of a diagonal matrix, rounded down
-input_bounded       bool   whether the input stays bounded up to the deadline for every start
-peak_input          float  proved bound of every ``|u_k|`` from the start or the set of starts, rounded up
-seed                int    of the random start: ``ptcc certify GRAPH --x0 random --seed SEED`` certifies the same
-largest_outcome     float  largest ``|x_k|`` at the deadline
+input_bounded       bool   whether the input stays bounded up to the deadline for every initial state
+peak_input          float  proved bound of every ``|u_k|`` from the initial state or set, rounded up
+seed                int    of the random state: ``ptcc certify GRAPH --x0 random --seed SEED`` certifies the same
+largest_final_state float  largest ``|x_k|`` at the deadline
 degenerate          bool   whether some balanced closed component meets at 0
 reaching_time       float  sliding mode: when the last sliding variable is proved to be 0
 worst_ratio         float  numerical: largest simulated ``sqrt(V)`` over its bound
 bound_kept          bool   numerical: whether the simulated run exceeds no bound
-obligations         int    statements proved
+obligations         int    proof obligations proved
 cut_off             text   the searches that the time limit ended, which a row of more time may do better
 note                text   what kept the verdict from certified, and other remarks
 seconds             float  that the row took
@@ -56,7 +56,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from lmi.exact.rounding import float_down, float_up
+from lmi.exact.directed_rounding import float_down, float_up
 from ptcc_certify.batch.settings import Settings, Start
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -81,11 +81,11 @@ COLUMNS: dict[str, type] = {
         (str, "asked"),
         (float, "rate upper_bound optimality_ratio"),
         (str, "fastest"),
-        (float, "prefactor paper_rate diagonal_rate"),
+        (float, "overshoot paper_rate diagonal_rate"),
         (bool, "input_bounded"),
         (float, "peak_input"),
         (int, "seed"),
-        (float, "largest_outcome"),
+        (float, "largest_final_state"),
         (bool, "degenerate"),
         (float, "reaching_time worst_ratio"),
         (bool, "bound_kept"),
@@ -166,7 +166,7 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
         _start(settings.x0, seed, graph),
         method=settings.method,
         simulation=settings.simulation,
-        starts=settings.initial_bound,
+        initial_set=settings.initial_bound,
         time_limit=settings.time_limit,
         expectations=Expectations(settings.expect, settings.min_rate),
         **more,
@@ -184,7 +184,7 @@ def _start(start: Start, seed: Any, graph: SignedDigraph) -> Any:
 def _columns(certificate: Certificate) -> Row:
     structure, effort, seen = certificate.structure, certificate.effort, certificate.comparison
     rate = certificate.rate
-    result, reaching = certificate.outcome, certificate.reaching
+    result, reaching = certificate.final_state, certificate.reaching
     return {
         "connectivity": structure.connectivity,
         "components": len(structure.components),
@@ -202,12 +202,12 @@ def _columns(certificate: Certificate) -> Row:
         "upper_bound": _up(certificate.upper_bound),
         "optimality_ratio": certificate.optimality_ratio,
         "fastest": None if rate is None else certificate.fastest.kind,
-        "prefactor": _up(certificate.prefactor),
+        "overshoot": _up(certificate.overshoot),
         "paper_rate": _down(certificate.proof.rate),
         "diagonal_rate": _down(certificate.diagonal_rate),
         "input_bounded": None if effort is None else effort.bounded,
         "peak_input": None if effort is None or effort.peak is None else _up(Fraction(effort.peak.largest)),
-        "largest_outcome": None if result is None else _finite(float(np.abs(result.values).max())),
+        "largest_final_state": None if result is None else _finite(float(np.abs(result.values).max())),
         "degenerate": None if result is None else bool(result.degenerate),
         "reaching_time": None if reaching is None else max(r.time for r in reaching),
         "worst_ratio": None if seen is None else _finite(seen.worst_ratio),

@@ -59,17 +59,18 @@ class Settings:
         and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
         an error.
     seed : int
-        Of random starts and telegraph signals.
+        Of random initial states and telegraph signals.
     sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
         Sliding mode: the sliding variables at 0, like ``x0``; None: 0.
     disturbance : str, optional
-        Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the adversary by default.
+        Sliding mode: what a simulated run meets, an expression of ``k`` and ``t`` or a name; the worst-case disturbance
+        by default.
     method : {"best", "paper", "perron", "lmi", "full"}
         As in :func:`ptcc_certify.certify`.
     simulation : bool or None
         Compare with CVODES runs; None: of up to 10,000 agents.
     initial_bound : positive number, optional
-        Bound the input for all starts with ``|x_k(0)| <= initial_bound`` instead of ``x0``.
+        Bound the input for all initial states with ``|x_k(0)| <= initial_bound`` instead of ``x0``.
     expect : str, optional
         A behaviour that every graph should show.
     min_rate : positive number, optional
@@ -147,12 +148,12 @@ class Settings:
         return {name: _plain(value) for name, value in entries.items() if name != "reading"}
 
     def seed_of(self, graph: SignedDigraph) -> int:
-        """Return the seed of a graph's own random start: 32 bits of a hash of ``seed`` and the graph."""
+        """Return the seed of a graph's own random initial state: 32 bits of a hash of ``seed`` and the graph."""
         return int.from_bytes(hashlib.sha256(f"{self.seed} {graph.sha256}".encode()).digest()[:4], "big")
 
     def disturbance_of(self, n: int, seed: int = 0) -> Any:
         """Return the disturbance of ``n`` agents, which a simulated run meets."""
-        text = "adversary" if self.disturbance is None else self.disturbance
+        text = "worst-case" if self.disturbance is None else self.disturbance
         delta = getattr(self.protocol, "delta", 0)
         return as_disturbance(text, n, delta, 2 * float(self.protocol.T), seed)
 
@@ -170,7 +171,7 @@ def whole_number(value: Any, name: str, least: int) -> int:
 
 
 def _start(start: Start, name: str) -> Start:
-    """Return a start as a row takes it; refuse a file, and what is no number."""
+    """Return an initial state as a row takes it; refuse a file, and what is no number."""
     if (labelled := by_label(start, name)) is not None:
         start = labelled
     if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise

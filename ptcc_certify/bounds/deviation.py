@@ -1,4 +1,4 @@
-"""How far each agent is from its outcome, given a bound on ``V``.
+"""How far each agent is from its final state, given a bound on ``V``.
 
 In the state, a Lyapunov function is ``V = x'F x``, and ``x - Q x = D x``; both vanish on the kernel of ``L``, so that
 only rows and columns ``kept`` count: all nodes but the first one of each balanced closed component. There
@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from lmi.exact import arithmetic
-from lmi.exact.enclosure import rounded
+from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.fast import floats, unit_diagonal
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.function import DistanceBound, LyapunovFunction
+from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
 
 #: Bits of the constants that are kept.
 KEPT_BITS = 40
@@ -39,7 +39,7 @@ RAISE, NORM_RAISE = Fraction(1, 2**36), Fraction(1, 2**22)
 Integers = list[list[int]]
 
 
-class OutcomeGeometry:
+class DeviationGeometry:
     """What turns a bound on Lyapunov functions into bounds of ``x - Q x``, for one graph.
 
     Parameters
@@ -52,7 +52,7 @@ class OutcomeGeometry:
     def __init__(self, structure: Structure, influence: Influence):
         self._structure, self._influence = structure, influence
 
-    def bound(self, V: LyapunovFunction) -> DistanceBound | None:
+    def bound(self, V: LyapunovFunction) -> DeviationBound | None:
         """Return the constants of ``V``, or None where it is not seen to be definite."""
         F, scale = self._error_form(V) if V.coordinates == "E" else self._mean_form(V.weights)
         D, common = self._deviation
@@ -60,7 +60,7 @@ class OutcomeGeometry:
         if found is None:
             return None
         *agents, norm = (rounded(x * unit, KEPT_BITS, up=True) for x in found)
-        return DistanceBound(tuple(agents), norm)
+        return DeviationBound(tuple(agents), norm)
 
     @cached_property
     def _kept(self) -> list[int]:

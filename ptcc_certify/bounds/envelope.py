@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lmi.exact.rounding import float_up
-from ptcc_certify.bounds.final_state import Influence, exact_start, influence
+from lmi.exact.directed_rounding import float_up
+from ptcc_certify.bounds.final_state import Influence, exact_initial_state, influence
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.function import DistanceBound, LyapunovFunction
+from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
 
 
 def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
-    """Return values of a clock as floats, or refuse those before its start.
+    """Return values of a clock as floats, or refuse those before its initial state.
 
     Raises
     ------
@@ -107,9 +107,9 @@ class Comparison:
     sliding_ratio : float or None
         Sliding mode: ``max over k, t of max(|sigma_k| - f, 0) / bound``, with the bound of each agent and with that of
         Proposition 1 for the norm; ``f`` is the integrator's floor of the largest ``|sigma_k(0)|``.
-    distance_ratio : float or None
-        ``max over k, t > 0 of max(|x_k - outcome_k| - f, 0) / bound`` with the bound of each agent and of the norm, and
-        the integrator's floor of the largest state; None without constants.
+    deviation_ratio : float or None
+        ``max over k, t > 0 of max(|x_k - final_state_k| - f, 0) / bound`` with the bound of each agent and of the norm,
+        and the integrator's floor of the largest state; None without constants.
     reaching_kept : bool or None
         Sliding mode: whether every sliding variable was 0 at its certified reaching time.
 
@@ -138,13 +138,13 @@ class Comparison:
     stop: float
     deadline_resolved: bool
     sliding_ratio: float | None = None
-    distance_ratio: float | None = None
+    deviation_ratio: float | None = None
     reaching_kept: bool | None = None
 
     @property
     def violated(self) -> bool:
         """Whether a bound was exceeded by more than rounding."""
-        worst = max(self.worst_ratio, self.sliding_ratio or 0.0, self.distance_ratio or 0.0)
+        worst = max(self.worst_ratio, self.sliding_ratio or 0.0, self.deviation_ratio or 0.0)
         return worst > 1 + 1e-6 or self.reaching_kept is False
 
 
@@ -164,7 +164,7 @@ class Envelope:
     ----------
     structure : Structure
     gain : Gain
-    members : tuple of LyapunovFunction
+    functions : tuple of LyapunovFunction
 
     References
     ----------
@@ -180,13 +180,13 @@ class Envelope:
     >>> envelope = certify(pair, protocol, [3, 1], simulation=False).envelope
     >>> 0 < envelope.residual(0.01) < 0.01  # what may be left at 0.99 T
     True
-    >>> bool(envelope.distance(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)
+    >>> bool(envelope.deviation(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)
     True
     """
 
     structure: Structure
     gain: Gain
-    members: tuple[LyapunovFunction, ...]
+    functions: tuple[LyapunovFunction, ...]
 
     @cached_property
     def _laplacian(self) -> object:
@@ -194,15 +194,15 @@ class Envelope:
 
     @property
     def coordinates(self) -> str:
-        """The coordinates ``z`` of the bounds in norm: ``E`` if some member is in ``E``, otherwise ``eps``."""
-        return "eps" if all(m.coordinates == "eps" for m in self.members) and self.members else "E"
+        """The coordinates ``z`` of the bounds in norm: ``E`` if some function is in ``E``, otherwise ``eps``."""
+        return "eps" if all(m.coordinates == "eps" for m in self.functions) and self.functions else "E"
 
     @property
     def _in_norm(self) -> list[LyapunovFunction]:
-        return [m for m in self.members if m.coordinates == self.coordinates]
+        return [m for m in self.functions if m.coordinates == self.coordinates]
 
     def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
-        """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(prefactor_i) e^(-rate_i s / 2)``.
+        """Bound of ``||z(t)|| / ||z(0)||`` at clock values ``s``: ``min_i sqrt(overshoot_i) e^(-rate_i s / 2)``.
 
         Parameters
         ----------
@@ -212,7 +212,8 @@ class Envelope:
         Returns
         -------
         array
-            Of the shape of ``clock``; infinite where nothing was proved: an envelope without members bounds nothing.
+            Of the shape of ``clock``; infinite where nothing was proved: an envelope without Lyapunov functions bounds
+            nothing.
 
         Raises
         ------
@@ -220,7 +221,7 @@ class Envelope:
             A value is negative or not a number.
         """
         clock = clock_values(clock)
-        factors = [_grown(math.sqrt(m.prefactor_above), m.rate_below, clock) for m in self._in_norm]
+        factors = [_grown(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm]
         return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
 
     def residual(self, remaining: float) -> float:
@@ -268,7 +269,7 @@ class Envelope:
         ParameterError
             A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
         """
-        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
+        clock, x0 = clock_values(clock), exact_initial_state(self.structure, x0)
         bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest_below), m.rate_below, clock) for m in self._in_norm]
         return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
 
@@ -282,8 +283,8 @@ class Envelope:
         """
         return self.bound(self._clock(remaining), x0)
 
-    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
-        """Bound of ``|x_k - outcome_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
+    def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - final_state_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
 
         Parameters
         ----------
@@ -301,13 +302,13 @@ class Envelope:
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        return self.distance(self._clock(remaining), x0)
+        return self.deviation(self._clock(remaining), x0)
 
-    def distance(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
-        """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its outcome.
+    def deviation(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its final state.
 
-        The least of ``sqrt(c_k e^(-rate s) V(0))`` over the members, and never more than ``max_j |x_j(0) - (Q x0)_j|``:
-        ``x - Q x`` obeys the same equation as ``x``, and ``e^(-L s)`` does not expand the largest entry.
+        The least of ``sqrt(c_k e^(-rate s) V(0))`` over the Lyapunov functions, and never more than ``max_j |x_j(0) -
+        (Q x0)_j|``: ``x - Q x`` obeys the same equation as ``x``, and ``e^(-L s)`` does not expand the largest entry.
 
         Parameters
         ----------
@@ -325,21 +326,21 @@ class Envelope:
         ParameterError
             A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
         """
-        return self._distances(clock, x0, lambda d: d.roots)
+        return self._deviations(clock, x0, lambda d: d.roots)
 
-    def distance_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
-        """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`distance`."""
-        return self._distances(clock, x0, lambda d: np.array([d.norm_root]))[0]
+    def deviation_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
+        """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`deviation`."""
+        return self._deviations(clock, x0, lambda d: np.array([d.norm_root]))[0]
 
-    def _distances(
+    def _deviations(
         self,
         clock: np.ndarray | float,
         x0: Any,
-        constants: Callable[[DistanceBound], np.ndarray],
+        constants: Callable[[DeviationBound], np.ndarray],
     ) -> np.ndarray:
-        clock, x0 = clock_values(clock), exact_start(self.structure, x0)
+        clock, x0 = clock_values(clock), exact_initial_state(self.structure, x0)
         bounds = []
-        for m in self.members:
+        for m in self.functions:
             if m.deviation is not None:
                 with np.errstate(over="ignore", invalid="ignore"):
                     size = np.nan_to_num(constants(m.deviation) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
@@ -375,33 +376,33 @@ class Envelope:
         return {}
 
     def _exact_error(self, x0: Sequence[Fraction]) -> list[Fraction]:
-        """Return ``-L x0``, for which every member asks."""
+        """Return ``-L x0``, for which every Lyapunov function asks."""
         key = tuple(x0)
         if key not in self._errors:
             self._errors.clear()
             self._errors[key] = [-sum((w * key[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
         return self._errors[key]
 
-    def _start(self, member: LyapunovFunction, x0: Sequence[Fraction]) -> float:
-        """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since a start may cancel in them."""
-        z = member.exact_coordinates_of(x0, self._exact_error(x0))
+    def _start(self, function: LyapunovFunction, x0: Sequence[Fraction]) -> float:
+        """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since entries may cancel in them."""
+        z = function.exact_coordinates_of(x0, self._exact_error(x0))
         top = max(map(abs, z), default=Fraction(0))
         if top == 0:
             return 0.0
         relative = np.array([float(x / top) for x in z])
-        return float(np.sqrt(member.value(relative))) * (1 + 1e-12) * float_up(top)
+        return float(np.sqrt(function.value(relative))) * (1 + 1e-12) * float_up(top)
 
     def _unit(self, x0: np.ndarray) -> float:
-        """Return the size of the start, in which squares neither overflow nor vanish."""
+        """Return the size of the initial state, in which squares neither overflow nor vanish."""
         return float(np.abs(x0).max(initial=0.0)) or 1.0
 
     def compare(self, trajectory: Trajectory) -> Comparison:
-        """Compare a simulated run with every member; see :class:`Comparison`.
+        """Compare a simulated run with every Lyapunov function; see :class:`Comparison`.
 
         Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
         holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
-        in units of the start, so that no square overflows or vanishes. A run that begins later than 0 is judged from
-        its first sample on.
+        in units of the initial state, so that no square overflows or vanishes. A run that begins later than 0 is judged
+        from its first sample on.
 
         Parameters
         ----------
@@ -430,7 +431,7 @@ class Envelope:
             judged &= trajectory.t < T
         worst, floor, resolved, count = 0.0, 0.0, 0.0, 0
         ratios: dict[float, float] = {}
-        for history in (h for member in self.members for h in self.histories(member, trajectory)):
+        for history in (h for function in self.functions for h in self.histories(function, trajectory)):
             root, bound, f = history
             excess = np.maximum(root - f, 0.0)[judged]
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -456,15 +457,15 @@ class Envelope:
             ratios,
             float(before.min()),
             trajectory.deadline_resolved,
-            distance_ratio=self._distance_ratio(trajectory, judged),
+            deviation_ratio=self._deviation_ratio(trajectory, judged),
         )
 
-    def _distance_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
-        """Compare every agent's distance to its outcome with its bound, column by column.
+    def _deviation_ratio(self, trajectory: Trajectory, judged: np.ndarray) -> float | None:
+        """Compare every agent's deviation from the final state with its bound, column by column.
 
         Before the deadline only: the bound is 0 from there on, and whether the run has arrived is told elsewhere.
         """
-        if not any(m.deviation is not None for m in self.members) or trajectory.t[0] != 0:
+        if not any(m.deviation is not None for m in self.functions) or trajectory.t[0] != 0:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
@@ -472,7 +473,7 @@ class Envelope:
         for column in range(states.shape[1]):
             x = states[:, column]
             size = self._unit(x[:, 0])
-            bounds, start = self._distance_bounds(trajectory, x, size)
+            bounds, start = self._deviation_bounds(trajectory, x, size)
             final, _ = self._influence.apply(start)
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
@@ -482,19 +483,21 @@ class Envelope:
             worst = max(worst, float(np.where(np.vstack([excess, norm]) > 0, both, 0.0)[:, judged].max(initial=0.0)))
         return worst
 
-    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
+    def _deviation_bounds(
+        self, trajectory: Trajectory, x: np.ndarray, unit: float
+    ) -> tuple[np.ndarray, list[Fraction]]:
         """Return the bounds of every agent and of the norm (N + 1, M) in that unit, and what ``Q`` is applied to."""
         start = [as_exact(v) for v in x[:, 0]]
         own = [v / Fraction(unit) for v in start]
-        bounds = np.vstack([self.distance(trajectory.clock, own), self.distance_norm(trajectory.clock, own)])
+        bounds = np.vstack([self.deviation(trajectory.clock, own), self.deviation_norm(trajectory.clock, own)])
         return bounds, start
 
-    def histories(self, member: LyapunovFunction, trajectory: Trajectory) -> list[History]:
-        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the start.
+    def histories(self, function: LyapunovFunction, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the initial state.
 
         Parameters
         ----------
-        member : LyapunovFunction
+        function : LyapunovFunction
             Of this envelope.
         trajectory : Trajectory
             Of the same graph and protocol.
@@ -506,29 +509,29 @@ class Envelope:
         """
         states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         states = states / _sizes(states)
-        z = member.coordinates_of(states, self._laplacian)
+        z = function.coordinates_of(states, self._laplacian)
         unit = _sizes(z)
-        root = np.sqrt(member.value(z / unit))
-        bounds = _grown(root[:, 0], member.rate_below, trajectory.clock - trajectory.clock[0])
+        root = np.sqrt(function.value(z / unit))
+        bounds = _grown(root[:, 0], function.rate_below, trajectory.clock - trajectory.clock[0])
         return [
             History(
                 root[column],
                 bounds[column],
-                FLOOR_FACTOR * trajectory.rtol * self._state_scale(member, states[:, column], float(unit[column, 0])),
+                FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, states[:, column], float(unit[column, 0])),
             )
             for column in range(states.shape[1])
         ]
 
-    def _state_scale(self, member: LyapunovFunction, states: np.ndarray, unit: float) -> float:
+    def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
         size = np.abs(states).max(axis=1)
-        if member.coordinates == "E":
-            size = np.asarray(abs(self._laplacian) @ size)[member.rows]  # type: ignore[arg-type, operator]
+        if function.coordinates == "E":
+            size = np.asarray(abs(self._laplacian) @ size)[function.rows]  # type: ignore[arg-type, operator]
         else:
-            size = 2 * size[member.rows]
-        if member.root.ndim == 1:
-            return float(np.linalg.norm(member.root * (size / unit)))
-        return float(np.linalg.norm(np.abs(member.root) @ (size / unit)))
+            size = 2 * size[function.rows]
+        if function.root.ndim == 1:
+            return float(np.linalg.norm(function.root * (size / unit)))
+        return float(np.linalg.norm(np.abs(function.root) @ (size / unit)))
 
 
 def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:

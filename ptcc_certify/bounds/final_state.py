@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.iterative import solve
+from lmi.sparse_h_matrix import solve
 from ptcc_certify.errors import HypothesisError, NumberError, ParameterError
 from ptcc_certify.graphs.io import in_node_order
 from ptcc_certify.graphs.rationals import as_fraction, shorten
@@ -43,13 +43,13 @@ class Enclosure:
 
     Attributes
     ----------
-    voices : mapping of k to (middle, radius)
-        Of those of ``Influence.balanced`` whose voices are not rational.
+    left_null_vectors : mapping of k to (middle, radius)
+        Of those of ``Influence.balanced`` whose left null vectors are not rational.
     witness : (N,) array
-        ``u > 0`` with ``M(L_F) u > 0``; 1 for leaders, but for those of ``voices``.
+        ``u > 0`` with ``M(L_F) u > 0``; 1 for leaders, but for those of ``left_null_vectors``.
     """
 
-    voices: dict[int, tuple[np.ndarray, np.ndarray]]
+    left_null_vectors: dict[int, tuple[np.ndarray, np.ndarray]]
     witness: np.ndarray
 
 
@@ -60,10 +60,10 @@ class Influence:
     Attributes
     ----------
     structure : Structure
-    voices : tuple of tuple
+    left_null_vectors : tuple of tuple
         For each balanced closed component the weights ``eta_k`` times gauge, in the order of its nodes: the
-        component meets at ``c_k = sum voices * X(0)`` times its gauge.
-    pulls : tuple of tuple, or None
+        component meets at ``c_k = sum left_null_vectors * X(0)`` times its gauge.
+    containment_weights : tuple of tuple, or None
         For each follower, its weight on each balanced closed component (``varpi``; absolute sum at most 1). None where
         followers times components are more than ``MANY_PULLS``.
     exact : bool
@@ -82,19 +82,19 @@ class Influence:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> who = influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])))
-    >>> who.pulls, who.apply([Fraction(1), Fraction(0), Fraction(2)])[0][1]  # of a and b on c, whose x is forgotten
+    >>> who.containment_weights, who.apply([Fraction(1), Fraction(0), Fraction(2)])[0][1]  # of a and b on c
     (((Fraction(1, 4), Fraction(-3, 4)),), Fraction(-5, 4))
     """
 
     structure: Structure
-    voices: tuple[tuple[Number, ...], ...]
-    pulls: tuple[tuple[Number, ...], ...] | None
+    left_null_vectors: tuple[tuple[Number, ...], ...]
+    containment_weights: tuple[tuple[Number, ...], ...] | None
     exact: bool
     enclosure: Enclosure | None = field(default=None, compare=False)
 
     @cached_property
     def balanced(self) -> tuple[ClosedComponent, ...]:
-        """The balanced closed components, to which ``voices`` and the columns of ``pulls`` belong."""
+        """The balanced closed components, to which ``left_null_vectors`` and ``containment_weights`` belong."""
         return tuple(c for c in self.structure.closed_components if c.balanced)
 
     def row(self, node: int) -> dict[int, Number]:
@@ -108,7 +108,7 @@ class Influence:
         Returns
         -------
         dict of int to Fraction or float
-            Empty for a node that ends at 0 from every start.
+            Empty for a node that ends at 0 from every initial state.
 
         Examples
         --------
@@ -117,18 +117,18 @@ class Influence:
         >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
         {0: Fraction(1, 4), 2: Fraction(-3, 4)}
         """
-        for component, voice in zip(self.balanced, self.voices, strict=True):
+        for component, null_vector in zip(self.balanced, self.left_null_vectors, strict=True):
             if node in component.nodes:
                 own = (component.gauge or ())[component.nodes.index(node)]
-                return {v: own * w for v, w in zip(component.nodes, voice, strict=True)}
+                return {v: own * w for v, w in zip(component.nodes, null_vector, strict=True)}
         where = np.flatnonzero(self.structure.followers == node)
         if where.size == 0:
             return {}
         result: dict[int, Number] = {}
-        pull = self._pull_of(int(where[0]))
-        for component, voice, weight in zip(self.balanced, self.voices, pull, strict=True):
+        weights = self._weights_of(int(where[0]))
+        for component, null_vector, weight in zip(self.balanced, self.left_null_vectors, weights, strict=True):
             if weight:
-                result.update({v: weight * w for v, w in zip(component.nodes, voice, strict=True)})
+                result.update({v: weight * w for v, w in zip(component.nodes, null_vector, strict=True)})
         return result
 
     def apply(self, x0: Sequence[Number]) -> tuple[list[Number], list[Number]]:
@@ -146,26 +146,26 @@ class Influence:
         """
         zero: Number = Fraction(0) if self.exact else 0.0
         values = [
-            sum((w * x0[v] for v, w in zip(component.nodes, voice, strict=True)), zero)
-            for component, voice in zip(self.balanced, self.voices, strict=True)
+            sum((w * x0[v] for v, w in zip(component.nodes, null_vector, strict=True)), zero)
+            for component, null_vector in zip(self.balanced, self.left_null_vectors, strict=True)
         ]
         final: list[Number] = [zero] * self.structure.graph.n_nodes
         for component, value in zip(self.balanced, values, strict=True):
             for v, sign in zip(component.nodes, component.gauge or (), strict=True):
                 final[v] = sign * value
-        if self.pulls is None:
+        if self.containment_weights is None:
             state = np.array([float(x) for x in final])
             for v, x in zip(self.structure.followers.tolist(), follower_state(self.structure, state), strict=True):
                 final[v] = float(x)
             return final, values
-        for v, pull in zip(self.structure.followers.tolist(), self.pulls, strict=True):
-            final[v] = sum((w * c for w, c in zip(pull, values, strict=True) if w), zero)
+        for v, weights in zip(self.structure.followers.tolist(), self.containment_weights, strict=True):
+            final[v] = sum((w * c for w, c in zip(weights, values, strict=True) if w), zero)
         return final, values
 
-    def _pull_of(self, follower: int) -> Sequence[Number]:
+    def _weights_of(self, follower: int) -> Sequence[Number]:
         """Return the weights of one follower, by one solve with the transposed block if they are not stored."""
-        if self.pulls is not None:
-            return self.pulls[follower]
+        if self.containment_weights is not None:
+            return self.containment_weights[follower]
         L, F = self.structure.graph.laplacian().tocsr(), self.structure.followers
         block, unit = L[F][:, F], np.zeros(F.size)
         unit[follower] = 1
@@ -208,19 +208,19 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> foes = analyse(SignedDigraph.from_edges([(1, 2, -3), (2, 1, -1)]))
-    >>> influence(foes).voices  # they meet at (3 x_1 - x_2)/4 and its opposite
+    >>> influence(foes).left_null_vectors  # they meet at (3 x_1 - x_2)/4 and its opposite
     ((Fraction(3, 4), Fraction(-1, 4)),)
     """
     graph = structure.graph
     exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
-    voices: list[tuple[Number, ...]] = []
+    left_null_vectors: list[tuple[Number, ...]] = []
     several = [v for c in structure.closed_components if len(c.nodes) > 1 for v in c.nodes]
     groups, place = graph.subgraph(several) if several else graph, {v: i for i, v in enumerate(several)}
     balanced = [c for c in structure.closed_components if c.balanced]
     for component in balanced:
         gauge = component.gauge or ()
         if len(component.nodes) == 1:
-            voices.append((Fraction(1),))
+            left_null_vectors.append((Fraction(1),))
             continue
         block = groups.subgraph([place[v] for v in component.nodes])
         eta: Sequence[Number]
@@ -231,33 +231,33 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
             whole = dyadic_left_vector(block, p)
             total = sum(whole or ())
             eta = [Fraction(w, total) for w in whole] if whole else p.tolist()
-        voices.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
+        left_null_vectors.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
     if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
-        return Influence(structure, tuple(voices), None, False)
+        return Influence(structure, tuple(left_null_vectors), None, False)
     try:
         weights: Sequence[Sequence[Number]] = (
             exact_containment_weights(structure) if exact else containment_weights(structure).tolist()
         )
     except RuntimeError:  # a factor of floats that is exactly singular
-        return Influence(structure, tuple(voices), None, False)
-    return Influence(structure, tuple(voices), tuple(tuple(row) for row in weights), exact)
+        return Influence(structure, tuple(left_null_vectors), None, False)
+    return Influence(structure, tuple(left_null_vectors), tuple(tuple(row) for row in weights), exact)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FinalState:
     """The state at the deadline and after.
 
     Attributes
     ----------
     labels : tuple of str
         The N agents.
-    final_state : tuple of Fraction or float
+    states : tuple of Fraction or float
         ``Q X(0)``, exact for small graphs, otherwise the middles of intervals.
     consensus_values : tuple
         ``c_k`` of each balanced closed component.
     degenerate : tuple of int
-        1-based numbers of the closed components that meet at 0 although they are balanced: the special starts with
-        ``eta' G X(0) = 0``, for which the consensus value of Definitions 3 to 5 is not positive.
+        1-based numbers of the closed components that meet at 0 although they are balanced: the special initial states
+        with ``eta' G X(0) = 0``, for which the consensus value of Definitions 3 to 5 is not positive.
     radius : tuple of Fraction, or None
         Of the proved intervals, 0 where an end is exact; None if all are, or if nothing is proved.
 
@@ -270,15 +270,15 @@ class Outcome:
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> end = outcome(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
+    >>> end = final_state(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
     >>> end
-    Outcome(1=1, 2=-1, 3=-1)
+    FinalState(1=1, 2=-1, 3=-1)
     >>> end.consensus_values, end.degenerate
     ((Fraction(1, 1),), ())
     """
 
     labels: tuple[str, ...]
-    final_state: tuple[Number, ...]
+    states: tuple[Number, ...]
     consensus_values: tuple[Number, ...]
     degenerate: tuple[int, ...]
     radius: tuple[Fraction, ...] | None = None
@@ -286,33 +286,33 @@ class Outcome:
     @property
     def exact(self) -> bool:
         """Whether ``final_state`` is exact: rational, without a radius."""
-        return self.radius is None and all(isinstance(x, Fraction) for x in self.final_state)
+        return self.radius is None and all(isinstance(x, Fraction) for x in self.states)
 
     @property
     def intervals(self) -> tuple[tuple[Fraction, Fraction], ...] | None:
         """Middle and radius of a proved interval for each agent; None if nothing is proved."""
         if self.radius is None and not self.exact:
             return None
-        radius = self.radius or (Fraction(0),) * len(self.final_state)
-        return tuple(zip((Fraction(x) for x in self.final_state), radius, strict=True))
+        radius = self.radius or (Fraction(0),) * len(self.states)
+        return tuple(zip((Fraction(x) for x in self.states), radius, strict=True))
 
     @cached_property
     def values(self) -> np.ndarray:
         """(N,) float64 array: ``final_state``, rounded."""
-        return np.array([float(x) for x in self.final_state])
+        return np.array([float(x) for x in self.states])
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.final_state, strict=True))[:8])
-        return f"Outcome({shown}{', ...' if len(self.labels) > 8 else ''})"
+        shown = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
+        return f"FinalState({shown}{', ...' if len(self.labels) > 8 else ''})"
 
 
-def outcome(
+def final_state(
     structure: Structure,
     x0: Sequence[Any] | Mapping[Any, Any],
     *,
     exact: bool | None = None,
     matrix: Influence | None = None,
-) -> Outcome:
+) -> FinalState:
     """Compute the state at the deadline, ``Q x0``.
 
     Parameters
@@ -327,7 +327,7 @@ def outcome(
 
     Returns
     -------
-    Outcome
+    FinalState
 
     Raises
     ------
@@ -343,21 +343,23 @@ def outcome(
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> outcome(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])), [1, 0, 2]).final_state
+    >>> final_state(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])), [1, 0, 2]).states
     (Fraction(1, 1), Fraction(-5, 4), Fraction(2, 1))
     """
-    start = exact_start(structure, x0)
+    start = exact_initial_state(structure, x0)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
     final, values = matrix.apply(start if matrix.exact else [float(x) for x in start])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     size = max((abs(float(x)) for x in start), default=0.0)
     meets_at_zero = [c == 0 if matrix.exact else abs(float(c)) <= 1e-12 * size for c in values]
     degenerate = tuple(k for k, zero in zip(numbers, meets_at_zero, strict=True) if zero)
-    return Outcome(structure.graph.labels, tuple(final), tuple(values), degenerate)
+    return FinalState(structure.graph.labels, tuple(final), tuple(values), degenerate)
 
 
-def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0") -> list[Fraction]:
-    """Return a start as N rationals; ``x0`` in node order, or with labels. ``name`` is what messages call it.
+def exact_initial_state(
+    structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0"
+) -> list[Fraction]:
+    """Return an initial state as N rationals; ``x0`` in node order, or with labels. ``name`` is what messages call it.
 
     Raises
     ------
@@ -367,9 +369,9 @@ def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], nam
     labels = structure.graph.labels
     x0 = in_node_order(x0, structure.graph, name)
     if isinstance(x0, str) or not hasattr(x0, "__getitem__"):
-        raise ParameterError(f"the start {name} is a sequence of numbers in node order, or a mapping by label")
+        raise ParameterError(f"the initial state {name} is a sequence of numbers in node order, or a mapping by label")
     if len(x0) != len(labels):
-        raise ParameterError(f"the start {name} has {len(x0)} values for {len(labels)} agents")
+        raise ParameterError(f"the initial state {name} has {len(x0)} values for {len(labels)} agents")
     start = []
     for label, value in zip(labels, x0, strict=True):
         if type(value) is Fraction:
@@ -389,7 +391,7 @@ def exact_start(structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], nam
 def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -> bool:
     """Definition 1 on one run of the error system: ``E -> 0`` at the deadline and ``E = 0`` from there on.
 
-    Definition 1 speaks of all starts of a system; a single trajectory can only refute it.
+    Definition 1 speaks of all initial states of a system; a single trajectory can only refute it.
 
     Parameters
     ----------
@@ -432,11 +434,11 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
 
     Parameters
     ----------
-    x : sequence of N numbers, mapping or pandas Series by label, Outcome or Trajectory
+    x : sequence of N numbers, mapping or pandas Series by label, FinalState or Trajectory
         A trajectory is judged at its deadline and at every later sample, relative to its largest start.
     structure : Structure
     tolerance : float
-        0 asks for equality, which makes sense for exact outcomes.
+        0 asks for equality, which makes sense for exact final states.
 
     Returns
     -------
@@ -452,7 +454,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]))
-    >>> is_stability(outcome(st, [3, 4]), st)
+    >>> is_stability(final_state(st, [3, 4]), st)
     True
     """
     return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, structure, tolerance))
@@ -463,11 +465,11 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
 
     Parameters
     ----------
-    x : sequence of N numbers, Outcome or Trajectory
+    x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
     structure : Structure
     tolerance : float
-        0 asks for equality, which makes sense for exact outcomes.
+        0 asks for equality, which makes sense for exact final states.
 
     Returns
     -------
@@ -483,7 +485,7 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
-    >>> is_bipartite_consensus(outcome(st, [3, 4]), st), is_bipartite_consensus(outcome(st, [3, 3]), st)
+    >>> is_bipartite_consensus(final_state(st, [3, 4]), st), is_bipartite_consensus(final_state(st, [3, 3]), st)
     (True, False)
     """
     return all(_same_modulus(state, tol) for state, tol in _states(x, structure, tolerance))
@@ -494,11 +496,11 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
 
     Parameters
     ----------
-    x : sequence of N numbers, Outcome or Trajectory
+    x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
     structure : Structure
     tolerance : float
-        0 asks for equality, which makes sense for exact outcomes.
+        0 asks for equality, which makes sense for exact final states.
 
     Returns
     -------
@@ -514,7 +516,7 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 3, 1), (3, 2, 1)]))
-    >>> is_interval_bipartite_consensus(outcome(st, [2, 0, 0]), st)
+    >>> is_interval_bipartite_consensus(final_state(st, [2, 0, 0]), st)
     True
     """
     if len(structure.closed_components) != 1:
@@ -532,11 +534,11 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
 
     Parameters
     ----------
-    x : sequence of N numbers, Outcome or Trajectory
+    x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
     structure : Structure
     tolerance : float
-        0 asks for equality, which makes sense for exact outcomes.
+        0 asks for equality, which makes sense for exact final states.
 
     Returns
     -------
@@ -552,7 +554,7 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))
-    >>> is_bipartite_containment(outcome(st, [1, 0, 2]), st)
+    >>> is_bipartite_containment(final_state(st, [1, 0, 2]), st)
     True
     """
     return all(_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
@@ -576,11 +578,11 @@ def _same_modulus(state: Sequence[Any], tolerance: float) -> bool:
 
 def _states(x: Any, structure: Structure, tolerance: float) -> list[tuple[Sequence[Any], float]]:
     """Return the states to judge, each with its absolute tolerance (an int 0 keeps rationals exact)."""
-    if isinstance(x, Outcome) and tolerance == 0:
-        return [(x.final_state, 0)]
-    if isinstance(x, Outcome):
-        size = max((abs(float(v)) for v in x.final_state), default=0.0)
-        return [(x.final_state, tolerance * size)]
+    if isinstance(x, FinalState) and tolerance == 0:
+        return [(x.states, 0)]
+    if isinstance(x, FinalState):
+        size = max((abs(float(v)) for v in x.states), default=0.0)
+        return [(x.states, tolerance * size)]
     if hasattr(x, "deadline_index"):
         if x.deadline_index is None:
             raise HypothesisError("the trajectory has no sample at a deadline, so the definitions do not apply")

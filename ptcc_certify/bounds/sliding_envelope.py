@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.rounding import float_up
+from lmi.exact.directed_rounding import float_up
 from ptcc_certify.bounds.envelope import (
     FLOOR_FACTOR,
     Comparison,
@@ -33,7 +33,7 @@ from ptcc_certify.bounds.envelope import (
     clock_values,
     remaining_part,
 )
-from ptcc_certify.bounds.final_state import exact_start
+from ptcc_certify.bounds.final_state import exact_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.base import ReachingProtocol
@@ -72,7 +72,7 @@ class SlidingEnvelope(Envelope):
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> envelope = certify(pair, robust, [3, 1], sigma0=[1, 0], simulation=False).envelope
-    >>> bool(envelope.outcome_distance(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
+    >>> bool(envelope.deviation_bound(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
     True
     >>> bool(envelope.sliding_norm(0.0) >= 1)  # ||sigma(0)|| = 1
     True
@@ -132,14 +132,14 @@ class SlidingEnvelope(Envelope):
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_initial_state(self.structure, x0)
         z, clock = self._instants(q)
         bound, unit = np.full(q.size, np.inf), self._unit(np.array([float(x) for x in x0]))
-        for member in self._in_norm:
-            if self._usable(member):
-                v, sliding = self._bounds(member, x0, unit, z, clock)
+        for function in self._in_norm:
+            if self._usable(function):
+                v, sliding = self._bounds(function, x0, unit, z, clock)
                 with np.errstate(over="ignore"):
-                    bound = np.minimum(bound, (v + sliding) / math.sqrt(member.lowest_below) * unit * (1 + 1e-12))
+                    bound = np.minimum(bound, (v + sliding) / math.sqrt(function.lowest_below) * unit * (1 + 1e-12))
         return bound if np.ndim(remaining) else bound[0]
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
@@ -202,27 +202,27 @@ class SlidingEnvelope(Envelope):
             ratio = np.append(ratio, np.where(norm > 0, norm / (self.sliding_norm(z) / size), 0.0))
         return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
 
-    def histories(self, member: LyapunovFunction, trajectory: Trajectory) -> list[History]:
-        """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of the start."""
+    def histories(self, function: LyapunovFunction, trajectory: Trajectory) -> list[History]:
+        """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of ``x(0)``."""
         if self.direct:
-            return super().histories(member, trajectory)
+            return super().histories(function, trajectory)
         run = trajectory.sliding
         assert run is not None
-        if not self._usable(member):
+        if not self._usable(function):
             return []
         own = self._unit(trajectory.states[:, 0])
         x, y = trajectory.states / own, (run.states - run.sigma) / own
         size = max(float(np.abs(part).max()) for part in (x, y))
-        v, sliding = self._bounds(member, trajectory.states[:, 0], own, self._z(run), run.clock)
+        v, sliding = self._bounds(function, trajectory.states[:, 0], own, self._z(run), run.clock)
         unit = float((v + sliding).max()) or 1.0
-        floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(member, np.ones((len(y), 1)), unit)
+        floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(function, np.ones((len(y), 1)), unit)
         return [
-            History(np.sqrt(member.value(member.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
+            History(np.sqrt(function.value(function.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
             for part, bound in ((x, v + sliding), (y, v))
         ]
 
     def _unit(self, x0: np.ndarray) -> float:
-        """Return the size of the start, in which squares neither overflow nor vanish."""
+        """Return the size of the initial state, in which squares neither overflow nor vanish."""
         return max(float(np.abs(x0).max()), *(abs(float(x)) for x in self.sigma0)) or 1.0
 
     @staticmethod
@@ -230,12 +230,12 @@ class SlidingEnvelope(Envelope):
         with np.errstate(divide="ignore"):
             return -np.log(trajectory.reaching_remaining)
 
-    def _usable(self, member: LyapunovFunction) -> bool:
-        """Whether a member bounds the reaching phase: one that bounds only the growth would end in infinity."""
-        return self.direct or member.rate_below > 0
+    def _usable(self, function: LyapunovFunction) -> bool:
+        """Whether a function bounds the reaching phase: one that bounds only the growth would end in infinity."""
+        return self.direct or function.rate_below > 0
 
     def _bounds(
-        self, member: LyapunovFunction, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
+        self, function: LyapunovFunction, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
 
@@ -243,8 +243,8 @@ class SlidingEnvelope(Envelope):
         """
         own = Fraction(unit)
         y0 = [(as_exact(x) - sigma) / own for x, sigma in zip(x0, self.sigma0, strict=True)]
-        half = member.rate_below / 2
-        C, B = self._drive(member)
+        half = function.rate_below / 2
+        C, B = self._drive(function)
         knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
         size = self._sliding(knots) / unit
         forcing = _column_norms(B @ size)
@@ -252,7 +252,7 @@ class SlidingEnvelope(Envelope):
         step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
         decay, share = np.exp(-step), -np.expm1(-step) / half
         v = np.empty(knots.size + 1)
-        v[0] = self._start(member, y0)
+        v[0] = self._start(function, y0)
         for i in range(knots.size):
             v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
         at = np.searchsorted(knots, z)
@@ -266,7 +266,7 @@ class SlidingEnvelope(Envelope):
         return {}
 
     def _sliding(self, z: np.ndarray) -> np.ndarray:
-        """Return :func:`sliding_bound`, which every member asks for at the same instants."""
+        """Return :func:`sliding_bound`, which every Lyapunov function asks for at the same instants."""
         key = z.tobytes()
         if key not in self._known:
             if len(self._known) > _MOST_KNOWN:
@@ -287,49 +287,53 @@ class SlidingEnvelope(Envelope):
         T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
         return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
-    def _drive(self, member: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
+    def _drive(self, function: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
         """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
         L = self.structure.graph.laplacian()
-        if member.coordinates == "E":
-            rows = L[member.rows]
-            return np.abs(member.scaled(rows.toarray())), np.abs(member.scaled((rows @ L).toarray()))
-        deviation = member.coordinates_of(np.eye(L.shape[0]), L)
-        return np.abs(member.scaled(deviation)), np.abs(member.scaled(deviation @ L))
+        if function.coordinates == "E":
+            rows = L[function.rows]
+            return np.abs(function.scaled(rows.toarray())), np.abs(function.scaled((rows @ L).toarray()))
+        deviation = function.coordinates_of(np.eye(L.shape[0]), L)
+        return np.abs(function.scaled(deviation)), np.abs(function.scaled(deviation @ L))
 
-    def _distance_bounds(self, trajectory: Trajectory, x: np.ndarray, unit: float) -> tuple[np.ndarray, list[Fraction]]:
+    def _deviation_bounds(
+        self, trajectory: Trajectory, x: np.ndarray, unit: float
+    ) -> tuple[np.ndarray, list[Fraction]]:
         """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
         if self.direct:
-            return super()._distance_bounds(trajectory, x, unit)
+            return super()._deviation_bounds(trajectory, x, unit)
         run = trajectory.sliding
         assert run is not None
-        bounds, norm = self._outcome_bounds(x[:, 0], unit, self._z(run), run.clock)
+        bounds, norm = self._final_state_bounds(x[:, 0], unit, self._z(run), run.clock)
         start = [as_exact(v) - sigma for v, sigma in zip(x[:, 0], self.sigma0, strict=True)]
         return np.vstack([bounds, norm]), start
 
-    def _outcome_bounds(
+    def _final_state_bounds(
         self, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds of ``|x_k - outcome_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
+        """Return the bounds of ``|x_k - final_state_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
         bounds = np.full((len(x0), z.size), 0.0 if self._still else np.inf)
         norm = bounds[0].copy()
-        for member in self.members:
-            if member.deviation is None or not self._usable(member):
+        for function in self.functions:
+            if function.deviation is None or not self._usable(function):
                 continue
-            v = self._bounds(member, x0, unit, z, clock)[0] * (1 + 1e-12)
+            v = self._bounds(function, x0, unit, z, clock)[0] * (1 + 1e-12)
             with np.errstate(invalid="ignore", over="ignore"):
-                bounds = np.minimum(bounds, np.nan_to_num(np.multiply.outer(member.deviation.roots, v), posinf=np.inf))
-                norm = np.minimum(norm, np.nan_to_num(member.deviation.norm_root * v, posinf=np.inf))
+                bounds = np.minimum(
+                    bounds, np.nan_to_num(np.multiply.outer(function.deviation.roots, v), posinf=np.inf)
+                )
+                norm = np.minimum(norm, np.nan_to_num(function.deviation.norm_root * v, posinf=np.inf))
         size = self._sliding(z) / unit
         bounds, norm = bounds + size, norm + _column_norms(size)
-        if any(m.deviation is not None for m in self.members):
+        if any(m.deviation is not None for m in self.functions):
             most = self._largest_deviation(x0) / unit * (1 + 1e-15)
             bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
         return bounds, norm
 
     def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
-        """Return ``max_k |x_k(0) - outcome_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
+        """Return ``max_k |x_k(0) - final_state_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
 
-        ``x - outcome`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
+        ``x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
         expand the largest entry.
         """
         start = [as_exact(x) for x in x0]
@@ -337,8 +341,8 @@ class SlidingEnvelope(Envelope):
         gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
         return float_up(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
 
-    def outcome_distance(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
-        """Bound of ``|x_k - outcome_k|`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, whatever the disturbance.
+    def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
+        """Bound of ``|x_k - final_state_k|`` at ``1 - t/(T_r + T_s) = remaining``, whatever the disturbance.
 
         Parameters
         ----------
@@ -356,11 +360,11 @@ class SlidingEnvelope(Envelope):
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
         if self.direct:
-            return super().outcome_distance(remaining, x0)
-        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_start(self.structure, x0)
+            return super().deviation_bound(remaining, x0)
+        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_initial_state(self.structure, x0)
         unit = self._unit(np.array([float(x) for x in x0]))
         z, clock = self._instants(q)
-        bounds = self._outcome_bounds(x0, unit, z, clock)[0] * unit
+        bounds = self._final_state_bounds(x0, unit, z, clock)[0] * unit
         return bounds if np.ndim(remaining) else bounds[:, 0]
 
     def _instants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from lmi.exact.rounding import down
+from lmi.exact.directed_rounding import down
 from ptcc_certify.certificate.checking import check, read_and_check
 from ptcc_certify.certificate.content import Content, Source
 from ptcc_certify.certificate.format import certificate_document, read_document
@@ -19,9 +19,9 @@ from ptcc_certify.certificate.vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.rich_display import Shown
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: GB that the check of a large graph may take while it is certified.
@@ -51,7 +51,7 @@ class RejectedCertificate(PTCCError, ValueError):
     ...         read_certificate(path)
     ...     except RejectedCertificate as error:
     ...         print(error.path.name, error.report.rejected)
-    c.json effort
+    c.json input
     """
 
     def __init__(self, path: Path, report: CheckReport):
@@ -83,10 +83,10 @@ class Certificate(Content, Shown):
         The proved rate of the paper's function (None if not proved) and the statements proved for it.
     sharper : tuple of LyapunovFunction
         Sharper ones of the classes that ``method`` names, proved.
-    limit : RateLimit or None
+    limit : RateBound or None
         The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.
-    outcome : Outcome or None
-        ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without a start.
+    final_state : FinalState or None
+        ``Q X(0)``, for the sliding-mode protocol ``Q (X(0) - sigma(0))``; None without an initial state.
     matrix : Influence or None
         ``Q``, as it was computed; see ``influence``.
     request : Request
@@ -108,8 +108,8 @@ class Certificate(Content, Shown):
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
     >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
     ('certified', 'bipartite consensus', '1.1')
-    >>> cert.outcome, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
-    (Outcome(1=1, 2=-1), True, True)
+    >>> cert.final_state, bool(cert.rate <= cert.upper_bound), cert.checked.accepted
+    (FinalState(1=1, 2=-1), True, True)
     """
 
     @property
@@ -151,7 +151,7 @@ class Certificate(Content, Shown):
 
     @property
     def verdict(self) -> str:
-        """``certified`` if rate and outcome were proved and the independent check accepts it, else ``undecided``."""
+        """``certified`` if rate and final state were proved and the check accepts it, else ``undecided``."""
         return verdict_of(self.checked)
 
     @cached_property
@@ -167,7 +167,7 @@ class Certificate(Content, Shown):
         return kept[verdict]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/1``, without side files.
+        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files.
 
         One that was read is what its file says.
         """
@@ -222,7 +222,7 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
     Parameters
     ----------
     path : str or Path
-        A file of schema ``ptcc-certificate/1``; its side files are in the same folder.
+        A file of schema ``ptcc-certificate/2``; its side files are in the same folder.
     stdlib : bool
         Let the check use the standard library alone.
     memory : float
@@ -250,7 +250,7 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
-    >>> saved, saved.checked.accepted, [str(x) for x, radius in saved.final_state]
+    >>> saved, saved.checked.accepted, [str(x) for x in saved.final_state.states]
     (Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
     >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
     True

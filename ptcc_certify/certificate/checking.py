@@ -46,7 +46,7 @@ def check(
     Examples
     --------
     >>> from ptcc_certify import check
-    >>> check({"schema": "ptcc-certificate/1"}).reason
+    >>> check({"schema": "ptcc-certificate/2"}).reason
     'the key "producer" is missing'
     """
     return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
@@ -64,8 +64,8 @@ def read_and_check(
 
     Examples
     --------
-    >>> read_and_check({"schema": "ptcc-certificate/1"})[0]
-    {'schema': 'ptcc-certificate/1'}
+    >>> read_and_check({"schema": "ptcc-certificate/2"})[0]
+    {'schema': 'ptcc-certificate/2'}
     """
     try:
         return checker.read_and_check(source, **options)

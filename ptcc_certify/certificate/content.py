@@ -15,21 +15,29 @@ from typing import Any, Self
 
 import numpy as np
 
-from ptcc_certify.bounds.deviation import OutcomeGeometry
+from ptcc_certify.bounds.deviation import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
-from ptcc_certify.bounds.final_state import Influence, Outcome, influence
-from ptcc_certify.bounds.input import Effort, InputRequest, Limits, Starts, WorstStart, bound_effort, worst_start
+from ptcc_certify.bounds.final_state import FinalState, Influence, influence
+from ptcc_certify.bounds.input import (
+    Effort,
+    InitialSet,
+    InputRequest,
+    Limits,
+    WorstInitialState,
+    bound_effort,
+    worst_initial_state,
+)
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.certificate.vectors import Interval, outcome_witness
+from ptcc_certify.certificate.vectors import final_state_witness
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.input_bounds import Form
+from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.lyapunov.rate_bound import RateLimit, optimality_ratio
-from ptcc_certify.lyapunov.search import DIAGONAL, Sharpening
+from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
+from ptcc_certify.lyapunov.search import DIAGONAL, Search
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.reaching_time import ReachingTime
@@ -41,7 +49,7 @@ from ptcc_certify.theorems.lemmas import EXACT_NODES
 from ptcc_certify.theorems.table import theorem_for
 
 #: What a simulated run meets under the sliding-mode protocol unless a file states an expression.
-ADVERSARY = "adversary"
+WORST_CASE = "worst-case"
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,7 @@ class Observations:
         The paper's rate in floating point, per unit of the clock.
     spectral_rate : float or None
         ``2 min Re lambda`` in floating point, per unit of the clock: no certificate can reach further.
-    search : Sharpening
+    search : Search
         What was tried beside the paper's; the functions that were proved are apart.
     cut_off : tuple of str
         The searches that the time limit ended; what they had proved by then stands.
@@ -67,7 +75,7 @@ class Observations:
     trajectory: Trajectory | None = None
     numerical_rate: float | None = None
     spectral_rate: float | None = None
-    search: Sharpening = field(default_factory=Sharpening)
+    search: Search = field(default_factory=Search)
     cut_off: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -111,8 +119,8 @@ class Content:
     lyapunov: LyapunovFunction | None
     proof: RateProof
     sharper: tuple[LyapunovFunction, ...]
-    limit: RateLimit | None
-    outcome: Outcome | None
+    limit: RateBound | None
+    final_state: FinalState | None
     matrix: Influence | None
     request: Request
     observed: Observations
@@ -124,7 +132,7 @@ class Content:
         Parameters
         ----------
         **values : Any
-            Fields of the certificate, of its ``request`` or of its ``observed``; ``sharpening`` is what a search found.
+            Fields of the certificate, of its ``request`` or of its ``observed``; ``search`` is what a search found.
 
         Examples
         --------
@@ -134,8 +142,8 @@ class Content:
         >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
         Fraction(1, 1)
         """
-        if (found := values.pop("sharpening", None)) is not None:
-            values |= {"sharper": found.members, "search": replace(found, members=())}
+        if (found := values.pop("search", None)) is not None:
+            values |= {"sharper": found.functions, "search": replace(found, functions=())}
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
@@ -160,9 +168,9 @@ class Content:
         return self.request.at
 
     @property
-    def starts(self) -> Starts | None:
-        """The set of starts for which the input is bounded; None: that of ``start`` alone."""
-        return self.request.starts
+    def initial_set(self) -> InitialSet | None:
+        """The set of initial states for which the input is bounded; None: that of ``start`` alone."""
+        return self.request.initial_set
 
     @property
     def limits(self) -> tuple[Limits, ...]:
@@ -215,9 +223,9 @@ class Content:
         return self.observed.notes
 
     @property
-    def sharpening(self) -> Sharpening:
+    def search(self) -> Search:
         """Sharper Lyapunov functions than the paper's, proved, and what else was tried."""
-        return replace(self.observed.search, members=self.sharper)
+        return replace(self.observed.search, functions=self.sharper)
 
     # ------------------------------------------------------------------ claims
 
@@ -258,14 +266,14 @@ class Content:
         if self.source is None:
             geometry = self._geometry
             found = tuple(replace(V, deviation=None if geometry is None else geometry.bound(V)) for V in found)
-        return tuple(replace(V, name=f"lyapunov.members[{k}]") for k, V in enumerate(found))
+        return tuple(replace(V, name=f"lyapunov.functions[{k}]") for k, V in enumerate(found))
 
     @cached_property
-    def _geometry(self) -> OutcomeGeometry | None:
-        """What turns Lyapunov functions into deviations; None without an exact outcome."""
-        if not self.influence.exact or outcome_witness(self.structure, self.influence) is not None:
+    def _geometry(self) -> DeviationGeometry | None:
+        """What turns Lyapunov functions into deviations; None without an exact final state."""
+        if not self.influence.exact or final_state_witness(self.structure, self.influence) is not None:
             return None
-        return OutcomeGeometry(self.structure, self.influence)
+        return DeviationGeometry(self.structure, self.influence)
 
     @property
     def forms(self) -> list[Form | None]:
@@ -280,7 +288,7 @@ class Content:
 
     @property
     def rate(self) -> Fraction | None:
-        """The largest proved rate of all members; None if nothing decays or nothing was proved."""
+        """The largest proved rate of all Lyapunov functions; None if nothing decays or nothing was proved."""
         return max((V.proved_rate for V in self._rated if V.proved_rate > 0), default=None)
 
     @property
@@ -296,13 +304,13 @@ class Content:
 
     @property
     def fastest(self) -> LyapunovFunction:
-        """The function of the largest proved rate, and of those that share it the one of the least prefactor."""
-        return max(self._rated, key=lambda V: (V.proved_rate, -V.prefactor))
+        """The function of the largest proved rate, and of those that share it the least overshoot constant."""
+        return max(self._rated, key=lambda V: (V.proved_rate, -V.overshoot))
 
     @property
-    def prefactor(self) -> Fraction | None:
+    def overshoot(self) -> Fraction | None:
         """What multiplies the squared norm at the largest proved rate."""
-        return self.fastest.prefactor if self.rate is not None else None
+        return self.fastest.overshoot if self.rate is not None else None
 
     @property
     def upper_bound(self) -> Fraction | None:
@@ -332,25 +340,20 @@ class Content:
         return influence(self.structure) if self.matrix is None else self.matrix
 
     @property
-    def final_state(self) -> tuple[Interval, ...] | None:
-        """Middle and radius of a proved interval for each agent's state at the deadline; radius 0 where it is exact."""
-        return None if self.outcome is None else self.outcome.intervals
-
-    @property
     def degenerate(self) -> tuple[int, ...]:
         """1-based numbers of the balanced closed components that meet at 0."""
-        return () if self.outcome is None else self.outcome.degenerate
+        return () if self.final_state is None else self.final_state.degenerate
 
     @property
     def longest_way(self) -> float | None:
         """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
-        if self.start is None or self.outcome is None:
+        if self.start is None or self.final_state is None:
             return None
-        return float(np.abs(np.array([float(x) for x in self.start]) - self.outcome.values).max())
+        return float(np.abs(np.array([float(x) for x in self.start]) - self.final_state.values).max())
 
     @cached_property
     def envelope(self) -> Envelope:
-        """The proved bounds over time; without members if nothing was proved."""
+        """The proved bounds over time; without Lyapunov functions if nothing was proved."""
         gain = self.protocol.gain
         if (sliding := self.protocol.reaching) is not None:
             sigma0, reaching = self.sigma0 or (), self.reaching or ()
@@ -358,7 +361,7 @@ class Content:
         return Envelope(self.structure, gain, self.functions)
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the start.
+        """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the initial state.
 
         Under the sliding-mode protocol it holds whatever the disturbance.
 
@@ -379,8 +382,8 @@ class Content:
         """
         return self.envelope.norm_bound(remaining, self._known_start())
 
-    def outcome_distance(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Bound of ``|x_k(t) - x_k(T)|`` from the start, for every agent.
+    def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k(t) - x_k(T)|`` from the initial state, for every agent.
 
         Under the sliding-mode protocol it holds whatever the disturbance.
 
@@ -399,11 +402,11 @@ class Content:
         ParameterError
             The certificate has no start, or an instant is not from 0 to 1.
         """
-        return self.envelope.outcome_distance(remaining, self._known_start())
+        return self.envelope.deviation_bound(remaining, self._known_start())
 
     def _known_start(self) -> tuple[Fraction, ...]:
         if self.start is None:
-            raise ParameterError("the certificate has no start; certify the graph with x0")
+            raise ParameterError("the certificate has no initial state; certify the graph with x0")
         return self.start
 
     def best_possible_residual(self, remaining: float) -> float | None:
@@ -432,11 +435,11 @@ class Content:
             rate=self.rate,
             limit=self.upper_bound,
             start=self.start,
-            starts=self.starts,
+            initial_set=self.initial_set,
             sigma0=self.sigma0,
             reaching=None if self.reaching is None else [r.z for r in self.reaching],
             influence=self.influence,
-            distances=[None if V.deviation is None else V.deviation.agents for V in self.functions],
+            deviations=[None if V.deviation is None else V.deviation.agents for V in self.functions],
             limits=self.limits,
             delta=self.delta,
             noise=self.noise,
@@ -444,11 +447,11 @@ class Content:
         return bound_effort(asked)
 
     @cached_property
-    def worst_start(self) -> WorstStart | None:
-        """The start of the set ``starts`` from which the input gets largest (numerical); None without a set."""
-        if self.starts is None or self.graph.n_nodes > EXACT_NODES:
+    def worst_initial_state(self) -> WorstInitialState | None:
+        """The start of the set ``initial_set`` from which the input gets largest (numerical); None without a set."""
+        if self.initial_set is None or self.graph.n_nodes > EXACT_NODES:
             return None
-        return worst_start(self.structure, self.protocol, self.starts)
+        return worst_initial_state(self.structure, self.protocol, self.initial_set)
 
     # ------------------------------------------------------------------ proof
 
@@ -459,21 +462,23 @@ class Content:
             return self.source.obligations
         found = [Obligation("structure", "graph"), Obligation("claim", "graph")]
         if self.influence.exact:
-            found.append(Obligation("outcome", "graph", witness=outcome_witness(self.structure, self.influence)))
+            found.append(
+                Obligation("final-state", "graph", witness=final_state_witness(self.structure, self.influence))
+            )
         elif self.influence.enclosure is not None:
-            found.append(Obligation("outcome", "graph", witness=self.influence.enclosure.witness))
+            found.append(Obligation("final-state", "graph", witness=self.influence.enclosure.witness))
         found += self.proof.obligations if self.proof.rate is not None else ()
         for V in self.functions:
             if V.kind != "paper":
                 kind = "rate" if V.dominance is None else "dominance"
                 found.append(Obligation(kind, V.name, {"b": V.proved_rate}, V.dominance))
             if V.matrix is not None:
-                found.append(Obligation("prefactor", V.name, {"lowest": V.lowest, "highest": V.highest}))
+                found.append(Obligation("overshoot", V.name, {"lowest": V.lowest, "highest": V.highest}))
             if V.deviation is not None:
-                found.append(Obligation("distance", V.name))
+                found.append(Obligation("deviation", V.name))
         if self.limit is not None:
             witness = self.limit.witness(self.graph.labels)
-            found.append(Obligation(self.limit.kind, "rates", {"limit": self.limit.value}, witness))
+            found.append(Obligation(self.limit.kind, "rates", {"upper_bound": self.limit.value}, witness))
         if self.reaching is not None:
             found.append(Obligation("sliding-bound", "protocol"))
             if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
@@ -487,13 +492,13 @@ class Content:
     @cached_property
     def comparison(self) -> Comparison | None:
         """The simulated run against the proved bounds; None without a run, or if nothing was proved."""
-        if self.trajectory is None or not (self.envelope.members or self.protocol.reaching):
+        if self.trajectory is None or not (self.envelope.functions or self.protocol.reaching):
             return None
         return self.envelope.compare(self.trajectory)
 
     @property
     def disturbance(self) -> str | None:
-        """The disturbance of a repeated run: the one written down, if it is an expression, otherwise ``adversary``.
+        """The disturbance of a repeated run: the one written down, if it is an expression, otherwise ``worst-case``.
 
         None for the nominal protocol. No part of the claim, which holds for every disturbance within ``delta``.
         """
@@ -504,17 +509,18 @@ class Content:
         if self.source is not None:
             said = self.source.document["protocol"]["disturbance"]
         if said is None or said == "none":
-            return said or ADVERSARY
+            return said or WORST_CASE
         try:
             ExpressionDisturbance(said)
         except PTCCError:
-            return ADVERSARY
+            return WORST_CASE
         return said
 
     def simulate(self, **options: Any) -> Trajectory:
-        """Run the protocol again from the start with CVODES, without whatever limits of the gain were judged.
+        """Run the protocol again from the initial state with CVODES, without whatever limits of the gain were judged.
 
-        Under the sliding-mode protocol with :attr:`disturbance`; with the adversary where that exceeds ``delta``.
+        Under the sliding-mode protocol with :attr:`disturbance`; with the worst-case disturbance where that exceeds
+        ``delta``.
 
         Parameters
         ----------
@@ -540,9 +546,9 @@ class Content:
         try:
             return simulate(self.graph, self.protocol, start, disturbance=self.disturbance, **options)
         except ParameterError:
-            if self.disturbance == ADVERSARY:
+            if self.disturbance == WORST_CASE:
                 raise
-            return simulate(self.graph, self.protocol, start, disturbance=ADVERSARY, **options)
+            return simulate(self.graph, self.protocol, start, disturbance=WORST_CASE, **options)
 
     def with_simulation(self, **options: Any) -> Self:
         """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.

@@ -1,4 +1,4 @@
-"""The JSON of a certificate, schema ``ptcc-certificate/1``: written and read section by section.
+"""The JSON of a certificate, schema ``ptcc-certificate/2``: written and read section by section.
 
 ``FORMAT.md`` specifies it. What is read was accepted by the independent check, so that every part is there; nothing
 that is claimed is taken from the key ``unverified``.
@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.enclosed_state import rounding_radius
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.final_state import Outcome
+from ptcc_certify.bounds.final_state import FinalState
+from ptcc_certify.bounds.final_state_enclosure import rounding_radius
 from ptcc_certify.bounds.input import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
 from ptcc_certify.certificate.content import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import read_effort
@@ -35,13 +35,13 @@ from ptcc_certify.certificate.vectors import (
     text,
 )
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
-from ptcc_certify.checker.input_bounds import Limits, Starts
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
-from ptcc_certify.checker.vectors import beside
+from ptcc_certify.checker.side_vectors import beside
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
-from ptcc_certify.lyapunov.function import DistanceBound, Dominance, LyapunovBlock, LyapunovFunction
-from ptcc_certify.lyapunov.rate_bound import RateLimit
+from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
+from ptcc_certify.lyapunov.rate_upper_bound import RateBound
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
@@ -54,8 +54,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     """Return a certificate as JSON-ready data, and what holds its side files."""
     graph, structure = content.graph, content.structure
     out = Writer(graph.labels, files)
-    outcome = _write_outcome(content, out)
-    final = None if outcome is None else outcome["final_state"]
+    influence, final = _write_final_state(content, out)
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": producer(),
@@ -64,19 +63,20 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         **claim_sections(structure, content.claims, final, out),
         "protocol": _write_protocol(content),
         "paper": _write_paper(content),
-        "lyapunov": {"members": [_write_function(V, out) for V in content.functions]},
+        "lyapunov": {"functions": [_write_function(V, out) for V in content.functions]},
         "rates": {
             "paper": text(content.paper_rate),
             "diagonal": text(content.diagonal_rate),
-            "certified": text(content.rate),
-            "limit": text(content.upper_bound),
+            "proved": text(content.rate),
+            "upper_bound": text(content.upper_bound),
         },
-        "prefactor": _write_prefactor(content),
+        "overshoot": _write_overshoot(content),
         "initial_state": out.state("start", content.start),
-        "sigma0": out.state("sigma", content.sigma0),
-        "outcome": outcome,
+        "sliding_variable": out.state("sigma", content.sigma0),
+        "influence": influence,
+        "final_state": final,
         "reaching_time": _write_reaching(content),
-        "effort": effort_section(content.effort, graph.labels, format_exact),
+        "input": effort_section(content.effort, graph.labels, format_exact),
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
@@ -89,30 +89,30 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
     structure, protocol, data = analyse(graph), _read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
     proof = tuple(_read_obligation(step) for step in document["proof"])
     steps = {(step.kind, step.of): step for step in proof}
-    paper, functions = document["paper"], document["lyapunov"]["members"]
-    members = [
-        _read_function(f"lyapunov.members[{k}]", said, structure, data, steps) for k, said in enumerate(functions)
+    paper, functions = document["paper"], document["lyapunov"]["functions"]
+    functions = [
+        _read_function(f"lyapunov.functions[{k}]", said, structure, data, steps) for k, said in enumerate(functions)
     ]
-    lyapunov = next((replace(V, objective=paper["objective"]) for V in members if V.kind == "paper"), None)
+    lyapunov = next((replace(V, objective=paper["objective"]) for V in functions if V.kind == "paper"), None)
     start, ends = data.state(document["initial_state"]), None
     if paper is not None and paper["rho_interval"] is not None:
         ends = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
-    effort = read_effort(document["effort"], start, structure, protocol, data, steps)
+    effort = read_effort(document["input"], start, structure, protocol, data, steps)
     return {
         "structure": structure,
         "protocol": protocol,
         "start": start,
-        "sigma0": data.state(document["sigma0"]),
+        "sigma0": data.state(document["sliding_variable"]),
         "reaching": _read_reaching(document["reaching_time"], protocol),
         "lyapunov": lyapunov,
         "proof": RateProof(
             None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), ends
         ),
-        "sharper": tuple(V for V in members if V.kind != "paper"),
+        "sharper": tuple(V for V in functions if V.kind != "paper"),
         "limit": _read_limit(steps, data),
-        "outcome": _read_outcome(document["outcome"], structure, data),
+        "final_state": _read_final_state(document, structure, data),
         "matrix": None,
-        "request": _read_request(document["unverified"], None if effort is None else effort.starts),
+        "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof),
     }
@@ -169,13 +169,13 @@ def _write_paper(content: Content) -> dict[str, Any] | None:
         "rho": text(V.rho),
         "rho_interval": interval and {"printed": text(interval.printed), "exact": text(interval.exact)},
         "rate": text(V.rate),
-        "prefactor": format_exact(V.prefactor) if V.blocks else None,
+        "overshoot": format_exact(V.overshoot) if V.blocks else None,
     }
 
 
 def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
     where = Writer(out.labels) if V.kind == "paper" else out  # as the section "paper" has it
-    distance = V.deviation and {
+    deviation = V.deviation and {
         "agents": dict(zip(out.labels, map(format_exact, V.deviation.agents), strict=True)),
         "norm": format_exact(V.deviation.norm),
     }
@@ -185,8 +185,8 @@ def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
         "blocks": [_write_block(block, where) for block in V.blocks],
         "rho": text(V.rho),
         "rate": text(V.rate),
-        "prefactor": format_exact(V.prefactor),
-        "distance": distance,
+        "overshoot": format_exact(V.overshoot),
+        "deviation": deviation,
     }
 
 
@@ -197,7 +197,7 @@ def _read_function(
     data: Reader,
     steps: Mapping[tuple[str, str], Obligation],
 ) -> LyapunovFunction:
-    given, full, rows = said["distance"], steps.get(("prefactor", name)), steps.get(("dominance", name))
+    given, full, rows = said["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
     blocks = tuple(_read_block(block, data, rows is not None) for block in said["blocks"])
     gauge = structure.closed_components[0].gauge if said["coordinates"] == "eps" else ()
     return LyapunovFunction(
@@ -209,7 +209,7 @@ def _read_function(
         None if full is None else (full.numbers["lowest"], full.numbers["highest"]),
         gauge or (),
         dominance=None if rows is None else Dominance(data.floats(rows.witness["vector"], len(blocks[0].nodes))),
-        deviation=None if given is None else DistanceBound(data.agents(given["agents"]), exact(given["norm"])),
+        deviation=None if given is None else DeviationBound(data.agents(given["agents"]), exact(given["norm"])),
         name=name,
     )
 
@@ -234,91 +234,97 @@ def _read_block(said: Mapping[str, Any], data: Reader, large: bool) -> LyapunovB
     return LyapunovBlock(said["name"], nodes, tuple(map(exact, said["diagonal"])), said["times_rho"])
 
 
-def _write_prefactor(content: Content) -> dict[str, Any] | None:
+def _write_overshoot(content: Content) -> dict[str, Any] | None:
     if content.rate is None:
         return None
     V = content.fastest
-    return {"value": format_exact(V.prefactor), "of": f"||{V.coordinates}||^2"}
+    return {"value": format_exact(V.overshoot), "of": f"||{V.coordinates}||^2"}
 
 
-def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> RateLimit | None:
-    step = steps.get(("rate-limit", "rates")) or steps.get(("rate-mean", "rates"))
+def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> RateBound | None:
+    step = steps.get(("rate-upper-bound", "rates")) or steps.get(("rate-mean", "rates"))
     if step is None:
         return None
-    value, said = step.numbers["limit"], step.witness
+    value, said = step.numbers["upper_bound"], step.witness
     if "node" in said:
-        return RateLimit(value, data.nodes([said["node"]]))
+        return RateBound(value, data.nodes([said["node"]]))
     form, vectors = triangle(said["lower_triangle"], len(said["nodes"])), said["vectors"]
-    return RateLimit(value, data.nodes(said["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
+    return RateBound(value, data.nodes(said["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
 
 
 # ---------------------------------------------------------------------- final state
 
 
-def _write_outcome(content: Content, out: Writer) -> dict[str, Any] | None:
-    """Write the outcome with the influence of every leader, exact or in balls; None if it is floating point."""
+def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
     if content.influence.exact:
-        return _exact_outcome(content)
-    return None if content.influence.enclosure is None else _enclosed_outcome(content, out)
+        return _exact_final_state(content)
+    return (None, None) if content.influence.enclosure is None else _enclosed_final_state(content, out)
 
 
-def _exact_outcome(content: Content) -> dict[str, Any]:
+def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
     matrix, structure, labels = content.influence, content.structure, content.graph.labels
-    voices, pulls = influence_balls(matrix)
-    section: dict[str, Any] = {"final_state": None, "degenerate": None}
-    if content.outcome is not None and content.start is not None:
+    left_null_vectors, containment_weights = influence_balls(matrix)
+    ends: dict[str, Any] | None = None
+    degenerate: list[int] | None = None
+    if content.final_state is not None and content.start is not None:
         gone = content.sigma0 or [Fraction(0)] * len(labels)
         moved = [x - s for x, s in zip(content.start, gone, strict=True)]
         final: list[Interval] = [(Fraction(0), Fraction(0))] * len(labels)
         values = []
-        for component, voice in zip(matrix.balanced, voices, strict=True):
-            middle = sum((w * moved[v] for v, (w, _) in zip(component.nodes, voice, strict=True)), Fraction(0))
-            radius = sum((r * abs(moved[v]) for v, (_, r) in zip(component.nodes, voice, strict=True)), Fraction(0))
+        for component, null_vector in zip(matrix.balanced, left_null_vectors, strict=True):
+            middle = sum((w * moved[v] for v, (w, _) in zip(component.nodes, null_vector, strict=True)), Fraction(0))
+            radius = sum(
+                (r * abs(moved[v]) for v, (_, r) in zip(component.nodes, null_vector, strict=True)), Fraction(0)
+            )
             values.append((middle, radius))
             for v, sign in zip(component.nodes, component.gauge or (), strict=True):
                 final[v] = (sign * middle, radius)
-        for v, row in zip(structure.followers.tolist(), pulls, strict=True):
+        for v, row in zip(structure.followers.tolist(), containment_weights, strict=True):
             pairs = list(zip(row, values, strict=True))
             middle = sum((w * x for (w, _), (x, _) in pairs), Fraction(0))
             final[v] = (middle, sum((abs(w) * s + r * abs(x) + r * s for (w, r), (x, s) in pairs), Fraction(0)))
-        section["final_state"] = {label: interval_text(x) for label, x in zip(labels, final, strict=True)}
-        section["degenerate"] = list(content.outcome.degenerate)
-    section["influence"] = {
+        ends = {label: interval_text(x) for label, x in zip(labels, final, strict=True)}
+        degenerate = list(content.final_state.degenerate)
+    section = {
         "components": [
-            {"nodes": [labels[v] for v in c.nodes], "voices": [interval_text(w) for w in voice]}
-            for c, voice in zip(matrix.balanced, voices, strict=True)
+            {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
+            for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
         ],
-        "followers": {
+        "containment_weights": {
             labels[v]: [interval_text(w) for w in row]
-            for v, row in zip(structure.followers.tolist(), pulls, strict=True)
+            for v, row in zip(structure.followers.tolist(), containment_weights, strict=True)
         },
+        "degenerate": degenerate,
     }
-    return section
+    return section, ends
 
 
-def _enclosed_outcome(content: Content, out: Writer) -> dict[str, Any]:
-    """Write the outcome of a large graph: voices of leader groups, and the final state in intervals."""
-    labels, matrix, found = content.graph.labels, content.influence, content.outcome
+def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Write the final state of a large graph: left null vector of leader groups, and the final state in intervals."""
+    labels, matrix, found = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
     final: dict[str, Any] | None = None
     if found is not None and found.radius is not None:
-        pairs = list(zip(found.final_state, found.radius, strict=True))
+        pairs = list(zip(found.states, found.radius, strict=True))
         if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
             radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
             final = {"mid": out.vector("mid", found.values), "radius": out.vector("radius", np.array(radius))}
         else:
             final = {label: _enclosed_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
-    for k, (component, voice) in enumerate(zip(matrix.balanced, matrix.voices, strict=True)):
-        if k in matrix.enclosure.voices:
-            middles, radii = (x.tolist() for x in matrix.enclosure.voices[k])
-            voices: list[Any] = [{"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)]
+    for k, (component, null_vector) in enumerate(zip(matrix.balanced, matrix.left_null_vectors, strict=True)):
+        if k in matrix.enclosure.left_null_vectors:
+            middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
+            left_null_vectors: list[Any] = [
+                {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
+            ]
         else:
-            voices = [exact_or_ball(Fraction(w)) for w in voice]
+            left_null_vectors = [exact_or_ball(Fraction(w)) for w in null_vector]
         if len(component.nodes) > 1:
-            groups.append({"nodes": [labels[v] for v in component.nodes], "voices": voices})
+            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vectors})
     degenerate = None if found is None else list(found.degenerate)
-    return {"final_state": final, "degenerate": degenerate, "influence": {"components": groups, "followers": None}}
+    return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
 
 
 def _enclosed_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
@@ -329,17 +335,17 @@ def _enclosed_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str
     return {"mid": format_exact(x), "radius": format_exact(radius)}
 
 
-def _read_outcome(said: Mapping[str, Any] | None, structure: Structure, data: Reader) -> Outcome | None:
-    if said is None or said["final_state"] is None:
+def _read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:
+    final = document["final_state"]
+    if final is None:
         return None
-    final = said["final_state"]
     if list(final) == ["mid", "radius"] and beside(final["mid"]):
         middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
     else:
         middle, radius = zip(*map(interval, final.values()), strict=True)
     values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
     spread = radius if any(radius) else None
-    return Outcome(structure.graph.labels, middle, tuple(values), tuple(said["degenerate"] or ()), spread)
+    return FinalState(structure.graph.labels, middle, tuple(values), tuple(document["influence"]["degenerate"]), spread)
 
 
 # ---------------------------------------------------------------------- proof
@@ -362,7 +368,7 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     return {
         "kind": obligation.kind,
         "of": obligation.of,
-        "statement": obligation.statement,
+        "proves": obligation.statement,
         "lemma": obligation.lemma,
         "numbers": {name: format_exact(value) for name, value in obligation.numbers.items()},
         "witness": witness,
@@ -408,12 +414,12 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
 
 
 def _write_unverified(content: Content) -> dict[str, Any]:
-    search, envelope = content.sharpening, content.envelope
+    search, envelope = content.search, content.envelope
     remaining = (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
     residual = {str(1 - q if q > 1e-3 else f"1-{q:g}"): q for q in remaining}
     floats = None
-    if content.outcome is not None and not content.outcome.exact:
-        floats = dict(zip(content.graph.labels, map(finite, content.outcome.values.tolist()), strict=True))
+    if content.final_state is not None and not content.final_state.exact:
+        floats = dict(zip(content.graph.labels, map(finite, content.final_state.values.tolist()), strict=True))
     return {
         "spectral": finite(content.spectral_rate),
         "optimality_ratio": content.optimality_ratio,
@@ -447,7 +453,7 @@ def _write_run(content: Content) -> dict[str, Any] | None:
         "ratios": {str(k): finite(v) for k, v in seen.ratios.items()},
         "stop": seen.stop,
         "tolerances": {"relative": seen.tolerance},
-        "distance_ratio": finite(seen.distance_ratio),
+        "deviation_ratio": finite(seen.deviation_ratio),
         "deadline_resolved": seen.deadline_resolved,
     }
     if run is None or run.sliding is None:
@@ -478,7 +484,7 @@ def _write_asked(request: Request) -> dict[str, Any]:
     }
 
 
-def _read_request(unverified: Mapping[str, Any], starts: Starts | None) -> Request:
+def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
     """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
     asked, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
     asked = asked if isinstance(asked, dict) else {}
@@ -493,7 +499,7 @@ def _read_request(unverified: Mapping[str, Any], starts: Starts | None) -> Reque
     ]
     return Request(
         method=method if method in METHODS else "best",
-        starts=starts,
+        initial_set=initial_set,
         limits=tuple(Limits(*entry) for entry in each if any(entry)),
         delta=_positive(asked, "delta"),
         noise=_positive(asked, "noise"),

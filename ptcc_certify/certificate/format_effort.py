@@ -10,11 +10,11 @@ from ptcc_certify.bounds.input import (
     Disturbed,
     Effort,
     EnergyIntegral,
+    InitialSet,
     Limited,
     Limits,
     Peak,
     SlidingPart,
-    Starts,
     Witness,
     first_input,
 )
@@ -36,23 +36,23 @@ def read_effort(
     data: Reader,
     steps: Steps,
 ) -> Effort | None:
-    """Read the section ``effort``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
+    """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
     if said is None:
         return None
-    starts, sliding, threshold = _starts(said["starts"], data), said["sliding"], said["threshold"]
-    region = starts or (None if start is None else Starts(start))
+    initial_set, sliding, threshold = _starts(said["initial_set"], data), said["sliding"], said["threshold"]
+    region = initial_set or (None if start is None else InitialSet(start))
     return Effort(
         bounded=said["bounded"],
-        by=None if said["bounded"] is None else steps["input-threshold", "effort"].witness,
+        by=None if said["bounded"] is None else steps["input-threshold", "input"].witness,
         threshold=(number(threshold["lower"]), number(threshold["upper"])),
-        starts=starts,
+        initial_set=initial_set,
         constants=tuple(map(data.state, said["constants"])),
         peak=_peak(said["peak"], data, steps),
         energy=_energy(said["energy"], steps),
         path_length=_witness(said["path_length"], "input-length", steps),
         sliding=None if sliding is None else SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
-            _limited(entry, steps["limited-gain", f"effort.residual[{k}]"], data)
+            _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
             for k, entry in enumerate(said["residual"])
         ),
         disturbed=_disturbed(said["disturbed"], data, steps),
@@ -60,22 +60,22 @@ def read_effort(
     )
 
 
-def _starts(said: Said | None, data: Reader) -> Starts | None:
+def _starts(said: Said | None, data: Reader) -> InitialSet | None:
     if said is None:
         return None
     axes = tuple(map(data.agents, said.get("axes", ())))
-    return Starts(data.agents(said["center"]), () if axes else data.agents(said["radius"]), axes)
+    return InitialSet(data.agents(said["center"]), () if axes else data.agents(said["radius"]), axes)
 
 
 def _witness(said: str | None, kind: str, steps: Steps) -> Witness | None:
     if said is None:
         return None
-    step = steps[kind, "effort"]
+    step = steps[kind, "input"]
     return Witness(exact(said), step.witness, step.numbers["z"])
 
 
 def _energy(said: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
-    step = steps.get(("input-energy", "effort"))
+    step = steps.get(("input-energy", "input"))
     if said is None or step is None or not isinstance(step.witness, dict):
         return _witness(said, "input-energy", steps)
     first, second = (triangle(step.witness[key], len(step.witness[key])) for key in ("W0", "W1"))
@@ -86,7 +86,7 @@ def _energy(said: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
 def _peak(said: Said | None, data: Reader, steps: Steps) -> Peak | None:
     if said is None:
         return None
-    step = steps["input-peak", "effort"]
+    step = steps["input-peak", "input"]
     agents, norm = data.agents(said["agents"]), exact(said["norm"])
     how = step.witness["agents"].values()
     return Peak(
@@ -103,13 +103,13 @@ def _limited(said: Said, step: Obligation, data: Reader) -> Limited:
     return Limited(
         limits=Limits(*(number(said[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
         clock=exact(said["clock"]),
-        member=first,
+        function=first,
         growth=step.numbers["growth"],
         norm=exact(said["norm"]),
         agents=data.state(said["agents"]),
         largest=number(said["largest"]),
         noise=number(noise.get("bound")),
-        noise_member=second,
+        noise_function=second,
         noisy_norm=number(noise.get("norm")),
         noisy_largest=number(noise.get("largest")),
     )
@@ -118,5 +118,5 @@ def _limited(said: Said, step: Obligation, data: Reader) -> Limited:
 def _disturbed(said: Said | None, data: Reader, steps: Steps) -> Disturbed | None:
     if said is None:
         return None
-    member = steps["nominal-disturbed", "effort"].witness
-    return Disturbed(exact(said["delta"]), member, data.agents(said["inputs"]), data.state(said["drift"]))
+    function = steps["nominal-disturbed", "input"].witness
+    return Disturbed(exact(said["delta"]), function, data.agents(said["inputs"]), data.state(said["drift"]))

@@ -12,7 +12,7 @@ import numpy as np
 from ptcc_certify.certificate.vectors import Writer
 from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.reading import exact
-from ptcc_certify.checker.vectors import SideFiles
+from ptcc_certify.checker.side_vectors import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.claims import Claim
@@ -125,7 +125,7 @@ def _claim(claim: Claim) -> dict[str, Any]:
 
 
 def _components(structure: Structure, claims: Sequence[Claim], final: Mapping[str, Any] | None, out: Writer) -> Any:
-    """Return connectivity, claim and outcome of every weak component, in arrays if there are many."""
+    """Return connectivity, claim and final state of every weak component, in arrays if there are many."""
     components, labels = structure.components, structure.graph.labels
     if len(components) > MANY_COMPONENTS:
         return {
@@ -144,7 +144,7 @@ def _components(structure: Structure, claims: Sequence[Claim], final: Mapping[st
             "nodes": [labels[v] for v in c.nodes],
             "connectivity": c.connectivity,
             "claim": _claim(claim),
-            "outcome": final and {labels[v]: final[labels[v]] for v in c.nodes},
+            "final_state": final and {labels[v]: final[labels[v]] for v in c.nodes},
         }
         for c, claim in zip(components, claims, strict=True)
     ]

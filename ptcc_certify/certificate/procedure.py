@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from lmi import deadline
-from lmi.apart import apart
-from lmi.deadline import share_of_time
+from lmi import search_time as deadline
+from lmi.child_process import apart
 from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
-from ptcc_certify.bounds.enclosed_state import NotEnclosedError, enclose, enclosed_outcome
+from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import Influence, Outcome, influence, outcome
+from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
+from ptcc_certify.bounds.final_state_enclosure import NotEnclosedError, enclose, enclosed_final_state
 from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.content import Observations
@@ -34,8 +34,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.lyapunov.rate_bound import RateLimit, mean_limit, prove_rate_limit
-from ptcc_certify.lyapunov.search import APART_NODES, Sharpening, sharpen, sharpen_large
+from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
+from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.simulation.filippov import rounding_slack
@@ -51,8 +51,8 @@ STEPS = (
     "simulation",
     "the paper's certificate",
     "sharper certificates",
-    "limit of rates",
-    "outcome",
+    "upper bound on the decay rate",
+    "final state",
     "independent check",
 )
 #: Below this time limit, in seconds, the solver is loaded before the time begins to run.
@@ -64,7 +64,7 @@ SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
 SEARCH_NODES = 150
 #: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
 SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
-#: A simulated end state is settled when it is this near to the outcome, relative to the start.
+#: A simulated end state is settled when it is this near to the final state, relative to the initial state.
 SETTLED = 1e-6
 
 
@@ -78,7 +78,7 @@ def certify(
     simulation: bool | None = None,
     method: str = "best",
     at: Any = None,
-    starts: Any = None,
+    initial_set: Any = None,
     limits: Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
@@ -99,7 +99,7 @@ def certify(
         simulation.
     sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
-        outcome.
+        final state.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.run.simulate`.
     simulation : bool, optional
@@ -108,8 +108,8 @@ def certify(
         Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.lyapunov.search`.
     at : number, optional
         An instant before the deadline, in units of time, at which the bound should be smallest.
-    starts : Starts or positive number, optional
-        The set of starts for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
+    initial_set : InitialSet or positive number, optional
+        The set of initial states for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
         ``||X(0)||_inf <= R``.
     limits : sequence of Actuator
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
@@ -150,17 +150,17 @@ def certify(
     >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
     >>> cert
     Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified)
-    >>> cert.outcome
-    Outcome(1=-1, 2=1)
+    >>> cert.final_state
+    FinalState(1=-1, 2=1)
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
     >>> cert, cert.reaching
     (Certificate(bipartite consensus, Theorem 4.1, rate 3.99999, certified), (ReachingTime(0.43409, 0.565 before T_r), \
 ReachingTime(0, 1 before T_r)))
-    >>> cert.outcome
-    Outcome(1=-1.5, 2=1.5)
+    >>> cert.final_state
+    FinalState(1=-1.5, 2=1.5)
     """
-    asked = {"method": method, "at": at, "starts": starts, "limits": limits, "delta": delta, "noise": noise}
+    asked = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
     request = read_request(structure, protocol, {**asked, "time_limit": time_limit, "expectations": expectations})
@@ -177,10 +177,10 @@ ReachingTime(0, 1 before T_r)))
     with deadline.time_limit(SEARCHING * request.time_limit):
         trajectory = case.simulation(disturbance) if runs else None
         lyapunov, proof, numerical = case.paper()
-        sharpening = case.sharper(proof)
+        search = case.sharper(proof)
         limit = case.upper_bound()
     matrix, result = case.final_state(trajectory)
-    proved = [proof.rate, *(V.rate for V in sharpening.members)]
+    proved = [proof.rate, *(V.rate for V in search.functions)]
     certificate = Certificate(
         structure=structure,
         protocol=protocol,
@@ -189,16 +189,16 @@ ReachingTime(0, 1 before T_r)))
         reaching=reaching,
         lyapunov=lyapunov,
         proof=proof,
-        sharper=sharpening.members,
+        sharper=search.functions,
         limit=limit,
-        outcome=result,
+        final_state=result,
         matrix=matrix,
         request=request,
         observed=Observations(
             trajectory=trajectory,
             numerical_rate=numerical,
             spectral_rate=_spectral_rate(structure, proved, case.notes),
-            search=replace(sharpening, members=()),
+            search=replace(search, functions=()),
             cut_off=tuple(case.cut_off),
             notes=tuple(case.notes),
         ),
@@ -258,7 +258,7 @@ class Case:
         return asked is not False
 
     def simulation(self, disturbance: Any) -> Trajectory | None:
-        """Run the protocol from the start with CVODES."""
+        """Run the protocol from the initial state with CVODES."""
         graph = self.structure.graph
         self.progress(STEPS[0])
         more: dict[str, Any] = {"samples": FEW_SAMPLES} if graph.n_nodes > SIMULATED_NODES else {}
@@ -281,26 +281,26 @@ class Case:
             )
         return None if V is None else replace(V, rate=proof.rate, numerical_rate=numerical), proof, numerical
 
-    def sharper(self, paper: RateProof) -> Sharpening:
+    def sharper(self, paper: RateProof) -> Search:
         """Search and prove sharper Lyapunov functions."""
         self.progress(STEPS[2])
-        found = Sharpening()
+        found = Search()
         with share_of_time(SHARES[2], STEPS[2], self.cut_off):
             found = _sharpen(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
             self.cut_off += found.cut_off
-        if paper.rate is None and not any(V.proved_rate > 0 for V in found.members) and self.structure.graph.n_edges:
+        if paper.rate is None and not any(V.proved_rate > 0 for V in found.functions) and self.structure.graph.n_edges:
             self.notes.insert(0, _precision_note(self.structure.graph))
         return found
 
-    def upper_bound(self) -> RateLimit | None:
+    def upper_bound(self) -> RateBound | None:
         """Prove the upper bound on the decay rate."""
         self.progress(STEPS[3])
-        mean = mean_limit(self.structure)
+        mean = mean_bound(self.structure)
         with share_of_time(SHARES[3], STEPS[3], self.cut_off):
-            return prove_rate_limit(self.structure)
+            return prove_rate_bound(self.structure)
         return mean  # which stands if time ran out
 
-    def final_state(self, run: Trajectory | None) -> tuple[Influence, Outcome | None]:
+    def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
         structure, matrix, start = self.structure, influence(self.structure), self.start
@@ -310,17 +310,17 @@ class Case:
         if not matrix.exact:
             try:
                 enclosed = replace(matrix, enclosure=enclose(structure, matrix))
-                result = None if moved is None else enclosed_outcome(structure, enclosed, moved)
+                result = None if moved is None else enclosed_final_state(structure, enclosed, moved)
                 matrix = enclosed
             except NotEnclosedError as error:
-                self.notes.append(f"the outcome is floating point only: {error}")
+                self.notes.append(f"the final state is floating point only: {error}")
         if result is None and moved is not None:
-            result = outcome(structure, moved, matrix=matrix)
+            result = final_state(structure, moved, matrix=matrix)
         if run is not None and result is not None:
             gap = float(np.abs(run.final_state - result.values).max())
             if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
                 self.notes.append(
-                    f"the simulated run is still {gap:.1e} from the outcome: its slowest modes had not settled"
+                    f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
         return matrix, result
 
@@ -364,17 +364,15 @@ def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
     return [theorem.lyapunov(structure)]
 
 
-def _sharpen(
-    structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
-) -> Sharpening:
+def _sharpen(structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]) -> Search:
     """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
     gain = protocol.gain
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
     if structure.graph.n_nodes <= EXACT_NODES:
-        found = sharpen(ErrorSystem(structure), method, clocks, own)
+        found = search_functions(ErrorSystem(structure), method, clocks, own)
     else:
-        found = sharpen_large(structure, method, clocks if own is None else [*clocks, own])
+        found = search_large(structure, method, clocks if own is None else [*clocks, own])
     notes.extend(found.notes)
     return found
 

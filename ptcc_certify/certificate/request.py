@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import MAX_SCALE_BITS
-from ptcc_certify.bounds.final_state import exact_start
-from ptcc_certify.bounds.input import Limits, Starts, starts_within
+from ptcc_certify.bounds.final_state import exact_initial_state
+from ptcc_certify.bounds.input import InitialSet, Limits, initial_set_within
 from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -22,11 +22,11 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.gain import parameter
-from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 from ptcc_certify.theorems.lemmas import EXACT_NODES
 
-#: Largest entry of a start, in size: outcomes and trajectories are also reported as floats.
+#: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000
@@ -57,7 +57,7 @@ class Expectations:
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
     >>> print(certify(pair, protocol, expectations=asked).assessment.text)
-    refuted: rate >= 5 (none exceeds 4, proved); certified; met: bipartite consensus
+    refuted: rate >= 5 (upper bound 4, proved); certified; met: bipartite consensus
     """
 
     behaviour: str | None = None
@@ -75,8 +75,8 @@ class Request:
         Which Lyapunov functions are searched.
     at : Fraction or None
         Instant for which the bound was optimised, in units of time.
-    starts : Starts or None
-        The set of starts for which the input is bounded; None: that of the initial state alone.
+    initial_set : InitialSet or None
+        The set of initial states for which the input is bounded; None: that of the initial state alone.
     limits : tuple of Limits
         Limits of the gain that are judged besides.
     delta : Fraction or None
@@ -91,7 +91,7 @@ class Request:
 
     method: str = "best"
     at: Fraction | None = None
-    starts: Starts | None = None
+    initial_set: InitialSet | None = None
     limits: tuple[Limits, ...] = ()
     delta: Fraction | None = None
     noise: Fraction | None = None
@@ -121,7 +121,7 @@ def read_request(structure: Structure, protocol: Protocol, asked: Mapping[str, A
     request = Request(
         method=asked["method"],
         at=None if asked["at"] is None else _instant(asked["at"], protocol),
-        starts=_starts(structure, asked["starts"]),
+        initial_set=_starts(structure, asked["initial_set"]),
         limits=tuple(_limits(entry, protocol) for entry in asked["limits"]),
         time_limit=60 + n / 1000 if seconds is None else seconds,
         expectations=asked["expectations"] or Expectations(),
@@ -145,26 +145,26 @@ def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     return limits
 
 
-def _starts(structure: Structure, starts: Any) -> Starts | None:
-    """Return a set of starts, or refuse it."""
-    if starts is None:
+def _starts(structure: Structure, initial_set: Any) -> InitialSet | None:
+    """Return a set of initial states, or refuse it."""
+    if initial_set is None:
         return None
-    if not isinstance(starts, Starts):
-        return starts_within(structure, starts)
+    if not isinstance(initial_set, InitialSet):
+        return initial_set_within(structure, initial_set)
     n = structure.graph.n_nodes
-    for name, vector in (("center", starts.center), ("radius", starts.radius or starts.center)):
+    for name, vector in (("center", initial_set.center), ("radius", initial_set.radius or initial_set.center)):
         if len(vector) != n:
             raise ParameterError(f"{name} of the starts has {len(vector)} entries for {n} agents")
-    if any(len(axis) != n for axis in starts.axes):
+    if any(len(axis) != n for axis in initial_set.axes):
         raise ParameterError(f"an axis of the starts has another number of entries than {n} agents")
-    if starts.radius and starts.axes:
-        raise ParameterError("starts have a radius, for a box, or axes, for an ellipsoid; leave one out")
-    if any(r < 0 for r in starts.radius):
-        raise ParameterError("a radius of the starts is negative")
-    numbers = [x for vector in (starts.center, starts.radius, *starts.axes) for x in vector]
+    if initial_set.radius and initial_set.axes:
+        raise ParameterError("initial states have a radius, for a box, or axes, for an ellipsoid; leave one out")
+    if any(r < 0 for r in initial_set.radius):
+        raise ParameterError("a radius of the initial states is negative")
+    numbers = [x for vector in (initial_set.center, initial_set.radius, *initial_set.axes) for x in vector]
     if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
-        raise ParameterError("the starts are beyond 1e300, or have too many digits to keep")
-    return starts
+        raise ParameterError("the initial states are beyond 1e300, or have too many digits to keep")
+    return initial_set
 
 
 def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
@@ -204,7 +204,7 @@ def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[
 
 def initial_state(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
     """Return ``X(0)`` or ``sigma(0)`` in rationals, or refuse it."""
-    start = tuple(exact_start(structure, values, name))
+    start = tuple(exact_initial_state(structure, values, name))
     for label, value in zip(structure.graph.labels, start, strict=True):
         if abs(value) > LARGEST_STATE:
             raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")

@@ -14,7 +14,7 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.reading import exact
-from ptcc_certify.checker.vectors import SideFiles, beside
+from ptcc_certify.checker.side_vectors import SideFiles, beside
 from ptcc_certify.graphs.rationals import format_exact, writable
 from ptcc_certify.graphs.structure import Structure
 
@@ -180,12 +180,12 @@ def _ball_text(interval: Interval) -> dict[str, str]:
 
 
 def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:
-    """Return voices and pulls as intervals: of radius 0, but for those of a component that are too long to write."""
-    voices = [_balls([Fraction(w) for w in voice]) for voice in matrix.voices]
-    rows = matrix.pulls or ()
-    columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.voices))]
-    pulls = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
-    return voices, pulls
+    """Return left null vectors and containment weights as intervals: of radius 0, unless too long to write."""
+    left_null_vectors = [_balls([Fraction(w) for w in null_vector]) for null_vector in matrix.left_null_vectors]
+    rows = matrix.containment_weights or ()
+    columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.left_null_vectors))]
+    containment_weights = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
+    return left_null_vectors, containment_weights
 
 
 def _balls(values: Sequence[Fraction]) -> list[Interval]:
@@ -195,21 +195,21 @@ def _balls(values: Sequence[Fraction]) -> list[Interval]:
     return [(Fraction(round(x * unit), unit), _RADIUS) for x in values]
 
 
-def outcome_witness(structure: Structure, matrix: Influence) -> tuple[Fraction, ...] | None:
+def final_state_witness(structure: Structure, matrix: Influence) -> tuple[Fraction, ...] | None:
     """Return ``u > 0`` with ``M u > 0`` on followers and on leader groups less one agent, if balls need it.
 
     ``M`` is the comparison matrix of ``L_F``, and that of ``L_k`` transposed. From it follows how far a ball's middle
     may be from the truth.
     """
-    voices, pulls = influence_balls(matrix)
-    if not any(r for row in (*voices, *pulls) for _, r in row):
+    left_null_vectors, containment_weights = influence_balls(matrix)
+    if not any(r for row in (*left_null_vectors, *containment_weights) for _, r in row):
         return None
     u = np.ones(structure.graph.n_nodes)
     L = structure.graph.laplacian().toarray()
     M = np.diag(np.diag(L)) * 2 - np.abs(L)
     groups = [(structure.followers.tolist(), M)]
-    for component, voice in zip(matrix.balanced, voices, strict=True):
-        top = max(range(len(voice)), key=lambda i: abs(voice[i][0]))
+    for component, null_vector in zip(matrix.balanced, left_null_vectors, strict=True):
+        top = max(range(len(null_vector)), key=lambda i: abs(null_vector[i][0]))
         groups.append(([v for i, v in enumerate(component.nodes) if i != top], M.T))
     for nodes, block in groups:
         if nodes:

@@ -22,11 +22,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from lmi.exact.rounding import down, near, up
+from lmi.exact.directed_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.content import Content
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.input_bounds import Starts, root_above
+from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
@@ -143,7 +143,7 @@ class Assessment:
 
 
 def verdict_of(report: CheckReport | None) -> str:
-    """Return ``certified`` if rate and outcome were proved and the independent check accepts it, else ``undecided``.
+    """Return ``certified`` if rate and final state were proved and the check accepts it, else ``undecided``.
 
     Examples
     --------
@@ -238,7 +238,7 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
     if certificate.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
     if bound is not None and least > bound:
-        return Answer(REFUTED, what, f"none exceeds {up(bound, 8)}, proved")
+        return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     proved = "none is proved" if rate is None else f"proved: {down(rate)}"
     return Answer(OPEN, what, proved if bound is None else f"{proved}, at most {up(bound, 8)} can be")
 
@@ -255,9 +255,11 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
         first = effort is not None and effort.first is not None and effort.first >= least
         size = f"up to {down(least)}" if least < math.inf else "without limit"
         return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by noise alone'}, proved")
-    solid = effort is not None and effort.starts is not None and all(r > 0 for r in effort.starts.radius or (0,))
+    solid = (
+        effort is not None and effort.initial_set is not None and all(r > 0 for r in effort.initial_set.radius or (0,))
+    )
     if effort is not None and effort.bounded is False and solid and not certificate.limits:
-        return Answer(REFUTED, what, "from some of these starts it grows without limit, proved")
+        return Answer(REFUTED, what, "from some of these initial states it grows without limit, proved")
     return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
 
 
@@ -321,9 +323,9 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     said = f"||{z}|| <= {up(left, 2)} ||{begin}|| at {instant}"
     if left <= USEFUL:
         return True, said, ""
-    of_set = certificate.effort is not None and certificate.effort.starts is not None
+    of_set = certificate.effort is not None and certificate.effort.initial_set is not None
     if direct and not of_set and (way := certificate.longest_way) is not None:
-        worst = float(certificate.outcome_distance([float(LAST)]).max(initial=0.0))
+        worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
     rho2 = _useful_rho2(envelope, fixed, p.kappa)
@@ -336,7 +338,7 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
     effort, start, way = certificate.effort, certificate.start, certificate.longest_way
     residual = () if effort is None else effort.residual
-    region = None if effort is None else effort.starts
+    region = None if effort is None else effort.initial_set
     noisy = any(entry.noise is not None for entry in residual)
     if region is None and way is not None and not noisy and all(entry.agents is not None for entry in residual):
         worst = max(x for entry in residual for x in entry.agents or ())
@@ -347,8 +349,8 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
-        return norm <= Fraction(USEFUL) * largest, f"{said} from all these starts", ""
-    first = Fraction(0) if start is None else sum((Starts(start).largest(row) ** 2 for row in rows), Fraction(0))
+        return norm <= Fraction(USEFUL) * largest, f"{said} from all these initial states", ""
+    first = Fraction(0) if start is None else sum((InitialSet(start).largest(row) ** 2 for row in rows), Fraction(0))
     if not first:
         return norm == 0, said, ""
     left = root_above(norm**2 / first)

@@ -1,6 +1,6 @@
 """The independent check of a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
-Reads schema ``ptcc-certificate/1``, recomputes the structure of the graph from its edges, and checks every claim
+Reads schema ``ptcc-certificate/2``, recomputes the structure of the graph from its edges, and checks every claim
 outside ``unverified``, obligation by obligation as the proof lists them; ``_verdict`` is the list. ``FORMAT.md``
 specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
 ``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
@@ -23,13 +23,12 @@ from typing import Any
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
 from ptcc_certify.checker.lyapunov import check_functions
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
-from ptcc_certify.checker.paper import check_paper
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import (
     REACHING_BITS,
     SLIDING_BOUND,
@@ -40,15 +39,16 @@ from ptcc_certify.checker.protocol import (
 )
 from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, entries, fields, need, read
+from ptcc_certify.checker.side_vectors import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
-from ptcc_certify.checker.vectors import SideFiles
+from ptcc_certify.checker.theorem_function import check_paper
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib] [--memory GB]"
 
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
-    *("prefactor", "initial_state", "sigma0", "outcome", "reaching_time", "effort", "proof", "verdict"),
-    *("digest", "unverified"),
+    *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
+    *("verdict", "digest", "unverified"),
 )
 
 __all__ = [
@@ -124,7 +124,7 @@ def read_and_check(
     Examples
     --------
     >>> read_and_check({"schema": SCHEMA})[0]
-    {'schema': 'ptcc-certificate/1'}
+    {'schema': 'ptcc-certificate/2'}
     """
     with limited(memory) as account:
         if isinstance(source, Mapping):
@@ -175,7 +175,7 @@ def _verdict(doc: Document) -> str:
     check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
     doc.at = "proof"
     need(len(doc.steps) == len(data["proof"]), "an obligation that nothing asks for")
-    proved = data["outcome"] is not None and (rate is not None or not graph.listening)
+    proved = data["influence"] is not None and (rate is not None or not graph.listening)
     verdict = "certified" if proved else "undecided"
     need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")
     need(doc.section("digest") == digest(data), "the certificate was changed after it was made")

@@ -10,26 +10,26 @@ from functools import cached_property
 from operator import mul
 from typing import Any
 
+from lmi.exact.directed_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
-from lmi.exact.rounding import up
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import by_agent, ordered, positions
 from ptcc_certify.checker.matrices import Matrix, need_rows
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, entries, fields, interval, length, need, same
+from ptcc_certify.checker.side_vectors import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
-from ptcc_certify.checker.vectors import Numbers, beside
 
 #: Integers by node.
 Indexed = Sequence[int] | Mapping[int, int]
-#: An interval may be wider than twice what is proved by this share of the largest entry of the start.
+#: An interval may be wider than twice what is proved by this share of the largest entry of the initial state.
 WIDEST = Fraction(1, 10**6)
 #: Bits to which the values of leader groups are rounded, beyond the common scale of states, in the large form.
 GRID_BITS = 128
 ZERO = Fraction(0), Fraction(0)
-#: The voices of a group of one.
+#: The left null vector of a group of one.
 ALONE = [(Fraction(1), Fraction(0))]
 
 
@@ -40,23 +40,23 @@ class FinalState:
     Attributes
     ----------
     structure : Structure
-    voices : list of (list of Interval), or None
+    left_null_vectors : list of (list of Interval), or None
         ``eta_k' G_k`` of each balanced closed component; None: not known exactly.
     weights : list of (list of Interval)
         Of each follower on these components.
     """
 
     structure: Structure
-    voices: list[list[Interval]] | None = None
+    left_null_vectors: list[list[Interval]] | None = None
     weights: Sequence[Sequence[Interval]] = ()
 
     @cached_property
     def projection(self) -> list[dict[int, Fraction]]:
         """The rows of ``Q``, which are exact."""
-        need(self.voices is not None, "a distance to an outcome that is not exact")
-        n, voices = self.structure.graph.n, self.voices or []
+        need(self.left_null_vectors is not None, "a deviation from a final state that is not exact")
+        n, left_null_vectors = self.structure.graph.n, self.left_null_vectors or []
         need_rows(n)
-        bits = sum(2 * length(x for row in rows for x, _ in row) for rows in (voices, self.weights))
+        bits = sum(2 * length(x for row in rows for x, _ in row) for rows in (left_null_vectors, self.weights))
         count = n * sum(len(group) for _, group, _ in self.structure.balanced)
         sized(count, bits, "the weights of leaders")
         spend(count, bits, bits, "the weights of leaders")
@@ -66,7 +66,7 @@ class FinalState:
             weights |= {v: row[k][0] for v, row in zip(self.structure.followers, self.weights, strict=True)}
             for v, weight in weights.items():
                 if weight:
-                    Q[v] |= {j: weight * x for j, (x, _) in zip(group, voices[k], strict=True)}
+                    Q[v] |= {j: weight * x for j, (x, _) in zip(group, left_null_vectors[k], strict=True)}
         return Q
 
     @cached_property
@@ -84,26 +84,28 @@ class FinalState:
 
 def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
     """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
-    said, graph = doc.section("outcome"), structure.graph
+    given, said, graph = doc.section("final_state"), doc.section("influence"), structure.graph
     if said is None or begin.state is None:
-        need(all(state is None for _, state in claim.components), "an outcome of a component without one of all")
+        need(all(state is None for _, state in claim.components), "a final state of a component without one of all")
     if said is None:
+        need(given is None, "a final state without the influence of the leaders")
         return FinalState(structure)
-    witness = doc.open("outcome", "graph", witness=True)["witness"]
-    said = fields(said, ("final_state", "degenerate", "influence"), "outcome")
-    parts = fields(said["influence"], ("components", "followers"), "influence")
+    witness = doc.open("final-state", "graph", witness=True)["witness"]
+    fields(said, ("components", "containment_weights", "degenerate"), "influence")
     u = None if witness is None else by_agent(doc, graph, fields(witness, ("u",), "the witness")["u"], "u")
     need(u is None or u.positive(), "u is not positive")
-    large = parts["followers"] is None  # no weights of followers: voices of groups alone, and one final state
-    voices = _voices(doc, structure, parts["components"], large, u)
-    weights = [] if large else _weights(structure, parts["followers"], u)
-    exact = not large and not any(r for row in (*voices.values(), *weights) for _, r in row)
+    large = said["containment_weights"] is None  # no weights of followers
+    left_null_vectors = _left_null_vector(doc, structure, said["components"], large, u)
+    weights = [] if large else _weights(structure, said["containment_weights"], u)
+    exact = not large and not any(r for row in (*left_null_vectors.values(), *weights) for _, r in row)
     widest = None
     if begin.state is None:
-        need(said["final_state"] is None and said["degenerate"] is None, "a final state without a start")
+        need(given is None and said["degenerate"] is None, "a final state without an initial state")
     else:
-        widest = _final(doc, structure, said, begin, voices, None if large else weights, u)
-        _components(graph, claim, said["final_state"])
+        widest = _final(
+            doc, structure, (given, said["degenerate"]), begin, left_null_vectors, None if large else weights, u
+        )
+        _components(graph, claim, given)
     doc.done(
         "exact"
         if exact
@@ -111,16 +113,16 @@ def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: 
         if widest is None
         else f"enclosed, radius at most {up(widest)}"
     )
-    return FinalState(structure, list(voices.values()), weights) if exact else FinalState(structure)
+    return FinalState(structure, list(left_null_vectors.values()), weights) if exact else FinalState(structure)
 
 
 def _components(graph: Digraph, claim: Claim, said: Any) -> None:
-    """Check the outcome of every weak component, which repeats the final state where that is no side vector."""
+    """Check the final state of every weak component, which repeats the final state where that is no side vector."""
     for nodes, state in claim.components:
         if len(claim.components) > MANY_COMPONENTS or beside(said.get("mid")):
-            need(state is None, "the outcome of a component")
+            need(state is None, "the final state of a component")
         else:
-            need(same(state, {graph.labels[v]: said[graph.labels[v]] for v in nodes}), "the outcome of a component")
+            need(same(state, {graph.labels[v]: said[graph.labels[v]] for v in nodes}), "the final state of a component")
 
 
 def _worst(nodes: Sequence[int], residuals: Indexed, pushed: Indexed) -> tuple[int, int]:
@@ -136,26 +138,28 @@ def _worst(nodes: Sequence[int], residuals: Indexed, pushed: Indexed) -> tuple[i
 # ---------------------------------------------------------------------- leaders
 
 
-def _voices(
+def _left_null_vector(
     doc: Document, structure: Structure, said: Any, large: bool, u: Numbers | None
 ) -> dict[int, list[Interval]]:
     """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1`` for every group: exactly, or within the radii."""
     listed, found = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
     for entry, (k, group, gauge) in zip(entries(said, "components", len(listed)), listed, strict=True):
-        fields(entry, ("nodes", "voices"), "a component")
+        fields(entry, ("nodes", "left_null_vector"), "a component")
         need(positions(doc, structure.graph, entry["nodes"], "a component") == group, "another component")
-        found[k] = [interval(x) for x in entries(entry["voices"], "voices", len(group))]
-        _voices_of(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, found[k], strict=True)], u)
+        found[k] = [interval(x) for x in entries(entry["left_null_vector"], "left_null_vector", len(group))]
+        _left_null_vector_of(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, found[k], strict=True)], u)
     return found
 
 
-def _voices_of(graph: Digraph, group: Sequence[int], voices: Sequence[Interval], u: Numbers | None) -> None:
+def _left_null_vector_of(
+    graph: Digraph, group: Sequence[int], left_null_vectors: Sequence[Interval], u: Numbers | None
+) -> None:
     """Verify the left null vector of one comparison matrix; all in integers."""
-    (eta, radii), scale = integers([[x for x, _ in voices], [r for _, r in voices]])
+    (eta, radii), scale = integers([[x for x, _ in left_null_vectors], [r for _, r in left_null_vectors]])
     left, top = graph.left(group, eta), max(range(len(eta)), key=eta.__getitem__)
     if not any(radii):
-        need(sum(eta) == scale, "voices do not sum to 1")
-        need(not any(left), "voices are not kept by the motion")
+        need(sum(eta) == scale, "a left null vector does not sum to 1")
+        need(not any(left), "a left null vector is not kept by the motion")
         return
     if u is None or eta[top] <= 0:
         raise RejectedError("no witness of the enclosure")
@@ -164,11 +168,11 @@ def _voices_of(graph: Digraph, group: Sequence[int], voices: Sequence[Interval],
     # |exact / exact[top] - eta / eta[top]| <= worst / (least eta[top]) u, since the rest of M is an M-matrix
     worst, least = _worst([i for i in range(len(eta)) if i != top], left, graph.left(group, each))
     middle, width = least * sum(eta), worst * sum(each)
-    need(middle > width, "voices are not enclosed")
+    need(middle > width, "a left null vector is not enclosed")
     for x, y, radius in zip(eta, each, radii, strict=True):
         below, above = least * x - worst * y, least * x + worst * y
         holds = (x - radius) * (middle + width) <= scale * below
-        need(holds and scale * above <= (x + radius) * (middle - width), "voices are not enclosed")
+        need(holds and scale * above <= (x + radius) * (middle - width), "a left null vector is not enclosed")
 
 
 # ---------------------------------------------------------------------- followers
@@ -177,7 +181,7 @@ def _voices_of(graph: Digraph, group: Sequence[int], voices: Sequence[Interval],
 def _weights(structure: Structure, said: Any, u: Numbers | None) -> list[list[Interval]]:
     """Verify the columns ``L_F w = -L_FLk G_k 1``: exactly, or by ``|w - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``."""
     graph, F = structure.graph, structure.followers
-    said = ordered([graph.labels[v] for v in F], said, "followers")
+    said = ordered([graph.labels[v] for v in F], said, "containment_weights")
     weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in said.values()]
     rows, each = {v: graph.row(v) for v in F}, dict(zip(F, u.over(F)[0] if u else (), strict=False))
     count, bits = sum(map(len, rows.values())), longest(each.values())
@@ -207,9 +211,9 @@ def _weights(structure: Structure, said: Any, u: Numbers | None) -> list[list[In
 def _final(
     doc: Document,
     structure: Structure,
-    said: Any,
+    said: tuple[Any, Any],
     begin: Begin,
-    voices: Mapping[int, list[Interval]],
+    left_null_vectors: Mapping[int, list[Interval]],
     weights: Sequence[Sequence[Interval]] | None,
     u: Numbers | None,
 ) -> Fraction:
@@ -218,12 +222,12 @@ def _final(
     if begin.sigma is not None:
         moved = Numbers([x - s for x, s in zip(moved, begin.sigma, strict=True)])
     values = {
-        k: combined(voices.get(k, ALONE), [(moved[v], Fraction(0)) for v in group])
+        k: combined(left_null_vectors.get(k, ALONE), [(moved[v], Fraction(0)) for v in group])
         for k, group, _ in structure.balanced
     }
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
-    need(same(said["degenerate"], [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    claimed, spare = _claimed(doc, graph, said["final_state"]), WIDEST * moved.largest()
+    need(same(said[1], [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
+    claimed, spare = _claimed(doc, graph, said[0]), WIDEST * moved.largest()
     proved: dict[int, Interval] = {}
     for k, (group, gauge) in enumerate(zip(structure.closed, structure.gauges, strict=True), start=1):
         x, r = values.get(k, ZERO)

@@ -8,9 +8,9 @@ from typing import Any
 
 from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.document import Document
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
-from ptcc_certify.checker.vectors import Numbers, beside
+from ptcc_certify.checker.side_vectors import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000
@@ -35,7 +35,7 @@ def check_graph(doc: Document) -> Digraph:
     columns = _edges(doc, said["edges"], index)
     kind: type[Digraph] = Digraph
     if doc.exact.numpy and len(columns[0]) >= MANY_EDGES:
-        from ptcc_certify.checker.fast import ArrayDigraph
+        from ptcc_certify.checker.array_digraph import ArrayDigraph
 
         kind = ArrayDigraph
     graph = kind(labels, *columns)

@@ -9,22 +9,22 @@ from functools import cached_property
 from itertools import chain
 from typing import Any
 
+from lmi.exact.directed_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
-from lmi.exact.rounding import down, up
 from lmi.exact.spectrum import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
-from ptcc_certify.checker import input_bounds as formulas
-from ptcc_certify.checker.document import Document
+from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
+from ptcc_certify.checker.side_vectors import Numbers
 from ptcc_certify.checker.structure import Structure
-from ptcc_certify.checker.vectors import Numbers
 
-KEYS = ("bounded", "threshold", "starts", "constants", "peak", "energy", "path_length", "sliding")
+KEYS = ("bounded", "threshold", "initial_set", "constants", "peak", "energy", "path_length", "sliding")
 LIMIT_KEYS = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
 #: Graphs up to this size have bounds of the input.
 INPUT_NODES = 400
@@ -72,39 +72,39 @@ class Verified:
 
 
 def check_input(doc: Document, known: Verified) -> None:
-    """Verify the section ``effort``."""
-    said = doc.section("effort")
+    """Verify the section ``input``."""
+    said = doc.section("input")
     decays = known.rate is not None or not known.structure.graph.listening
     need((said is not None) == decays, "the input is spoken of iff the decay is proved")
     if said is None:
         return
-    fields(said, (*KEYS, "residual", "disturbed"), "effort")
+    fields(said, (*KEYS, "residual", "disturbed"), "input")
     _threshold(doc, known, said)
     constants = _constants(doc, known, entries(said["constants"], "constants", len(known.functions)))
     _sliding(doc, known, said["sliding"])
-    starts = _starts(doc, known, said["starts"])
-    if starts is None:
+    initial_set = _starts(doc, known, said["initial_set"])
+    if initial_set is None:
         for key in ("peak", "energy", "path_length", "disturbed"):
-            need(said[key] is None, f"{key} without a start, or of too large a graph")
-        need(said["residual"] == [], "limits without a start, or of too large a graph")
+            need(said[key] is None, f"{key} without an initial state, or of too large a graph")
+        need(said["residual"] == [], "limits without an initial state, or of too large a graph")
         return
     try:
-        bounds = _bounds(doc, known, starts, constants)
+        bounds = _bounds(doc, known, initial_set, constants)
         _peak(doc, known, said["peak"], bounds)
         _integral(doc, known, said["energy"], bounds)
         _length(doc, known, said["path_length"], bounds)
         need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
         for k, entry in enumerate(said["residual"]):
-            _limited(doc, known, f"effort.residual[{k}]", entry, said["peak"], bounds)
+            _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
         _disturbed(doc, known, said["disturbed"], bounds)
     except ValueError as error:
         raise RejectedError(str(error)) from None
 
 
-def _member(known: Verified, k: Any) -> int:
+def _function(known: Verified, k: Any) -> int:
     """Return the number of a Lyapunov function."""
     if type(k) is not int or not 0 <= k < len(known.functions):
-        raise RejectedError("there is no such member")
+        raise RejectedError("there is no such Lyapunov function")
     return k
 
 
@@ -125,7 +125,7 @@ def _above(doc: Document, known: Verified, said: Any, what: str, least: Sequence
 
 
 def _threshold(doc: Document, known: Verified, said: Mapping[str, Any]) -> None:
-    """Verify whether the input stays bounded for every start, and the bounds of the threshold."""
+    """Verify whether the input stays bounded for every initial state, and the bounds of the threshold."""
     ends, k = fields(said["threshold"], ("lower", "upper"), "threshold"), known.gain.k
     for key, rate in (("lower", known.rate), ("upper", known.limit)):
         value = None if rate is None else k * rate / 2
@@ -134,11 +134,11 @@ def _threshold(doc: Document, known: Verified, said: Mapping[str, Any]) -> None:
     if bounded is None:
         return
     need(isinstance(bounded, bool), "bounded is no truth value")
-    by = doc.open("input-threshold", "effort", witness=True)["witness"]
+    by = doc.open("input-threshold", "input", witness=True)["witness"]
     if by == "rate":
         holds = not known.structure.graph.listening or (known.rate is not None and known.rate * k >= 2)
         need(bounded and holds, "no rate proves that the input stays bounded")
-    elif by == "limit":
+    elif by == "upper_bound":
         need(not bounded and known.limit is not None and known.limit * k < 2, "no limit proves that the input grows")
     else:
         need(by == "spectrum", "another proof")
@@ -170,14 +170,14 @@ def _constants(doc: Document, known: Verified, said: Sequence[Any]) -> list[list
     """Verify ``e_k^2 <= c_k V`` for full matrices; for diagonal ones the constants follow."""
     found: list[list[Fraction] | None] = []
     for k, (given, function) in enumerate(zip(said, known.functions, strict=True)):
-        doc.at = f"effort.constants[{k}]"
+        doc.at = f"input.constants[{k}]"
         if given is None:
             found.append(None)
             continue
         form = function.form
         if form is None or form.matrix is None:
             raise RejectedError("constants that follow from a diagonal")
-        doc.open("input-constants", f"lyapunov.members[{k}]")
+        doc.open("input-constants", f"lyapunov.functions[{k}]")
         constants = list(_each(doc, known, given, "constants"))
         P, scale = integers(form.matrix)
         place, forms = {v: i for i, v in enumerate(form.nodes)}, []
@@ -195,42 +195,42 @@ def _constants(doc: Document, known: Verified, said: Sequence[Any]) -> list[list
 
 def _sliding(doc: Document, known: Verified, said: Any) -> None:
     """Verify the sliding part of the input."""
-    doc.at = "effort.sliding"
+    doc.at = "input.sliding"
     need((said is not None) == known.protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
     if said is None:
         return
     fields(said, ("bounded", "agents"), "sliding")
-    need(said["bounded"] is known.sliding_bounded, "bounded for every start iff mu3 kappa >= 1")
+    need(said["bounded"] is known.sliding_bounded, "bounded for every initial state iff mu3 kappa >= 1")
     if said["agents"] is not None:
-        doc.open("input-sliding", "effort")
+        doc.open("input-sliding", "input")
         _above(doc, known, said["agents"], "the sliding part", known.sliding_part())
         doc.done("for every disturbance within delta")
 
 
-def _starts(doc: Document, known: Verified, said: Any) -> formulas.Starts | None:
-    """Read the set of starts; None if there is none, or the graph is too large."""
-    doc.at = "effort.starts"
+def _starts(doc: Document, known: Verified, said: Any) -> formulas.InitialSet | None:
+    """Read the set of initial states; None if there is none, or the graph is too large."""
+    doc.at = "input.initial_set"
     small = known.structure.graph.n <= INPUT_NODES and bool(known.structure.graph.listening)
     if said is None:
-        return formulas.Starts(list(known.begin.state)) if known.begin.state is not None and small else None
-    need(small, "starts of too large a graph, or of one that does not move")
+        return formulas.InitialSet(list(known.begin.state)) if known.begin.state is not None and small else None
+    need(small, "initial states of too large a graph, or of one that does not move")
     shape = "axes" if isinstance(said, dict) and "axes" in said else "radius"
-    center = list(_each(doc, known, fields(said, ("center", shape), "starts")["center"], "center"))
+    center = list(_each(doc, known, fields(said, ("center", shape), "initial_set")["center"], "center"))
     if shape == "axes":
         axes = entries(said["axes"], "axes")
         need(len(axes) <= INPUT_NODES, "too many axes")
-        return formulas.Starts(center, axes=[list(_each(doc, known, x, "an axis")) for x in axes])
+        return formulas.InitialSet(center, axes=[list(_each(doc, known, x, "an axis")) for x in axes])
     radius = list(_each(doc, known, said["radius"], "radius"))
     need(all(r >= 0 for r in radius), "a radius is negative")
-    return formulas.Starts(center, radius)
+    return formulas.InitialSet(center, radius)
 
 
 def _bounds(
-    doc: Document, known: Verified, starts: formulas.Starts, constants: Sequence[Sequence[Fraction] | None]
+    doc: Document, known: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
 ) -> formulas.InputBounds:
     """Return what bounds the input over the starts."""
     graph, g, sigma0 = known.structure.graph, known.protocol.gains, list(known.begin.sigma or ())
-    whole, _ = integers([starts.center, starts.radius, *starts.axes])
+    whole, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
     own, each = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(whole))
     sized(graph.n_edges + graph.n, own, "the rows of L")
     spend(len(whole) * (graph.n_edges + graph.n), own + each, own + each, "the starts")
@@ -241,7 +241,7 @@ def _bounds(
         last = None if None in times else max(map(exact, times))
         push = g["mu1"] + g["delta"]
         reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
-    return formulas.InputBounds(rows, known.gain, [f.form for f in known.functions], constants, starts, reaching)
+    return formulas.InputBounds(rows, known.gain, [f.form for f in known.functions], constants, initial_set, reaching)
 
 
 # ---------------------------------------------------------------------- peak, energy, length
@@ -249,20 +249,20 @@ def _bounds(
 
 def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
-    doc.at = "effort.peak"
+    doc.at = "input.peak"
     if said is None:
         return
     fields(said, ("agents", "largest", "norm"), "peak")
-    step = doc.open("input-peak", "effort", ["z"], witness=True)
+    step = doc.open("input-peak", "input", ["z"], witness=True)
     witness = fields(step["witness"], ("agents", "norm"), "the witness")
     ways = ordered(known.structure.graph.labels, witness["agents"], "agents").values()
     own = known.sliding_part() if known.protocol.sliding else [Fraction(0)] * len(bounds.rows)
     least = []
     for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in ways):
-        least.append(bounds.bound(formulas.peak_above, v, _member(known, k), exact(z)) + own[v])
+        least.append(bounds.bound(formulas.peak_above, v, _function(known, k), exact(z)) + own[v])
     peaks = _above(doc, known, said["agents"], "the peak", least)
     need(exact(said["largest"]) == max(peaks), "the largest peak is another")
-    norm = bounds.bound(formulas.peak_above, None, _member(known, witness["norm"]), step["z"])
+    norm = bounds.bound(formulas.peak_above, None, _function(known, witness["norm"]), step["z"])
     norm += formulas.root_above(sum((x * x for x in own), Fraction(0)))
     need(exact(said["norm"]) >= norm, "the peak of the norm is not proved")
     doc.done(f"at most {up(max(peaks))}, norm {up(exact(said['norm']))}")
@@ -270,29 +270,29 @@ def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBound
 
 def _length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify the length of the path."""
-    doc.at = "effort.path_length"
+    doc.at = "input.path_length"
     if said is not None:
-        step = doc.open("input-length", "effort", ["z"], witness=True)
-        least = bounds.bound(formulas.length_above, None, _member(known, step["witness"]), step["z"])
+        step = doc.open("input-length", "input", ["z"], witness=True)
+        least = bounds.bound(formulas.length_above, None, _function(known, step["witness"]), step["z"])
         need(exact(said) >= least, "the bound is not proved")
         doc.done(f"at most {up(exact(said))}")
 
 
 def _integral(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify the energy: by one function, or by ``L'W + W L - c W > m I`` on the range of ``L`` for two matrices."""
-    doc.at = "effort.energy"
+    doc.at = "input.energy"
     if said is None:
         return
     if isinstance(doc.following.get("witness"), dict):
-        step = doc.open("input-energy", "effort", ["p", "m0", "m1"], witness=True)
+        step = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
         matrices = fields(step["witness"], ("W0", "W1"), "the witness")
         need(bounds.reaching is None, "sliding variables move")
         even = _remainder(doc, known, matrices, "W0", step["m0"], bounds)
         grown = _remainder(doc, known, matrices, "W1", step["m1"], bounds)
         least = formulas.integral_above(known.gain, even, grown, step["p"])
     else:
-        step = doc.open("input-energy", "effort", ["z"], witness=True)
-        least = bounds.bound(formulas.energy_above, None, _member(known, step["witness"]), step["z"])
+        step = doc.open("input-energy", "input", ["z"], witness=True)
+        least = bounds.bound(formulas.energy_above, None, _function(known, step["witness"]), step["z"])
     need(exact(said) >= least, "the bound is not proved")
     doc.done(f"at most {up(exact(said))}")
 
@@ -336,13 +336,13 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
     need(not known.protocol.sliding, "limits are for the nominal protocol")
     cap, stop, period = (None if said[key] is None else exact(said[key]) for key in LIMIT_KEYS[:3])
     need(all(x is None or x > 0 for x in (cap, stop, period)), "a limit is not positive")
-    need(stop is None or stop < known.gain.T, "a stop before the start")
+    need(stop is None or stop < known.gain.T, "a stop before the initial state")
     need(period is None or period <= known.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
     top = limits.top(known.gain)
     step = doc.open("limited-gain", of, ["growth"], witness=True)
     chosen = [step["witness"]] if said["noise"] is None else entries(step["witness"], "the witness", 2)
-    k = _member(known, chosen[0])
+    k = _function(known, chosen[0])
     form = bounds.form(k)
     need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
     if period is not None:
@@ -352,11 +352,11 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
     norm = bounds.root_constant(k, None) * left
     need(exact(said["norm"]) >= norm, "what is left is not proved")
     if said["agents"] is not None:
-        distance = doc.data["lyapunov"]["members"][k]["distance"]
-        need(distance is not None, "distances without constants")
-        least = [formulas.root_above(c) * left for c in _each(doc, known, distance["agents"], "agents")]
+        deviation = doc.data["lyapunov"]["functions"][k]["deviation"]
+        need(deviation is not None, "deviations without constants")
+        least = [formulas.root_above(c) * left for c in _each(doc, known, deviation["agents"], "agents")]
         if period is None:
-            most = _largest_deviation(known.final, bounds.starts)
+            most = _largest_deviation(known.final, bounds.initial_set)
             least = [min(x, most) for x in least]
         _above(doc, known, said["agents"], "what is left", least)
     need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
@@ -367,19 +367,19 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
         need(period is None, "noise of a held gain")
         noise = {key: exact(x) for key, x in fields(said["noise"], ("bound", "norm", "largest"), "noise").items()}
         need(noise["bound"] > 0, "noise of no size")
-        whole, each = bounds.noisy(_member(known, chosen[1]), noise["bound"])
+        whole, each = bounds.noisy(_function(known, chosen[1]), noise["bound"])
         need(noise["norm"] >= norm + whole, "what is left by noise is not proved")
         largest = exact(said["largest"]) + top * max(each)
         need(noise["largest"] >= largest, "the largest input under noise is not proved")
     doc.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
 
 
-def _largest_deviation(final: FinalState, starts: formulas.Starts) -> Fraction:
+def _largest_deviation(final: FinalState, initial_set: formulas.InitialSet) -> Fraction:
     """Return ``sup max_k |x_k(0) - (Q x(0))_k|``, which no deviation exceeds where the input is not held."""
     rows = [{j: (i == j) - row.get(j, Fraction(0)) for j in {i, *row}} for i, row in enumerate(final.projection)]
-    bits = length(x for row in rows for x in row.values()) + length(starts.center)
-    spend(5 * sum(map(len, rows)) * (2 + len(starts.axes)), bits, bits, "deviations of all starts")
-    return max(map(starts.largest, rows))
+    bits = length(x for row in rows for x in row.values()) + length(initial_set.center)
+    spend(5 * sum(map(len, rows)) * (2 + len(initial_set.axes)), bits, bits, "deviations of all initial states")
+    return max(map(initial_set.largest, rows))
 
 
 def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fraction) -> None:
@@ -402,15 +402,15 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
 
 def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
-    doc.at = "effort.disturbed"
+    doc.at = "input.disturbed"
     if said is None:
         return
     need(not known.protocol.sliding, "the sliding-mode protocol has its own claims")
     fields(said, ("delta", "inputs", "drift"), "disturbed")
-    step = doc.open("nominal-disturbed", "effort", ["delta"], witness=True)
+    step = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
     delta = exact(said["delta"])
     need(delta == step["delta"] and delta > 0, "another delta")
-    inputs = bounds.disturbed(_member(known, step["witness"]), delta)
+    inputs = bounds.disturbed(_function(known, step["witness"]), delta)
     _above(doc, known, said["inputs"], "the input", inputs)
     if said["drift"] is not None:
         drift = [delta * known.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in known.final.projection]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from lmi.exact.enclosure import decay_integrals_below
+from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import exact, fields, need
-from ptcc_certify.checker.vectors import Numbers
+from ptcc_certify.checker.side_vectors import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
@@ -59,7 +59,7 @@ def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
     """Read ``X(0)`` and ``sigma(0)``."""
     state, sigma = (
         None if (said := doc.section(key)) is None else by_agent(doc, graph, said, key)
-        for key in ("initial_state", "sigma0")
+        for key in ("initial_state", "sliding_variable")
     )
     need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
     return Begin(state, sigma)
@@ -78,10 +78,10 @@ def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begi
     doc.done("for every disturbance within delta")
     z = [None if x is None else exact(x) for x in told]
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
-        need(not any(z), "a reaching time of a variable that is 0 from the start")
+        need(not any(z), "a reaching time of a variable that is 0 from the initial state")
         return
     doc.open("reaching-time", "reaching_time")
-    need(all(end is None or end >= 0 for end in z), "a reaching time before the start")
+    need(all(end is None or end >= 0 for end in z), "a reaching time before the initial state")
     asked = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
     spend(len(asked) * EACH_INSTANT, what="the reaching times of many agents")
     known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)

@@ -6,51 +6,51 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from lmi.exact.directed_rounding import up
 from lmi.exact.numbers import integers, longest
-from lmi.exact.rounding import up
 from lmi.exact.work import spend
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrices import block, decrease, need_rows, product, transposed
-from ptcc_certify.checker.paper import Paper
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
+from ptcc_certify.checker.theorem_function import Paper
 
 
 def check_rates(doc: Document, paper: Paper | None, functions: Sequence[Function]) -> Fraction | None:
-    """Verify that the rates and the prefactor are those of the functions; return the largest rate."""
-    said = fields(doc.section("rates"), ("paper", "diagonal", "certified", "limit"), "rates")
+    """Verify that the rates and the overshoot constant are those of the functions; return the largest rate."""
+    said = fields(doc.section("rates"), ("paper", "diagonal", "proved", "upper_bound"), "rates")
     decaying = [f for f in functions if f.rate > 0]
-    best = max(decaying, key=lambda f: (f.rate, -f.prefactor), default=None)
+    best = max(decaying, key=lambda f: (f.rate, -f.overshoot), default=None)
     proved = {
         "paper": paper and paper.rate,
         "diagonal": max((f.rate for f in decaying if f.kind in ("perron", "lmi")), default=None),
-        "certified": best and best.rate,
+        "proved": best and best.rate,
     }
     for key, value in proved.items():
-        need((None if said[key] is None else exact(said[key])) == value, f"the rate {key} is not the proved one")
-    said = doc.section("prefactor")
+        need((None if said[key] is None else exact(said[key])) == value, f"rates.{key} is not what was proved")
+    said = doc.section("overshoot")
     if best is None:
-        need(said is None, "a prefactor without a rate")
+        need(said is None, "an overshoot constant without a rate")
         return None
-    fields(said, ("value", "of"), "prefactor")
+    fields(said, ("value", "of"), "overshoot")
     of = f"||{best.form.coordinates if best.form else 'E'}||^2"
-    need(exact(said["value"]) == best.prefactor and said["of"] == of, "not that of the largest rate")
+    need(exact(said["value"]) == best.overshoot and said["of"] == of, "not that of the largest rate")
     return best.rate
 
 
 def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
     """Verify the upper bound on every rate: by the mean nonzero eigenvalue of a strong component, or by inertia."""
-    said = doc.data["rates"]["limit"]
+    said = doc.data["rates"]["upper_bound"]
     if said is None:
         return None
     mean = doc.following.get("kind") == "rate-mean"
-    step = doc.open("rate-mean" if mean else "rate-limit", "rates", ["limit"], witness=True)
-    need(exact(said) == step["limit"], "the limit is another")
-    (_mean if mean else _inertia)(doc, structure, step["limit"], step["witness"])
-    doc.done(f"no rate exceeds {up(step['limit'])}")
-    return step["limit"]
+    step = doc.open("rate-mean" if mean else "rate-upper-bound", "rates", ["upper_bound"], witness=True)
+    need(exact(said) == step["upper_bound"], "the upper bound is another")
+    (_mean if mean else _inertia)(doc, structure, step["upper_bound"], step["witness"])
+    doc.done(f"upper bound on the decay rate {up(step['upper_bound'])}")
+    return step["upper_bound"]
 
 
 def _mean(doc: Document, structure: Structure, limit: Fraction, witness: Any) -> None:

@@ -10,10 +10,10 @@ from itertools import pairwise
 from typing import Any
 
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, fields, need, same
-from ptcc_certify.checker.vectors import beside
+from ptcc_certify.checker.side_vectors import beside
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100
@@ -68,13 +68,13 @@ class Structure:
 
 @dataclass(frozen=True)
 class Claim:
-    """The theorem whose Lyapunov function is used, and the weak components of a disconnected graph with their outcomes.
+    """The theorem whose Lyapunov function is used, and the weak components, if several, with their final states.
 
     Attributes
     ----------
     theorem : str
     components : list of (list of int, JSON)
-        Empty for a connected graph; the outcome of each is not verified yet.
+        Empty for a connected graph; the final state of each is not verified yet.
     """
 
     theorem: str
@@ -201,17 +201,17 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
 
 
 def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
-    """Check what is said of each weak component; return its nodes and the outcome that is claimed."""
+    """Check what is said of each weak component; return its nodes and the final state that is claimed."""
     said, keys = doc.data.get("components"), ("theorem", "behaviour", "corollaries")
     groups, kinds, claims = zip(*expected, strict=True)
     if len(expected) <= MANY_COMPONENTS:
         for entry, nodes, kind, claim in zip(
             entries(said, "components", len(expected)), groups, kinds, claims, strict=True
         ):
-            fields(entry, ("nodes", "connectivity", "claim", "outcome"), "a component")
+            fields(entry, ("nodes", "connectivity", "claim", "final_state"), "a component")
             need(positions(doc, graph, entry["nodes"], "a component") == nodes, "another component")
             need(entry["connectivity"] == kind and same(entry["claim"], claim), "the claim of a component")
-        return [(nodes, entry["outcome"]) for nodes, entry in zip(groups, said or [], strict=True)]
+        return [(nodes, entry["final_state"]) for nodes, entry in zip(groups, said or [], strict=True)]
     said = fields(said, ("nodes", "connectivity", *keys), "components")
     if beside(said["nodes"]):
         number = {v: k for k, nodes in enumerate(groups) for v in nodes}

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
 @shared.json_option
 def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> int:
-    """Certify what the protocol does on GRAPH: behaviour, rate, outcome; compare with a CVODES run."""
+    """Certify what the protocol does on GRAPH: behaviour, rate, final state; compare with a CVODES run."""
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
     from ptcc_certify.certificate.request import Expectations
@@ -58,7 +58,9 @@ def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> in
         raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
     more |= {name: options[name] for name in ("method", "simulation", "time_limit")}
     with progress(STEPS) as begin:
-        certificate = run(signed, protocol, start, at=at, starts=bound, expectations=expected, progress=begin, **more)
+        certificate = run(
+            signed, protocol, start, at=at, initial_set=bound, expectations=expected, progress=begin, **more
+        )
     if output:
         certificate.save(output)
     found = certificate.assessment

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 @click.command()
 @graph_options
-@click.option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all starts.")
-@click.option("--initial-bound", metavar="R", required=True, help="All starts with |x_k(0)| <= R.")
+@click.option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all initial states.")
+@click.option("--initial-bound", metavar="R", required=True, help="All initial states with |x_k(0)| <= R.")
 @click.option("--deadline", metavar="T", help="Ask for this deadline.")
 @click.option("--shortest-deadline", is_flag=True, help="Ask for the shortest deadline.")
-@click.option("--residual", metavar="r", help="Every agent may be so far from its outcome at the deadline.")
+@click.option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
 @click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
 @click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")

@@ -18,7 +18,7 @@ from ptcc_certify.errors import NumberError, ParameterError, PTCCError
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
-    from ptcc_certify.protocols.limits import Actuator
+    from ptcc_certify.protocols.gain_limits import Actuator
 
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]
@@ -70,12 +70,14 @@ protocol_options = _options(
     click.option(
         "--disturbance",
         metavar="EXPR",
-        show_default="adversary",
-        help="Of the simulated run: an expression of k and t, adversary (sliding mode), telegraph or none.",
+        show_default="worst-case",
+        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none.",
     ),
     click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
     click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
-    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random starts."),
+    click.option(
+        "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random initial states."
+    ),
 )
 limit_options = _options(
     click.option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
@@ -90,7 +92,7 @@ method_option = click.option(
     help="Lyapunov functions searched beside the paper's.",
 )
 starts_option = click.option(
-    "--initial-bound", metavar="R", help="Bound the input for all starts within |x_k(0)| <= R, not --x0."
+    "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
 )
 memory_option = click.option(
     "--memory",
@@ -184,7 +186,7 @@ def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph)
 
     if (sliding := protocol.reaching) is None:
         return {}
-    source = "adversary" if options["disturbance"] is None else options["disturbance"]
+    source = "worst-case" if options["disturbance"] is None else options["disturbance"]
     horizon, seed = 2 * float(protocol.T), options["seed"]
     return {
         "sigma0": _sigma0(options["sigma0"], seed, graph),
@@ -194,7 +196,7 @@ def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph)
 
 def actuator_of(options: Options) -> Actuator | None:
     """Return the limits of the gain; None if there are none."""
-    from ptcc_certify.protocols.limits import Actuator
+    from ptcc_certify.protocols.gain_limits import Actuator
 
     actuator = Actuator(**{name: number(options, name) for name in LIMITS})
     return None if actuator.ideal else actuator
@@ -212,7 +214,7 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
 
 
 def start_of(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    """Return the start that ``--x0`` gives, or draw one."""
+    """Return the initial state that ``--x0`` gives, or draw one."""
     from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 == "random":

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
-from ptcc_certify.graphs.rich_display import Shown
 
 if TYPE_CHECKING:
     import networkx as nx

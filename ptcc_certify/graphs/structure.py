@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.rich_display import Shown
+from ptcc_certify.graphs.display_hook import Shown
 
 STABILITY = "stability"
 BIPARTITE_CONSENSUS = "bipartite consensus"
@@ -208,7 +208,7 @@ class Structure(Shown):
         return self.components[0].claim if len(self.components) == 1 else None
 
     def holds(self, behaviour: str) -> bool:
-        """Tell whether every component shows ``behaviour`` from every start that is not degenerate.
+        """Tell whether every component shows ``behaviour`` from every initial state that is not degenerate.
 
         Theorems and corollaries decide, but for the signed average: a strongly connected balanced component meets at
         it iff every node listens as much as it is listened to, undirected or not.
@@ -392,10 +392,10 @@ def _closed_components(
     violating: dict[int, int] = {}
     for position in camps.violated[::-1].tolist():
         violating[int(strong[camps.source[position]])] = position
-    members = _groups(strong, is_closed.size)
+    functions = _groups(strong, is_closed.size)
     result = []
     for number in np.flatnonzero(is_closed).tolist():
-        nodes = members[number].tolist()
+        nodes = functions[number].tolist()
         if number in violating:
             result.append(ClosedComponent(tuple(nodes), False, None, camps.negative_cycle(violating[number])))
         else:
@@ -418,11 +418,11 @@ def _weak_components(
     _, representative = np.unique(strong, return_index=True)
     n_strong = np.bincount(weak[representative], minlength=n_weak).tolist()
     result = []
-    for number, members in enumerate(_groups(weak, n_weak)):
+    for number, functions in enumerate(_groups(weak, n_weak)):
         connectivity = "strong" if n_strong[number] == 1 else "quasi-strong" if len(held[number]) == 1 else "weak"
         result.append(
             WeakComponent(
-                tuple(members.tolist()),
+                tuple(functions.tolist()),
                 connectivity,
                 tuple(held[number]),
                 any(closed[i].balanced for i in held[number]),

@@ -11,8 +11,8 @@ matrix of :func:`lmi.diagonal_lyapunov`. With ``(g_k - b) P_k`` in place of thes
     S_ii d_i > sum_j |S_ij| d_j    for every row i.
 
 Followers: ``w = v / u`` and ``d = u`` with ``u = (M - t I)^-1 1``, ``v = (M - t I)^-T 1``, ``M`` the comparison matrix
-of ``L_F`` (:mod:`lmi.iterative`). Groups: ``d`` so small that they hardly disturb the followers, ``w`` so large that
-the followers hardly disturb them.
+of ``L_F`` (:mod:`lmi.sparse_h_matrix`). Groups: ``d`` so small that they hardly disturb the followers, ``w`` so large
+that the followers hardly disturb them.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from typing import Any
 import numpy as np
 
 import lmi
+from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.numbers import round_to_bits
-from lmi.iterative import FILL_ROWS, SparseHMatrix, fill_core
-from lmi.sparse_witness import prove_sparse_positive_definite
-from lmi.witness import prove_generalized_margin
+from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
+from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import diagonal_matrix, prove_connectivity, symmetric_product
 from ptcc_certify.theorems.lemmas import EXACT_NODES, dyadic_left_vector, gauge, left_vector
 
-#: Relative distances of ``t`` below the smallest eigenvalue: the larger, the smaller the prefactor.
+#: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
 #: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
 _BITS, _SLACK = 40, 1e-9
@@ -50,8 +50,10 @@ _LARGEST_CONDITION = 1e6
 _GROUP_LOSSES = (1e-6, 1e-4, 1e-2, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
-def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, search: int = 0) -> list[LyapunovFunction]:
-    """Return Lyapunov functions from the fastest to the one of the smallest prefactor.
+def dominant_functions(
+    structure: Structure, losses: Sequence[float] = LOSSES, search: int = 0
+) -> list[LyapunovFunction]:
+    """Return Lyapunov functions from the fastest to the one of the smallest overshoot constant.
 
     Leader groups of more than ``EXACT_NODES`` nodes, up to ``search``, take the best diagonal matrix in place of the
     Perron vector. Their rates are proved. The inequality of all rows holds in floating point with some slack; the check
@@ -66,7 +68,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, sea
     --------
     >>> from ptcc_certify.graphs.structure import analyse
     >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 2), (2, 3, -1)])
-    >>> [round(float(m.rate), 3) for m in dominant_members(analyse(g))]
+    >>> [round(float(m.rate), 3) for m in dominant_functions(analyse(g))]
     [2.0, 1.99, 1.9, 1.5, 1.1, 1.01, 1.0]
     """
     if not structure.graph.n_edges:
@@ -75,7 +77,7 @@ def dominant_members(structure: Structure, losses: Sequence[float] = LOSSES, sea
     found: list[LyapunovFunction] = []
     for loss in losses:
         try:
-            found.append(problem.member(loss, "lmi" if search else "perron"))
+            found.append(problem.function(loss, "lmi" if search else "perron"))
         except LMIError:
             continue
     if not found:
@@ -111,7 +113,7 @@ class _Composite:
         if not min(2 * self.smallest, self.g.min(initial=np.inf)) > 0:
             raise NoCertificate("a block has no positive rate in floating point")
 
-    def member(self, loss: float, kind: str) -> LyapunovFunction:
+    def function(self, loss: float, kind: str) -> LyapunovFunction:
         """Return the composite whose followers are taken at ``(1 - loss)`` times their smallest eigenvalue."""
         p = self.p
         if self.followers is None:

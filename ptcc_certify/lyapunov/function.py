@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 import lmi
-from lmi.exact.rounding import float_down, float_up
-from lmi.sparse_witness import SparseDefinitenessProof
-from ptcc_certify.checker.input_bounds import Form
+from lmi.exact.directed_rounding import float_down, float_up
+from lmi.sparse_definiteness_proofs import SparseDefinitenessProof
+from ptcc_certify.checker.input_formulas import Form
 
 Matrix = list[list[Fraction]]
 
@@ -52,7 +52,7 @@ class LyapunovBlock:
 
 
 @dataclass(frozen=True)
-class DistanceBound:
+class DeviationBound:
     """``|x_k - (Q x)_k|^2 <= agents[k] V`` and ``||x - Q x||^2 <= norm V``; the check proves it.
 
     Attributes
@@ -152,8 +152,8 @@ class LyapunovFunction:
         The rate of a search, before the matrix was rounded, in floating point.
     dominance : Dominance or None
         Of a large graph: what proves the rate row by row.
-    deviation : DistanceBound or None
-        Constants from ``V`` to the distance of each agent to its outcome.
+    deviation : DeviationBound or None
+        Constants from ``V`` to the deviation of each agent to its final state.
     name : str
         Which part of a certificate it is.
     """
@@ -169,7 +169,7 @@ class LyapunovFunction:
     interval: lmi.RhoInterval | None = None
     numerical_rate: float | None = None
     dominance: Dominance | None = None
-    deviation: DistanceBound | None = None
+    deviation: DeviationBound | None = None
     name: str = ""
 
     @cached_property
@@ -216,7 +216,7 @@ class LyapunovFunction:
         return self.rate
 
     @property
-    def prefactor(self) -> Fraction:
+    def overshoot(self) -> Fraction:
         """``highest / lowest``, which multiplies the squared norm."""
         return self.highest / self.lowest
 
@@ -236,9 +236,9 @@ class LyapunovFunction:
         return float_down(self.proved_rate)
 
     @cached_property
-    def prefactor_above(self) -> float:
-        """The prefactor, rounded up."""
-        return float_up(self.prefactor)
+    def overshoot_above(self) -> float:
+        """The overshoot constant, rounded up."""
+        return float_up(self.overshoot)
 
     @cached_property
     def lowest_below(self) -> float:

@@ -1,7 +1,7 @@
 """Sharper Lyapunov functions than the paper's: searched in several classes, chosen for the bound over time, proved.
 
 All are quadratic in the error: ``V = E' P E`` with ``V <= e^(-b s) V(0)``, hence
-``||E||^2 <= prefactor e^(-b s) ||E(0)||^2``. The classes:
+``||E||^2 <= overshoot e^(-b s) ||E(0)||^2``. The classes:
 
 * ``perron``: diagonal, from the Perron vectors of leaders and followers, in closed form;
 * ``lmi``: the best diagonal matrix, searched by semidefinite programs;
@@ -22,14 +22,14 @@ import numpy as np
 
 import lmi
 import lmi.full
-from lmi.apart import apart
-from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
+from lmi.child_process import apart
+from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.errors import LMIError, OutOfTime
-from lmi.matrices import block_columns
-from lmi.witness import prove_generalized_margin
+from lmi.matrix_classes import block_columns
+from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.dominance import dominant_members
+from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import BITS, diagonal_matrix
@@ -43,9 +43,9 @@ SEARCHED_GROUP = (300, 2000)
 SEARCHING = 0.6
 #: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
 APART_NODES = 40
-#: The member with the largest rate is chosen among those with at most this prefactor.
+#: The Lyapunov function with the largest rate is chosen among those with at most this overshoot constant.
 LARGEST_PREFACTOR = 1e6
-#: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger prefactor.
+#: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger overshoot constant.
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
 _FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
@@ -56,9 +56,9 @@ USEFUL, _LATE = 0.01, 1.5
 _SAME_RATE = 1e-6
 #: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
 LARGEST_ENTRY = 2.0
-#: By what factor one more member must improve the bound of deviations at some instant.
+#: By what factor one more Lyapunov function must improve the bound of deviations at some instant.
 WORTH_A_MEMBER = 1.25
-#: Beyond this prefactor a diagonal matrix is of no use to anybody.
+#: Beyond this overshoot constant a diagonal matrix is of no use to anybody.
 _HOPELESS = 1e15
 _MATRIX_BITS = 60
 
@@ -83,15 +83,15 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Sharpening:
+class Search:
     """What was tried, what was taken, and how far the diagonal class reaches.
 
     Attributes
     ----------
-    members : tuple of LyapunovFunction
+    functions : tuple of LyapunovFunction
         Proved.
     tried : dict of str to float
-        Largest rate found of each class at any prefactor, in floating point.
+        Largest rate found of each class at any overshoot constant, in floating point.
     diagonal_limit : float or None
         No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
     notes : tuple of str
@@ -100,15 +100,15 @@ class Sharpening:
         What the time limit ended.
     """
 
-    members: tuple[LyapunovFunction, ...] = ()
+    functions: tuple[LyapunovFunction, ...] = ()
     tried: dict[str, float] = field(default_factory=dict)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
     cut_off: tuple[str, ...] = ()
 
 
-def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Sharpening:
-    """Search the classes of a method, choose the members that bound best, and prove them.
+def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], at: float | None = None) -> Search:
+    """Search the classes of a method, choose the Lyapunov functions that bound best, and prove them.
 
     Parameters
     ----------
@@ -122,10 +122,10 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
 
     Returns
     -------
-    Sharpening
+    Search
     """
     if method == "paper" or not system.nodes:
-        return Sharpening()
+        return Search()
     results: dict[str, list[Candidate]] = {}
     notes: list[str] = []
     cut_off: list[str] = []
@@ -159,33 +159,33 @@ def sharpen(system: ErrorSystem, method: str, clocks: Sequence[float], at: float
         candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
         for kind, rate in tried.items():
             if not any(c.rate > 0 for c in candidates if c.kind == kind):
-                notes.append(f"class {kind}: the rate {rate:.4g} needs a prefactor above {_HOPELESS:.0e}")
+                notes.append(f"class {kind}: the rate {rate:.4g} needs an overshoot constant above {_HOPELESS:.0e}")
         proved: list[LyapunovFunction] = []
         extra: LyapunovFunction | None = None
         with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
             chosen = choose(candidates, wanted)
             for candidate in chosen:
                 checkpoint()
-                member = prove_member(system, candidate)
-                if member is None:
+                function = prove_function(system, candidate)
+                if function is None:
                     notes.append(f"class {candidate.kind}: the rate {candidate.rate:.6g} is not proved")
                 else:
-                    proved.append(member)
+                    proved.append(function)
             checkpoint()
             decays = any(V.proved_rate > 0 for V in proved)
             near = _for_deviations(system, candidates, chosen, wanted) if decays else None
-            extra = None if near is None else prove_member(system, near)
+            extra = None if near is None else prove_function(system, near)
     limit = min((c.upper for c in every), default=math.inf)
-    members = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
-    if extra is not None:  # the largest rate, and its prefactor, stay those of a member that is small in E
-        fastest = max(members, key=lambda m: (m.proved_rate, -m.prefactor))
-        if extra.proved_rate < fastest.proved_rate or extra.prefactor >= fastest.prefactor:
-            members.append(replace(extra, rate=min(extra.proved_rate, fastest.proved_rate)))
+    functions = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
+    if extra is not None:  # the largest rate, and its overshoot constant, stay those of a function that is small in E
+        fastest = max(functions, key=lambda m: (m.proved_rate, -m.overshoot))
+        if extra.proved_rate < fastest.proved_rate or extra.overshoot >= fastest.overshoot:
+            functions.append(replace(extra, rate=min(extra.proved_rate, fastest.proved_rate)))
     least = limit if math.isfinite(limit) else None
-    return Sharpening(tuple(members), tried, least, tuple(notes), tuple(cut_off))
+    return Search(tuple(functions), tried, least, tuple(notes), tuple(cut_off))
 
 
-def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) -> Sharpening:
+def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> Search:
     """Return diagonal Lyapunov functions of a large graph, to be proved row by row by the check of the certificate.
 
     Leader groups take the Perron vector (class ``perron``), and those of some hundreds of nodes the best diagonal
@@ -196,13 +196,13 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
     structure : Structure
     method : {"perron", "lmi", "best"}
     clocks : sequence of float
-        See :func:`sharpen`.
+        See :func:`search_functions`.
     """
     if method not in (*DIAGONAL, "best"):
         n = structure.graph.n_nodes
         note = f"above {EXACT_NODES} nodes only the classes perron and lmi are proved; the graph has {n}"
-        return Sharpening(notes=(note,))
-    members: dict[Candidate, LyapunovFunction] = {}
+        return Search(notes=(note,))
+    functions: dict[Candidate, LyapunovFunction] = {}
     notes: list[str] = []
     tried: dict[str, float] = {}
     groups = [len(c.nodes) for c in structure.closed_components]
@@ -217,20 +217,20 @@ def sharpen_large(structure: Structure, method: str, clocks: Sequence[float]) ->
         found: Sequence[LyapunovFunction] = ()
         try:
             with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
-                found = list(apart(partial(dominant_members, structure, search=search)))
+                found = list(apart(partial(dominant_functions, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue
         rates = [float(V.proved_rate) for V in found]
-        members.update((Candidate(kind, r, float(V.prefactor)), V) for r, V in zip(rates, found, strict=True))
+        functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, found, strict=True))
         if found:
             tried[kind] = max(rates)
-    chosen = sorted(choose(list(members), clocks), key=lambda c: c.rate)
-    return Sharpening(tuple(members[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
+    chosen = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
+    return Search(tuple(functions[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
-    """Return the fastest candidate of a useful prefactor, the best at each clock value, and the fastest diagonal one.
+    """Return the fastest candidate that is useful, the best at each clock value, and the fastest diagonal one.
 
     Besides, unless one of these is nearly as early, the one that first leaves a hundredth of the error.
 
@@ -265,29 +265,30 @@ def _useful_from(candidate: Candidate) -> float:
 
 
 def _fastest(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the candidate of the largest rate, and of those that share it but for rounding the least prefactor."""
+    """Return the candidate of the largest rate, and of equal ones but for rounding the least overshoot constant."""
     top = max(c.rate for c in candidates)
     return min((c for c in candidates if c.rate >= top - _SAME_RATE * abs(top)), key=lambda c: c.condition)
 
 
-def _without_hair_splitting(members: list[LyapunovFunction]) -> list[LyapunovFunction]:
-    """Lower rates that are larger by rounding alone to that of the member with the smaller prefactor.
+def _without_hair_splitting(functions: list[LyapunovFunction]) -> list[LyapunovFunction]:
+    """Lower rates that are larger by rounding alone to that of the function with the smaller overshoot constant.
 
-    A smaller rate is proved with the larger one. The largest rate then comes with a prefactor that is worth it.
+    A smaller rate is proved with the larger one. The largest rate then comes with an overshoot constant that is worth
+    it.
     """
     result = []
-    for member in members:
-        slower = (m.proved_rate for m in members if m.prefactor < member.prefactor)
-        near = [rate for rate in slower if 0 < rate < member.proved_rate]
-        close = [rate for rate in near if member.proved_rate - rate <= Fraction(_SAME_RATE) * rate]
+    for function in functions:
+        slower = (m.proved_rate for m in functions if m.overshoot < function.overshoot)
+        near = [rate for rate in slower if 0 < rate < function.proved_rate]
+        close = [rate for rate in near if function.proved_rate - rate <= Fraction(_SAME_RATE) * rate]
         if close:
-            member = replace(member, rate=max(close))
-        result.append(member)
+            function = replace(function, rate=max(close))
+        result.append(function)
     return result
 
 
-def prove_member(system: ErrorSystem, candidate: Candidate) -> LyapunovFunction | None:
-    """Round a candidate to rationals and prove its rate and prefactor in exact arithmetic; None if a step fails."""
+def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunction | None:
+    """Round a candidate to rationals and prove its rate and overshoot constant exactly; None if a step fails."""
     n = len(system.nodes)
     if candidate.log_weights is not None:
         weights = rounded_diagonal(candidate.log_weights, BITS)
@@ -386,7 +387,7 @@ def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
 
 
 def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
-    """Yield the best diagonal matrix, the best ones of useful prefactors, and if ``thorough`` the whole frontier."""
+    """Yield the best diagonal matrix, useful ones, and if ``thorough`` the whole frontier."""
     A, basis = system.matrix, system.basis
     best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
     yield replace(_diagonal("lmi", best), upper=best.upper)
@@ -398,7 +399,7 @@ def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
                 )
                 yield _diagonal("lmi", near)
     if thorough:
-        yield from (_diagonal("lmi", member) for member in lmi.rate_frontier(A, basis=basis, best=best))
+        yield from (_diagonal("lmi", function) for function in lmi.rate_frontier(A, basis=basis, best=best))
 
 
 def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[Candidate]:
@@ -406,11 +407,11 @@ def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[C
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
     reduced = A if U is None else U.T @ A @ U
-    for member in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
-        P = member.matrix
+    for function in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
+        P = function.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
-            P = U @ P @ U.T + np.sqrt(member.condition) * (np.eye(len(A)) - U @ U.T)
-        yield Candidate("full", member.rate, member.condition, matrix=P)
+            P = U @ P @ U.T + np.sqrt(function.condition) * (np.eye(len(A)) - U @ U.T)
+        yield Candidate("full", function.rate, function.condition, matrix=P)
 
 
 def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:

@@ -19,8 +19,8 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
+from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.expression import ATOMS, Interval, Program, enclosure, floats, parse, symbolic
-from ptcc_certify.protocols.latex import to_latex
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -50,7 +50,7 @@ class Disturbance(ABC):
         agents : (A,) array_like of int
             Counted from 0.
         signs : (A,) array_like
-            ``sign(sigma_k)`` of these agents; only the adversary reads it.
+            ``sign(sigma_k)`` of these agents; only the worst-case disturbance reads it.
 
         Returns
         -------
@@ -433,7 +433,7 @@ def telegraph_noise(amplitude: float, rate: float, n: int, until: float, seed: i
 
 
 @dataclass(frozen=True, init=False)
-class Adversary(Disturbance):
+class WorstCaseDisturbance(Disturbance):
     """The worst disturbance against reaching: ``d_k = delta sign(sigma_k)``, zero while sliding.
 
     Parameters
@@ -458,18 +458,18 @@ class Adversary(Disturbance):
 
     Examples
     --------
-    >>> Adversary("1/2").values([0.0, 1.0], [0, 1], [1, -1])
+    >>> WorstCaseDisturbance("1/2").values([0.0, 1.0], [0, 1], [1, -1])
     array([[ 0.5,  0.5],
            [-0.5, -0.5]])
     """
 
     delta: Fraction
-    text: str = field(default="adversary: delta sign(sigma_k)", init=False, repr=False)
+    text: str = field(default="worst-case disturbance: delta sign(sigma_k)", init=False, repr=False)
 
     def __init__(self, delta: Exact):
         object.__setattr__(self, "delta", _exact(delta, "delta"))
         if self.delta < 0:
-            raise ParameterError(f"delta of the adversary is {float(self.delta):g}; give zero or more")
+            raise ParameterError(f"delta of the worst-case disturbance is {float(self.delta):g}; give zero or more")
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
         """Return ``delta sign(sigma_k)``: floats (A, M)."""
@@ -481,12 +481,12 @@ class Adversary(Disturbance):
         return level, np.zeros(level.size)
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
-        """Compare the adversary's ``delta`` with that of the protocol."""
+        """Compare the worst-case disturbance's ``delta`` with that of the protocol."""
         if self.delta > delta:
             value, limit = nearest_float(self.delta), nearest_float(delta)
             raise ParameterError(
-                f"the adversary's |d_k| = {value!r} of agent {shorten(labels[0])} from t = 0 on is beyond "
-                f"delta = {limit!r}; make the adversary with that delta"
+                f"the worst-case disturbance's |d_k| = {value!r} of agent {shorten(labels[0])} from t = 0 on is beyond "
+                f"delta = {limit!r}; make the worst-case disturbance with that delta"
             )
         return "by definition"
 
@@ -598,8 +598,8 @@ def as_disturbance(value: Any, n: int, delta: Exact, until: float, seed: int = 0
 
     Examples
     --------
-    >>> as_disturbance("adversary", 2, "0.1", 1.0).text
-    'adversary: delta sign(sigma_k)'
+    >>> as_disturbance("worst-case", 2, "0.1", 1.0).text
+    'worst-case disturbance: delta sign(sigma_k)'
     >>> as_disturbance([0.1, "1/3"], 2, 1, 1.0)
     Traceback (most recent call last):
     ...
@@ -611,8 +611,8 @@ def as_disturbance(value: Any, n: int, delta: Exact, until: float, seed: int = 0
         word = value.strip()
         if word == "none":
             return SampledDisturbance([0], [0], text="none")
-        if word == "adversary":
-            return Adversary(delta)
+        if word == "worst-case":
+            return WorstCaseDisturbance(delta)
         if word == "telegraph":
             horizon = _number(until, "until")
             rate = 20 / horizon if horizon > 0 else 0.0

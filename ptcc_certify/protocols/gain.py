@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ptcc_certify.checker.input_bounds import PrescribedGain
+from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Parameters, Positive, parameter, refuse_out_of_range
 
 if TYPE_CHECKING:

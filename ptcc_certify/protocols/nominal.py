@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.base import Protocol, aligned, symbols
-from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ class NominalProtocol(Protocol):
         u_k = gain(t) sum_l w_kl (x_l - sign(w_kl) x_k),
         gain(t) = rho1 + rho2 kappa/(T - t)  before T,  rho1 from T on
 
-    The agents settle at ``T``, whatever the start. ``rho2 = 0`` is allowed: then the gain is constant and they settle
-    only as ``t`` goes to infinity (the asymptotic baseline).
+    The agents settle at ``T``, whatever the initial state. ``rho2 = 0`` is allowed: then the gain is constant and they
+    settle only as ``t`` goes to infinity (the asymptotic baseline).
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _pull(weight: Any, listener: ca.SX, source: ca.SX) -> ca.SX:
 
 
 def coupling(graph: SignedDigraph, x: ca.SX) -> ca.SX:
-    """``E``, the sum of the pulls on every agent."""
+    """``E``, the sum of the containment weights on every agent."""
     import casadi as ca
 
     entries = [ca.SX(0)] * graph.n_nodes

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.rounding import down, float_down, near, up
+from lmi.exact.directed_rounding import down, float_down, near, up
 from ptcc_certify.errors import SimulationError
-from ptcc_certify.protocols.disturbance import Adversary, Disturbance
+from ptcc_certify.protocols.disturbance import Disturbance, WorstCaseDisturbance
 
 if TYPE_CHECKING:
     from ptcc_certify.protocols.base import ReachingProtocol
@@ -36,7 +36,7 @@ _MAX_PANELS = 200_000
 _LEAST_PANELS = 3000
 _BATCH = 200_000
 _BITS = (96, 256, 1024, 4096)
-#: By how much a sum of panels, or a decay, may be off, relative to the start.
+#: By how much a sum of panels, or a decay, may be off, relative to the initial state.
 SUM_ERROR = 1e-12
 _LARGEST_Z = Fraction(2) ** 1000
 
@@ -65,7 +65,7 @@ class ReachingTime:
     >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3="1/2", delta=1)
     >>> small, large = certified_reaching_times(p, [Fraction(1), Fraction(100)])
-    >>> small.time < 1, large.time, large.z is None  # the adversary keeps the large one away from 0 until T_r
+    >>> small.time < 1, large.time, large.z is None  # the worst case keeps the large one from 0 until T_r
     (True, 1.0, True)
     """
 
@@ -100,7 +100,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
 
     ``|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r)`` is shown in ball arithmetic, the integral being an incomplete
     gamma function. With ``mu3 kappa >= 1`` such a ``t < T_r`` always exists. With ``mu3 kappa < 1`` the integral is
-    finite: a large ``sigma_k(0)`` is certain to be 0 at ``T_r`` only, and the adversary attains it.
+    finite: a large ``sigma_k(0)`` is certain to be 0 at ``T_r`` only, and the worst-case disturbance attains it.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
-    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
+    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
     known: dict[Fraction, Fraction | None] = {Fraction(0): Fraction(0)}
     for value, z in zip(sigma0, worst.z.tolist(), strict=True):
         if abs(value) not in known:
@@ -225,12 +225,12 @@ class ReachingProblem:
 
     def __init__(self, protocol: ReachingProtocol, sigma0: np.ndarray, disturbance: Disturbance):
         self._protocol, self._disturbance = protocol, disturbance
-        # Each sliding variable in units of its own start: the bracket begins at 1.
+        # Each sliding variable in units of its own initial state: the bracket begins at 1.
         self._unit, self._sign = np.abs(sigma0), np.sign(sigma0)
         self._agents = np.flatnonzero(self._sign)
-        # An adversary of the full size leaves mu1 - delta, which floats would cancel.
+        # A worst-case disturbance of the full size leaves mu1 - delta, which floats would cancel.
         self._gap = float(protocol.mu1 - protocol.delta)
-        self._worst = isinstance(disturbance, Adversary) and disturbance.delta == protocol.delta
+        self._worst = isinstance(disturbance, WorstCaseDisturbance) and disturbance.delta == protocol.delta
         self.z = np.zeros(len(sigma0))
         if self._agents.size:
             largest = _bracket(protocol, Fraction(float(self._unit.max())))
@@ -405,12 +405,12 @@ def sliding_bound(
     z: np.ndarray,
     reaching: Sequence[ReachingTime] | None = None,
 ) -> np.ndarray:
-    """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below what the adversary leaves.
+    """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below the worst case.
 
     ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, sharper than Proposition 1 and kept by every
     disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
     lose digits, and may be 0.
     """
-    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), Adversary(protocol.delta))
+    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
     times = certified_reaching_times(protocol, sigma0) if reaching is None else reaching
     return worst.above(z, np.array([math.inf if r.z is None else float(r.z) for r in times]) * (1 + 1e-15))

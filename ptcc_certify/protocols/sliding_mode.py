@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
-from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
 from ptcc_certify.protocols.parameters import NotNegative, Positive, readable
 

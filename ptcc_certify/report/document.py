@@ -9,7 +9,7 @@ from pathlib import Path
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.plots.style import figure_bytes
@@ -35,7 +35,7 @@ def write_report(
     Parameters
     ----------
     certificate : path
-        A file of schema ``ptcc-certificate/1``.
+        A file of schema ``ptcc-certificate/2``.
     output : path
         The suffix decides what is written.
     simulation : bool, optional
@@ -112,7 +112,7 @@ def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate,
     if simulation is False:
         return saved, "it was left out (--no-simulation)"
     if saved.start is None:
-        return saved, "the certificate names no start"
+        return saved, "the certificate names no initial state"
     if simulation is None and n > REPEATED_NODES:
         return saved, f"above {REPEATED_NODES} agents it is repeated only where that is asked for"
     try:
@@ -120,4 +120,4 @@ def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate,
     except (SimulationError, ParameterError) as error:
         return saved, f"it failed: {error}"
     except OverflowError:
-        return saved, "a number of the start is beyond the range of float64"
+        return saved, "a number of the initial state is beyond the range of float64"

@@ -1,8 +1,8 @@
 """The explorer: proved bound and simulated run of a graph, redrawn while parameters are moved in a notebook.
 
 Lyapunov functions and their rates depend on the graph alone; gains and deadline enter through the clock. They are
-searched and proved once for each graph and class. What follows a control is the rest: clock, run, bound, outcome, and
-the independent check of the certificate that they make.
+searched and proved once for each graph and class. What follows a control is the rest: clock, run, bound, final state,
+and the independent check of the certificate that they make.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.rounding import down
-from ptcc_certify.bounds.final_state import exact_start, outcome
+from lmi.exact.directed_rounding import down
+from ptcc_certify.bounds.final_state import exact_initial_state, final_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
-from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.graphs.rationals import as_fraction
+from ptcc_certify.graphs.size_limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.search import METHODS, sharpen
+from ptcc_certify.lyapunov.search import METHODS, search_functions
 from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
 
 KINDS = ("nominal", "sliding-mode")
-DISTURBANCES = ("none", "adversary", "sin", "telegraph")
+DISTURBANCES = ("none", "worst-case", "sin", "telegraph")
 #: The name of a graph that is given, among those of the packaged ones.
 GIVEN = "given graph"
 #: Values of ``s`` times the largest rate that is possible, at which the bound should be small, whatever the gains.
@@ -67,7 +67,7 @@ _LARGEST, _LARGER = 3.0, {"kappa": 5.0, "mu1": 5.0}
 _NOMINAL = ("T", "rho1", "rho2", "kappa")
 _SLIDING = tuple(name for name in _BEGIN if name != "T")
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
-_SHOWN = ("claim", "ends at", "sliding", "disturbed", "rate", "left", "proof", "input", "INPUT", "simulated", "note")
+_SHOWN = ("claim", "x(T)", "sliding", "disturbed", "rate", "error", "proof", "input", "INPUT", "simulated", "note")
 _SAMPLES, _DPI = 81, 120
 #: Share of the error at the start down to which the decay is drawn: below it the integrator resolves little.
 _LEAST = 1e-8
@@ -86,10 +86,10 @@ class Settings:
     kind : {"nominal", "sliding-mode"}
     reaching : bool
         Sliding mode: whether ``sigma(0)`` is random, or 0, which leaves no reaching phase.
-    disturbance : {"none", "adversary", "sin", "telegraph"}
+    disturbance : {"none", "worst-case", "sin", "telegraph"}
         Sliding mode: what the simulated run meets; ``sin`` is ``delta sin(2 k t)``.
     seed : int
-        Of the start, of ``sigma(0)`` and of telegraph signals: whole numbers from -9 to 9.
+        Of the initial state, of ``sigma(0)`` and of telegraph signals: whole numbers from -9 to 9.
     method : {"best", "paper", "perron", "lmi", "full"}
         Classes of Lyapunov functions; see :mod:`ptcc_certify.lyapunov.search`.
     **parameters : number or str
@@ -113,7 +113,7 @@ class Settings:
         kind: str = "nominal",
         *,
         reaching: bool = True,
-        disturbance: str = "adversary",
+        disturbance: str = "worst-case",
         seed: int = 0,
         method: str = "best",
         **parameters: Any,
@@ -267,10 +267,10 @@ class Explorer:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         structure, n = base.structure, base.graph.n_nodes
         drawn = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
-        start = exact_start(structure, drawn[0])
+        start = exact_initial_state(structure, drawn[0])
         more: dict[str, Any] = {}
         if (sliding := protocol.reaching) is not None:
-            sigma0 = exact_start(structure, drawn[1] if settings.reaching else [0] * n)
+            sigma0 = exact_initial_state(structure, drawn[1] if settings.reaching else [0] * n)
             base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(sliding, sigma0))
             more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, sliding, n)}
         run = simulate(base.graph, protocol, [float(x) for x in start], samples=_SAMPLES, **more)
@@ -279,7 +279,7 @@ class Explorer:
         return base.changed(
             protocol=protocol,
             start=tuple(start),
-            outcome=outcome(structure, moved, matrix=base.influence),
+            final_state=final_state(structure, moved, matrix=base.influence),
             trajectory=run,
         )
 
@@ -311,9 +311,9 @@ class Explorer:
         if (graph, method) not in self._proved:
             base = self._proved[graph, "paper"]
             unit = float(base.upper_bound or 1)
-            found = sharpen(ErrorSystem(base.structure), method, [x / unit for x in _CLOCKS])
+            found = search_functions(ErrorSystem(base.structure), method, [x / unit for x in _CLOCKS])
             notes = (*base.notes, *found.notes)
-            self._proved[graph, method] = base.changed(sharpening=found, method=method, notes=notes)
+            self._proved[graph, method] = base.changed(search=found, method=method, notes=notes)
         return self._proved[graph, method]
 
 
@@ -507,7 +507,7 @@ def _figure(certificate: Certificate) -> Figure:
     draw: list[Callable[[Axes], object]] = [lambda ax: plot_trajectory(run, certificate.structure, ax)]
     if not certificate.direct:
         draw.append(lambda ax: plot_sliding(run, certificate.reaching, ax))
-    if certificate.envelope.members:
+    if certificate.envelope.functions:
         draw.append(partial(_draw_decay, certificate))
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
@@ -522,12 +522,12 @@ def _figure(certificate: Certificate) -> Figure:
 
 
 def _draw_decay(certificate: Certificate, ax: Axes) -> None:
-    """Draw ``||E||`` (or ``||eps||``) under its bound as :func:`plot_decay` does, but without each member's own."""
+    """Draw ``||E||`` (or ``||eps||``) under its bound as :func:`plot_decay` does, but without each function's own."""
     run, envelope = certificate.trajectory, certificate.envelope
     assert run is not None
     before = run.remaining > 0
-    member = next(m for m in envelope.members if m.coordinates == envelope.coordinates)
-    norm = np.linalg.norm(member.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
+    function = next(m for m in envelope.functions if m.coordinates == envelope.coordinates)
+    norm = np.linalg.norm(function.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
     bound, scale = certificate.norm_bound(run.remaining[before]), float(norm[0]) or 1.0
     ax.loglog(run.remaining[before], bound / scale, color="#D55E00", linewidth=1.6, label="bound")
     ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")

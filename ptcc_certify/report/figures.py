@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.limits import DRAWN_NODES, INPUT_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
@@ -28,7 +28,7 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:
         figures["graph"] = plot_graph(saved.structure).figure
     if run is None:
         return figures
-    if "decay" in wanted and saved.comparison is not None and saved.envelope.members and run.error.any():
+    if "decay" in wanted and saved.comparison is not None and saved.envelope.functions and run.error.any():
         figures["decay"] = plot_decay(saved).figure
     if "sliding" in wanted and (slid := run.sliding) is not None and not saved.direct and n <= INPUT_NODES:
         figures["sliding"] = plot_sliding(slid, saved.reaching).figure

@@ -1,6 +1,6 @@
 """What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
 
-Registered with :mod:`ptcc_certify.graphs.rich_display`, which calls them for ``_repr_html_``; elsewhere the plain
+Registered with :mod:`ptcc_certify.graphs.display_hook`, which calls them for ``_repr_html_``; elsewhere the plain
 ``repr`` is shown. Labels are escaped, figures are inline SVG images with a text in their place for those who
 do not see them.
 """
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.limits import SHOWN_NODES
-from ptcc_certify.graphs.rich_display import shows
+from ptcc_certify.graphs.display_hook import shows
+from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
@@ -56,14 +56,14 @@ def certificate_html(certificate: Certificate) -> str:
 
     run = certificate.trajectory
     moves = run is not None and certificate.comparison is not None and bool(run.error.any())
-    drawable = moves and bool(certificate.envelope.members)
+    drawable = moves and bool(certificate.envelope.functions)
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
     return _page(certificate_lines(certificate, "signed digraph"), [(draw, alt)] if drawable else [])
 
 
 @shows(Trajectory)
 def trajectory_html(trajectory: Trajectory) -> str:
-    """Show a trajectory: what its ``repr`` says, and the states (and sliding variables) of one start over time."""
+    """Show a trajectory: what its ``repr`` says, and states (and sliding variables) over time."""
     structure = analyse(trajectory.graph)
 
     def draw() -> Figure:

@@ -22,8 +22,8 @@ from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.io.graph_files import reading_flags
-from ptcc_certify.graphs.limits import DRAWN_NODES
 from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.size_limits import DRAWN_NODES
 from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.report import texts
 from ptcc_certify.report.figures import draw, inline_figure
@@ -145,19 +145,19 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "negative": int((graph.sign < 0).sum()),
         "remarks": remarks_on(saved.structure),
         "structure_words": structure_text(saved.structure),
-        "common_bound": texts.common_bound(effort.starts) if effort and effort.starts is not None else None,
+        "common_bound": texts.common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
         "equations": texts.equations(saved.protocol),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),
         "claims_in_all": len(saved.claims),
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
-        "exact": saved.final_state is None or not any(radius for _, radius in saved.final_state),
+        "exact": saved.final_state is None or saved.final_state.radius is None,
         **dict(zip(("states_head", "states"), _states(saved), strict=True)),
         "z": texts.coordinates(saved),
-        "prefactor_of": "E"
-        if saved.prefactor is not None and saved.document["prefactor"]["of"] == "||E||^2"
+        "overshoot_of": "E"
+        if saved.overshoot is not None and saved.document["overshoot"]["of"] == "||E||^2"
         else "\u03b5",
-        "kinds": Counter(m.kind for m in saved.envelope.members).items(),
+        "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(graph.labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
         "figures": draw(saved, ("graph", "decay", "sliding", "input")),
@@ -184,28 +184,28 @@ def _title(saved: Certificate, deadline: str, kept: str) -> Markup:
 def _missing(saved: Certificate) -> str:
     """Say what keeps a certificate from being certified."""
     lacks = ["no decay was proved"] if saved.rate is None and not saved.constant else []
-    lacks += ["no final state was proved"] if saved.document["outcome"] is None else []
+    lacks += ["no final state was proved"] if saved.document["influence"] is None else []
     return " and ".join(lacks) or "not everything was proved"
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the table of starts and final states."""
+    """Return head and rows of the table of initial and final states."""
     if saved.start is None:
         return [], []
-    numbers: dict[str, list[str]] = {"Start": [rational(x) for x in saved.start[:ROWS]]}
+    numbers: dict[str, list[str]] = {"Initial state": [rational(x) for x in saved.start[:ROWS]]}
     if not saved.direct:
         numbers["\u03c3(0)"] = [rational(x) for x in (saved.sigma0 or ())[:ROWS]]
     if saved.final_state is not None:
         ends = "State at the deadline" if saved.verdict == "certified" else "Limit, if it settles"
-        numbers[ends] = [enclosed(x) for x in saved.final_state[:ROWS]]
+        numbers[ends] = [enclosed(x) for x in (saved.final_state.intervals or ())[:ROWS]]
     labels = [texts.label(name) for name in saved.graph.labels[:ROWS]]
     rows = zip(labels, agent_parts(saved)[:ROWS], *numbers.values(), strict=True)
     return ["Agent", "Part", *numbers], [list(row) for row in rows]
 
 
 def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
-    """Return the instants, what may be left then of the norm, and of the distance to the outcome, rounded up."""
-    if not saved.envelope.members or saved.rate is None or (not saved.direct and saved.start is None):
+    """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
+    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.start is None):
         return []
     instants = [(Fraction(str(f)), f"{f} T") for f in FRACTIONS]
     if not saved.direct:
@@ -214,8 +214,8 @@ def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     left = [float(1 - f) for f, _ in instants]
     bounds = map(saved.envelope.residual, left) if saved.direct else saved.norm_bound(left).tolist()
     columns = [[above(x, 2) for x in bounds]]
-    if saved.start is not None and any(m.deviation is not None for m in saved.envelope.members):
-        columns.append([above(float(x), 2) for x in saved.outcome_distance(left).max(axis=0)])
+    if saved.start is not None and any(m.deviation is not None for m in saved.envelope.functions):
+        columns.append([above(float(x), 2) for x in saved.deviation_bound(left).max(axis=0)])
     return list(zip((name for _, name in instants), *columns, strict=True))
 
 
@@ -223,7 +223,7 @@ def _gap(saved: Certificate) -> Fraction | None:
     """Return how far the end of the repeated run is from the proved final state."""
     if saved.trajectory is None or saved.final_state is None:
         return None
-    pairs = zip(saved.trajectory.final_state.tolist(), saved.final_state, strict=True)
+    pairs = zip(saved.trajectory.final_state.tolist(), saved.final_state.intervals or (), strict=True)
     return Fraction(max(abs(float(x) - nearest_float(middle)) for x, (middle, _) in pairs))
 
 
@@ -232,7 +232,7 @@ def _largest(labels: Sequence[str], values: Sequence[Any]) -> str:
 
 
 def _camps(component: ClosedComponent) -> list[list[int]]:
-    """Return the camps of a balanced leader group, the one of its first member first."""
+    """Return the camps of a balanced leader group, the one of its first Lyapunov function first."""
     gauge = component.gauge or ()
     camps = [[v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1)]
     return [camp for camp in camps if camp]

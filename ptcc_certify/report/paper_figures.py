@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from lmi.exact.rounding import down, float_down, near, up
+from lmi.exact.directed_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
@@ -99,8 +99,8 @@ def results_csv(runs: Sequence[Run]) -> str:
     table = []
     for example, graph, certificate in runs:
         claim, paper, seen = certificate.claim, certificate.proof.rate, certificate.comparison
-        ends, (last, proved, deadline) = certificate.outcome, _reaching_times(certificate)
-        final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.final_state, strict=True)]
+        ends, (last, proved, deadline) = certificate.final_state, _reaching_times(certificate)
+        final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.states, strict=True)]
         row = {
             "example": example.number,
             "graph": graph,
@@ -150,9 +150,9 @@ def _reaching_times(certificate: Certificate) -> tuple[float | None, float | Non
 
 def _ends(certificate: Certificate) -> str:
     """Return the final state in a few letters: 0, a common size, or the largest, rounded up."""
-    if certificate.outcome is None:
+    if certificate.final_state is None:
         return "-"
-    sizes = {abs(Fraction(x)) for x in certificate.outcome.final_state}
+    sizes = {abs(Fraction(x)) for x in certificate.final_state.states}
     largest = max(sizes)
     common = near(largest, 5) if sizes == {0} else f"+-{near(largest, 5)}"
     return common if len(sizes) == 1 else f"|x| <= {up(largest, 5)}"

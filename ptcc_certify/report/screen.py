@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lmi.exact.enclosure import LARGEST_PUSH
-from lmi.exact.rounding import down, near, up
+from lmi.exact.directed_rounding import down, near, up
+from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.claims import Claim
 
@@ -63,8 +63,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         names = [name for name in p.to_dict() if name != "kind"]
         yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
         if certificate.start is not None:
-            yield "start", _pairs(structure.graph.labels, certificate.start)
-        for part in (_sliding_lines, _outcome_lines, _rate_lines, _effort_lines, _simulation_lines):
+            yield "x(0)", _pairs(structure.graph.labels, certificate.start)
+        for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines, _simulation_lines):
             yield from part(certificate)
         if certificate.cut_off:
             named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
@@ -94,26 +94,26 @@ def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
     return f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"
 
 
-def _outcome_lines(certificate: Certificate) -> Lines:
+def _final_state_lines(certificate: Certificate) -> Lines:
     """Tell where the agents end."""
-    result = certificate.outcome
+    result = certificate.final_state
     if result is None:
         return
     kind = "exact" if result.exact else "floating point"
     if result.radius is not None:
         widest = max(result.radius)
         kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
-    if kind != "floating point" and any(Fraction(_digits(x)) != x for x in result.final_state[:100]):
+    if kind != "floating point" and any(Fraction(_digits(x)) != x for x in result.states[:100]):
         kind += "; here to 5 digits"
-    yield "ends at", f"{_pairs(certificate.graph.labels, result.final_state)} ({kind})"
+    yield "x(T)", f"{_pairs(certificate.graph.labels, result.states)} ({kind})"
     if result.degenerate:
         groups = ", ".join(map(str, result.degenerate))
-        yield "", f"degenerate start: leader group {groups} meets at 0, although it is balanced"
+        yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:
     rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
-    best = "" if bound is None else f"; none exceeds {up(bound, 8)}, proved"
+    best = "" if bound is None else f"; upper bound {up(bound, 8)}, proved"
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
         best += f" ({spectral:.6g}, numerical)"
     if certificate.constant:
@@ -128,28 +128,28 @@ def _rate_lines(certificate: Certificate) -> Lines:
     yield "rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{ratio}"
     yield from _class_lines(certificate)
     yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
-    yield from _distance_lines(certificate)
+    yield from _deviation_lines(certificate)
     arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
-    said, report = f"{len(certificate.obligations)} statement(s) proved in {arithmetic}", certificate.checked
+    said, report = f"{len(certificate.obligations)} proof obligations proved in {arithmetic}", certificate.checked
     if report is not None:
         said += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
     yield "proof", said
 
 
 def _class_lines(certificate: Certificate) -> Lines:
-    """Tell the members of the envelope: class, rate and prefactor; what else was tried; the paper's own formula."""
-    V, found = certificate.lyapunov, certificate.sharpening
+    """Tell the Lyapunov functions of the envelope: class, rate, overshoot; what was searched; the paper's formula."""
+    V, found = certificate.lyapunov, certificate.search
     if V is not None and certificate.proof.rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
-        prefactor = f"||{V.coordinates}||^2 prefactor {up(V.prefactor, 4)}"
-        yield "", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {prefactor}"
+        overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
+        yield "", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
     if found.tried:
         tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
-        limit = "" if found.diagonal_limit is None else f"; no diagonal matrix exceeds {found.diagonal_limit:.4g}"
+        limit = "" if found.diagonal_limit is None else f"; diagonal upper bound {found.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
-        yield "", f"tried {', '.join(tried)} (numerical{limit}{time})"
-        taken = [f"{V.kind} {down(V.proved_rate, 4)} (prefactor {up(V.prefactor, 2)})" for V in found.members]
-        yield "", f"taken {', '.join(taken) or 'none, no rate was proved'}"
+        yield "", f"searched {', '.join(tried)} (numerical{limit}{time})"
+        used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in found.functions]
+        yield "", f"used {', '.join(used) or 'none, no rate was proved'}"
 
 
 def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
@@ -157,18 +157,18 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
     return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
 
 
-def _distance_lines(certificate: Certificate) -> Lines:
-    """Tell how far from its outcome the farthest agent may be, and every agent at the instant asked for."""
+def _deviation_lines(certificate: Certificate) -> Lines:
+    """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
     if certificate.start is None or not any(V.deviation for V in certificate.functions):
         return
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
-    worst = certificate.outcome_distance([q for q, _ in instants]).max(axis=0, initial=0.0)
+    worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
     if instants:
         numerical = "" if certificate.direct else " (numerical, rounded up)"
         said = _at_instants(worst, (name for _, name in instants))
-        yield "distance", f"of every agent to its outcome at most {said}{numerical}"
+        yield "deviation", f"of every agent from its final state at most {said}{numerical}"
     if certificate.at is not None:
-        each = certificate.outcome_distance([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
+        each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
         listed = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
         yield "", f"at t = {near(certificate.at, 12)}: {_listed(listed)}"
 
@@ -182,10 +182,10 @@ def _effort_lines(certificate: Certificate) -> Lines:
     product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
     if effort.bounded:
         how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
-        yield "input", f"bounded up to the deadline for every start: {how}"
+        yield "input", f"bounded up to the deadline for every initial state: {how}"
     elif effort.bounded is False:
-        below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "limit" else " = 1 or less"
-        yield "INPUT", "NOT BOUNDED: the state converges, but from some starts the input grows without limit"
+        below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
+        yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
         yield "", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"
     else:
         yield "input", f"bounded or not is undecided: {product}, it takes 1"
@@ -197,11 +197,11 @@ def _effort_lines(certificate: Certificate) -> Lines:
     sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
     sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
     if sizes:
-        whom = "" if effort.starts is None else " for all these starts"
+        whom = "" if effort.initial_set is None else " for all these initial states"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         yield "effort", ", ".join(sizes) + whom + part
     other = bool(certificate.limits) or not certificate.direct  # the found start is of neither
-    worst = None if effort.peak is None or other else certificate.worst_start
+    worst = None if effort.peak is None or other else certificate.worst_initial_state
     if worst is not None and math.isfinite(worst.size):
         labels = certificate.graph.labels
         where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
@@ -213,7 +213,7 @@ def _effort_lines(certificate: Certificate) -> Lines:
         d, drift = effort.disturbed, effort.disturbed.drift
         ends = "" if drift is None else ", and all end where they would without"
         if drift is not None and any(drift):
-            ends = f", every agent ends within {up(max(drift), 4)} of its outcome"
+            ends = f", every agent ends within {up(max(drift), 4)} of its final state"
         yield "disturbed", f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|{ends}"
     elif certificate.delta is not None:
         yield "disturbed", "nothing is certified: the rate proves no bounded input"
@@ -222,16 +222,16 @@ def _effort_lines(certificate: Certificate) -> Lines:
 def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
     """Tell what is proved under limits of the gain, and under noise with them."""
     for entry in effort.residual:
-        named = (("gain <= ", entry.limits.gain_cap), ("stop at T - ", entry.limits.stop_before))
-        said = [f"{what}{near(x)}" for what, x in (*named, ("held for ", entry.limits.sample_period)) if x]
-        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its outcome"
+        named = (("gain <= ", entry.limits.gain_cap), ("switched off at T - ", entry.limits.stop_before))
+        said = [f"{what}{near(x)}" for what, x in (*named, ("zero-order hold ", entry.limits.sample_period)) if x]
+        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
         yield "limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
             yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
     if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
-        yield "noise", "not certified: noise times an infinite gain; cap the gain, or stop before"
+        yield "noise", "not certified: noise times an infinite gain; saturate the gain, or switch it off before T"
     if effort.longest_period is not None:
         yield "limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"
     elif len(effort.residual) < len(certificate.limits):
@@ -257,7 +257,7 @@ def _residual_lines(certificate: Certificate) -> Lines:
     if at is not None:
         own = envelope.residual(float(1 - at / certificate.protocol.T))
         proved = f"{up(own, 3)} at t = {near(at, 12)}, {proved}"
-    yield "left", f"||{envelope.coordinates}(t)|| / ||{envelope.coordinates}(0)|| at most {proved}"
+    yield "error", f"||{envelope.coordinates}(t)|| / ||{envelope.coordinates}(0)|| at most {proved}"
     slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
     if slowest[-1] is not None:
         yield "", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
@@ -274,7 +274,7 @@ def _reaching_lines(certificate: Certificate) -> Lines:
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
     bounds = envelope.state_bound(np.array([q for q, _ in chosen]), certificate.start)
     said = _at_instants(bounds, (name for _, name in chosen))
-    yield "left", f"||{envelope.coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
+    yield "error", f"||{envelope.coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
 
 
 def _simulation_lines(certificate: Certificate) -> Lines:
@@ -289,8 +289,8 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         return
     if seen is not None and not certificate.constant:
         said = "VIOLATED" if seen.violated else "kept" if seen.judged else "not tested, all is below the floor"
-        resolved = f"down to 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
-        ratio = f"worst ratio {seen.worst_ratio:.4g}, resolved {resolved}"
+        resolved = f"until 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
+        ratio = f"worst ratio {seen.worst_ratio:.4g}, above integrator tolerance {resolved}"
         yield f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, {ratio}"
     if seen is not None and (slid := run.sliding) is not None and not certificate.direct:
         last = int(slid.reaching_z.argmax())
@@ -300,10 +300,10 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         kept = "kept" if seen.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
         yield f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}"
-    if certificate.outcome is not None:
-        gap = float(abs(run.final_state - certificate.outcome.values).max())
+    if certificate.final_state is not None:
+        gap = float(abs(run.final_state - certificate.final_state.values).max())
         settled = "" if run.deadline_resolved else " (the run had not settled)"
-        yield f"end state within {gap:.1e} of the outcome{settled}"
+        yield f"end state within {gap:.1e} of the final state{settled}"
 
 
 def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format import producer
-from ptcc_certify.protocols.latex import symbol_latex
+from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import texts
 from ptcc_certify.report.screen import structure_text
 
@@ -65,7 +65,7 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         "claims_in_all": len(saved.claims),
         "shares": _shares(saved),
         "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
-        "common_bound": texts.common_bound(effort.starts) if effort and effort.starts is not None else None,
+        "common_bound": texts.common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
         **{"figures": figures or {}, "stem": re.sub("[^A-Za-z0-9]+", "-", saved.path.stem)},
         "sha256": Markup(r"\allowbreak{}".join(saved.sha256[i : i + 8] for i in range(0, 64, 8))),
@@ -75,13 +75,13 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
 
 def _shares(saved: Certificate) -> list[tuple[float, float]]:
     """Return the share of the initial norm that may be left at fractions of the deadline."""
-    if not saved.direct or saved.rate is None or saved.prefactor is None:
+    if not saved.direct or saved.rate is None or saved.overshoot is None:
         return []
     return [(f, saved.envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS]
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, list[Markup]]]]:
-    """Return heads and rows of the table of starts and final states."""
+    """Return heads and rows of the table of initial and final states."""
     if saved.start is None:
         return [], []
     numbers: dict[str, Iterable[Markup]] = {"$x_{k}(0)$": map(_rational, saved.start)}
@@ -89,7 +89,9 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, list[Ma
         numbers[r"$\sigma_{k}(0)$"] = map(_rational, saved.sigma0 or ())
     if saved.final_state is not None:
         ends = "at the deadline" if saved.verdict == "certified" else "limit, if it settles"
-        numbers[ends] = (_number(texts.enclosed(x)) if x[1] else _rational(x[0]) for x in saved.final_state)
+        numbers[ends] = (
+            _number(texts.enclosed(x)) if x[1] else _rational(x[0]) for x in saved.final_state.intervals or ()
+        )
     labels = [texts.printable(label, texts.CHARACTERS // 2) for label in saved.graph.labels[: texts.LISTED]]
     rows = zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False)
     return list(numbers), [(label, part, list(row)) for label, part, row in rows]

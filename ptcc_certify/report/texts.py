@@ -14,8 +14,8 @@ from typing import Any
 from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
-from lmi.exact.rounding import down, up
-from ptcc_certify.bounds.input import Starts
+from lmi.exact.directed_rounding import down, up
+from ptcc_certify.bounds.input import InitialSet
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
@@ -154,7 +154,7 @@ def agent_parts(saved: Certificate) -> list[str]:
     return parts
 
 
-def common_bound(starts: Starts) -> Fraction | None:
-    """Return ``R`` of a set that is all starts with ``|x_k(0)| <= R``; None of another one."""
-    same = len(set(starts.radius)) == 1 and not any(starts.center) and not starts.axes
-    return starts.radius[0] if same else None
+def common_bound(initial_set: InitialSet) -> Fraction | None:
+    """Return ``R`` of a set that is all initial states with ``|x_k(0)| <= R``; None of another one."""
+    same = len(set(initial_set.radius)) == 1 and not any(initial_set.center) and not initial_set.axes
+    return initial_set.radius[0] if same else None

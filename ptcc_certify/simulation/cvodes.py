@@ -42,7 +42,7 @@ _CAUSES = {
 
 
 class Tolerances(NamedTuple):
-    """Of CVODES; ``atol`` is relative to the size of the start."""
+    """Of CVODES; ``atol`` is relative to the size of the initial state."""
 
     rtol: float
     atol: float

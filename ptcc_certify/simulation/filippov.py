@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
-from ptcc_certify.protocols.disturbance import TOLERANCE, Adversary, Disturbance, StateDependent
+from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
 from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
 from ptcc_certify.simulation.forced import Phase, SlidingMotion
@@ -258,7 +258,7 @@ class _Solver:
             slack = rounding_slack(self.protocol)
             columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels, slack) for i in range(t.size))
             return np.stack(list(columns), axis=1)
-        if isinstance(disturbance, Adversary) and layer is not None:
+        if isinstance(disturbance, WorstCaseDisturbance) and layer is not None:
             return float(disturbance.delta) * np.tanh(sigma / layer)
         agents = np.arange(x.shape[0])
         up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))

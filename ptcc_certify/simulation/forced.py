@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.protocols.disturbance import Adversary, Disturbance, ExpressionDisturbance
+from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, WorstCaseDisturbance
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def signal(source: Disturbance, n: int) -> Callable[[Any, Any, Any], Any]:
     """Return ``t, (a, b), sign -> d`` for the integrator; ``a + b t`` for a source that is linear between its jumps."""
     import casadi as ca
 
-    if isinstance(source, Adversary):
+    if isinstance(source, WorstCaseDisturbance):
         return lambda t, p, sign: float(source.delta) * sign
     if not isinstance(source, ExpressionDisturbance):
         return lambda t, p, sign: p[:n] + p[n:] * t
@@ -105,7 +105,7 @@ class SlidingMotion(Motion):
     state : (2 N,) array
         ``y`` and ``sigma`` in units of ``unit``.
     unit : float
-        Size of the start.
+        Size of the initial state.
     layer : float or None
         ``s`` is ``tanh(sigma/layer)`` instead of a given sign.
     """

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from lmi.deadline import checkpoint, seconds_left
+from lmi.search_time import checkpoint, seconds_left
 
 
 @contextmanager

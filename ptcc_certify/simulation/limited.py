@@ -19,7 +19,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.protocols.limits import GainLimits, LimitedGain, Periods
+from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain, Periods
 from ptcc_certify.protocols.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Motion, NominalMotion, Tolerances
 from ptcc_certify.simulation.forced import ForcedMotion, Forcing, Phase

@@ -22,7 +22,7 @@ from ptcc_certify.graphs.io import in_node_order
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, tau_before, wanted_instants
@@ -58,7 +58,7 @@ def simulate(
     The nominal protocol gives ``X' = -gain(t) L X``. The sliding-mode protocol under a disturbance gives the Filippov
     solution: every sliding variable reaches 0 at a root of its own equation and stays there.
 
-    The nominal protocol may act under :class:`~ptcc_certify.protocols.limits.GainLimits`, and under a disturbance
+    The nominal protocol may act under :class:`~ptcc_certify.protocols.gain_limits.GainLimits`, and under a disturbance
     and measurement noise: ``X' = -gain(t) L (X + n) + d``, the gain being the one that acts.
 
     Parameters
@@ -75,7 +75,7 @@ def simulate(
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
-        ``"sin(2*k*t)"``; by default the adversary ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
+        ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
         ``delta``. Nominal protocol: one that reads neither states nor sliding variables, by default none.
     boundary_layer : float, optional
         Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
@@ -147,7 +147,9 @@ def simulate(
         if value is not None:
             raise ParameterError(f"{name} belongs to the {other} protocol; leave it out or change the protocol")
     if protocol.reaching is not None and (np.ndim(x0) != 1 or np.ndim(sigma0) > 1):
-        raise ParameterError("the sliding mode is simulated from one start at a time; give N numbers x0 and sigma0")
+        raise ParameterError(
+            "the sliding mode is simulated from one initial state at a time; give N numbers x0 and sigma0"
+        )
     if boundary_layer is not None and not 1e-12 <= boundary_layer <= 1e12:
         raise ParameterError(f"boundary_layer = {boundary_layer} is outside its domain, 1e-12 to 1e12")
     if times is None:
@@ -158,7 +160,7 @@ def simulate(
     begin = start[:, 0] if np.ndim(x0) == 1 else start
     with interruptible():
         if (sliding := protocol.reaching) is not None:
-            source = "adversary" if disturbance is None else disturbance
+            source = "worst-case" if disturbance is None else disturbance
             met = as_disturbance(source, graph.n_nodes, sliding.delta, until)
             manifold = np.zeros(graph.n_nodes) if sigma0 is None else _start(graph, sigma0, "sigma0")[:, 0]
             run: Trajectory = simulate_sliding(
@@ -205,26 +207,28 @@ def _simulate_nominal(
 
 
 def _start(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:
-    """Return the start as an (N, S) float array."""
+    """Return the initial state as an (N, S) float array."""
     try:
         array = np.asarray(x0)
     except ValueError:
-        raise ParameterError(f"the start {name} has rows of different lengths") from None
+        raise ParameterError(f"the initial state {name} has rows of different lengths") from None
     n = graph.n_nodes
     if array.ndim not in (1, 2) or array.shape[0] != n or array.size == 0:
         shape = " x ".join(map(str, array.shape)) or "a single number"
-        raise ParameterError(f"the start {name} has shape {shape}; give {n} numbers, or {n} rows, one for each agent")
+        raise ParameterError(
+            f"the initial state {name} has shape {shape}; give {n} numbers, or {n} rows, one for each agent"
+        )
     if array.dtype.kind in "OU":
         try:
             array = np.array([float(as_fraction(v, name)) for v in array.ravel()]).reshape(array.shape)
         except (NumberError, OverflowError) as error:
-            raise ParameterError(f"the start {name}: {error}") from None
+            raise ParameterError(f"the initial state {name}: {error}") from None
     if array.dtype.kind not in "iuf":
-        raise ParameterError(f"the start {name} holds real numbers, not {array.dtype}")
+        raise ParameterError(f"the initial state {name} holds real numbers, not {array.dtype}")
     array = array.astype(float).reshape(n, -1)
     if not np.isfinite(array).all():
         row, column = np.argwhere(~np.isfinite(array))[0]
         raise ParameterError(
-            f"the start {name} of agent {shorten(graph.labels[row])} is {array[row, column]}, not a finite number"
+            f"the initial {name} of agent {shorten(graph.labels[row])} is {array[row, column]}, not a finite number"
         )
     return array

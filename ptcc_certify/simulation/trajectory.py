@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.rich_display import Shown
+from ptcc_certify.graphs.display_hook import Shown
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol, ReachingProtocol
-    from ptcc_certify.protocols.limits import GainLimits
+    from ptcc_certify.protocols.gain_limits import GainLimits
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.
 RESOLVED = 100
@@ -44,8 +44,8 @@ class Trajectory(Shown):
         Which instant is ``T``; None if none is, or if there is no deadline.
     deadline_residual : float or None
         How far from settled the state at ``T`` is: the larger of ``max_k |e_k|/(2 D_k)`` and of the change over the
-        last doubling of ``tau``, relative to the largest entry of the start. None if ``T`` was not reached. If an
-        actuator bounds the gain, the former alone, at the first instant from ``T`` on.
+        last doubling of ``tau``, relative to the largest entry of the initial state. None if ``T`` was not reached. If
+        an actuator bounds the gain, the former alone, at the first instant from ``T`` on.
     stats : mapping
         ``steps``, ``rhs`` (evaluations of the right-hand side, and of its derivatives in GMRES), ``seconds``.
     actuator : GainLimits or None
@@ -106,7 +106,7 @@ class Trajectory(Shown):
         """Whether the state at ``T`` has settled to within 100 tolerances; False if ``T`` was not reached.
 
         A float cannot see motion some 15 decades slower than the fastest: where links of very different weight almost
-        balance, ask the exact outcome.
+        balance, ask the exact final state.
         """
         settled = RESOLVED * max(self.rtol, self.atol)
         return self.deadline_residual is not None and self.deadline_residual <= settled
@@ -171,7 +171,7 @@ class Trajectory(Shown):
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,...`` as text, one row per instant, floats in full.
 
-        Columns of a start with S columns are headed ``<label>[1] .. <label>[S]``; those of sliding variables follow,
+        Of S initial states the columns are headed ``<label>[1] .. <label>[S]``; those of sliding variables follow,
         headed ``sigma(<label>)``.
 
         Examples

@@ -1,7 +1,7 @@
 """What every theorem of the paper has: hypotheses, a Lyapunov function, a rate with its proof.
 
 All rates are per unit of the stretched clock ``s``: ``V <= e^(-rate s) V(0)`` and, in the coordinates of the theorem,
-``||.||^2 <= prefactor e^(-rate s) ||.(0)||^2``.
+``||.||^2 <= overshoot e^(-rate s) ||.(0)||^2``.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.definiteness_proofs import prove_generalized_margin, prove_margin, prove_positive_definite
 from lmi.exact.numbers import round_to_bits
-from lmi.witness import prove_generalized_margin, prove_margin, prove_positive_definite
 from ptcc_certify.checker import Statement
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure

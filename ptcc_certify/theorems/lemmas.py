@@ -1,4 +1,4 @@
-"""The lemmas of the paper as functions, one each; the theorems and the outcome are built from them.
+"""The lemmas of the paper as functions, one each; the theorems and the final state are built from them.
 
 Lemma 4 is :func:`lmi.h_matrix_lyapunov`, Lemma 5 :func:`lmi.schur_positive_definite` and Lemma 6
 :func:`ptcc_certify.protocols.gain.prescribed_time_bound`; the others are here. Lemma 7.1 is Lemma 9.1 for one closed
@@ -17,7 +17,7 @@ import numpy as np
 
 import lmi
 from ptcc_certify.errors import HypothesisError
-from ptcc_certify.graphs import limits
+from ptcc_certify.graphs import size_limits as limits
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 
@@ -148,7 +148,7 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
     from scipy import sparse
     from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, bicgstab, eigs
 
-    from lmi.iterative import FILL_ROWS, fill_core
+    from lmi.sparse_h_matrix import FILL_ROWS, fill_core
 
     diagonal = block.diagonal()
     shift = -1e-4 * float(diagonal.mean())
@@ -254,7 +254,7 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
-    from lmi.iterative import FILL_ROWS, fill_core, solve
+    from lmi.sparse_h_matrix import FILL_ROWS, fill_core, solve
 
     M = sparse.csc_array(sparse.diags_array(graph.in_weight()) - abs(graph.adjacency()))
     rest, last = sparse.csc_array(M[:-1, :-1].T), -M[[-1], :-1].toarray().ravel()
@@ -465,13 +465,13 @@ def containment_weights(structure: Structure) -> np.ndarray:
     """
     from scipy.sparse.linalg import splu
 
-    pulls, F = _gauged_pulls(structure), structure.followers
-    if F.size == 0 or pulls.shape[1] == 0:
-        return np.zeros((F.size, pulls.shape[1]))
+    containment_weights, F = _gauged_weights(structure), structure.followers
+    if F.size == 0 or containment_weights.shape[1] == 0:
+        return np.zeros((F.size, containment_weights.shape[1]))
     L_F = structure.graph.laplacian()[F][:, F]
     scale = 1 / L_F.diagonal()
     factor = splu((scale[:, None] * L_F).tocsc())
-    return np.asarray(factor.solve(-scale[:, None] * (structure.graph.laplacian()[F] @ pulls)))
+    return np.asarray(factor.solve(-scale[:, None] * (structure.graph.laplacian()[F] @ containment_weights)))
 
 
 def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
@@ -512,13 +512,13 @@ def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
     return solution
 
 
-def _gauged_pulls(structure: Structure) -> np.ndarray:
+def _gauged_weights(structure: Structure) -> np.ndarray:
     """Return the (N, m_b) matrix whose columns are ``G_k 1`` on each balanced closed component."""
     balanced = [c for c in structure.closed_components if c.balanced]
-    pulls = np.zeros((structure.graph.n_nodes, len(balanced)))
+    containment_weights = np.zeros((structure.graph.n_nodes, len(balanced)))
     for column, component in enumerate(balanced):
-        pulls[list(component.nodes), column] = component.gauge
-    return pulls
+        containment_weights[list(component.nodes), column] = component.gauge
+    return containment_weights
 
 
 def _comparison(L: list[list[Fraction]]) -> list[list[Fraction]]:

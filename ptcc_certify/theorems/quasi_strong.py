@@ -24,7 +24,7 @@ from ptcc_certify.theorems.base import (
     rounded,
     split_rho,
 )
-from ptcc_certify.theorems.composite import DiagonalComposite
+from ptcc_certify.theorems.diagonal_composite import DiagonalComposite
 
 
 class BalancedQuasiStrong(Theorem):

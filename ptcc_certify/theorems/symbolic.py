@@ -11,7 +11,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.protocols.latex import to_latex
+from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.theorems.table import theorem_for
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 import lmi
-from lmi.witness import prove_margin
+from lmi.definiteness_proofs import prove_margin
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.base import (
@@ -36,7 +36,7 @@ from ptcc_certify.theorems.base import (
     symmetric_product,
     to_floats,
 )
-from ptcc_certify.theorems.composite import DiagonalComposite
+from ptcc_certify.theorems.diagonal_composite import DiagonalComposite
 
 
 class BalancedWeak(Theorem):

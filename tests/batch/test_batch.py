@@ -26,7 +26,7 @@ import pytest
 from bad_inputs import ptcc
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from lmi.apart import apart
+from lmi.child_process import apart
 from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, batch, certify, certify_many
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
@@ -126,7 +126,7 @@ def test_graphs_are_of_their_class(connectivity: str, balanced: bool, undirected
             assert nx.is_weakly_connected(picture) == (connectivity != "disconnected")
             if connectivity in ("quasi-strong", "weak"):
                 assert (len(closed) == 1) == (connectivity == "quasi-strong")
-            assert all(balanced_by_trial(picture.subgraph(members)) == balanced for members in closed)
+            assert all(balanced_by_trial(picture.subgraph(functions)) == balanced for functions in closed)
             if undirected:
                 assert all(picture[b][a]["weight"] == w for a, b, w in picture.edges(data="weight"))
 
@@ -275,7 +275,7 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...]):
         assert row["sha256"] == said["graph"]["sha256"]
         assert (row["theorem"], row["behaviour"]) == (said["claim"]["theorem"], said["claim"]["behaviour"])
         assert row["verdict"] == said["verdict"] == "certified"
-        rate, limit = Fraction(said["rates"]["certified"]), Fraction(said["rates"]["limit"])
+        rate, limit = Fraction(said["rates"]["proved"]), Fraction(said["rates"]["upper_bound"])
         assert Fraction(row["rate"]) <= rate <= Fraction(math.nextafter(row["rate"], math.inf))
         assert Fraction(math.nextafter(row["upper_bound"], 0)) < limit <= Fraction(row["upper_bound"])
         assert Fraction(row["optimality_ratio"]) <= rate / Fraction(row["upper_bound"]) * (1 + Fraction(1, 10**15))
@@ -325,8 +325,10 @@ def test_the_peak_of_the_input_is_for_the_start_or_for_all_starts():
     for bound in (None, "1/3"):
         (row,) = quickly("fig1b", initial_bound=bound)
         start = None if bound else [x for (x,) in random_states(row["seed"], load_graph("fig1b").n_nodes)]
-        starts = Fraction(1, 3) if bound else None
-        effort = certify(load_graph("fig1b"), PROTOCOL, start, method="perron", simulation=False, starts=starts).effort
+        initial_set = Fraction(1, 3) if bound else None
+        effort = certify(
+            load_graph("fig1b"), PROTOCOL, start, method="perron", simulation=False, initial_set=initial_set
+        ).effort
         assert effort is not None and effort.peak is not None and row["input_bounded"] is effort.bounded
         assert Fraction(row["peak_input"]) >= effort.peak.largest > Fraction(math.nextafter(row["peak_input"], 0))
 

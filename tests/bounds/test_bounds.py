@@ -49,14 +49,14 @@ def proved_forms(cert: Certificate) -> list[tuple[Fraction, Callable[[list[flint
     forms = []
     if (V := cert.lyapunov) is not None and V.blocks and cert.proof.rate is not None:
         forms.append((cert.proof.rate, lambda X: value(graph, V, gauge, X)))
-    for m in cert.sharpening.members:
+    for m in cert.search.functions:
         forms.append((m.rate, lambda X, m=m: form_value(graph, m.nodes, m.weights or None, m.matrix, X)))
     return forms
 
 
 class Judged(NamedTuple):
     exact: float  # worst sqrt(V / bound) of every member, in balls
-    distance: float  # worst |x_k - outcome_k| / bound over agents, in balls
+    deviation: float  # worst |x_k - outcome_k| / bound over agents, in balls
     integrated: float  # worst ratio of the CVODES run
     gap: float  # between balls and CVODES, relative to the start
 
@@ -70,17 +70,21 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
     x0 = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
     cert = certify(graph, protocol, x0, method=method)
     assert cert.verdict == "certified", (name, seed, cert.notes)
-    assert all("needs a prefactor above" in note for note in cert.sharpening.notes), (name, seed, cert.sharpening.notes)
+    assert all("needs an overshoot constant above" in note for note in cert.search.notes), (
+        name,
+        seed,
+        cert.search.notes,
+    )
     assert cert.comparison is None or not cert.comparison.violated, (name, seed, cert.comparison)
-    assert cert.outcome is not None
+    assert cert.final_state is not None
     forms = proved_forms(cert)
     remaining = [float(q) for q in INSTANTS]
-    distances = cert.outcome_distance(remaining) if forms else None
-    final = [ball(Fraction(x)) for x in cert.outcome.final_state]
+    deviations = cert.deviation_bound(remaining) if forms else None
+    final = [ball(Fraction(x)) for x in cert.final_state.states]
     worst = farthest = 0.0
     run = simulate(graph, protocol, x0, times=[float(protocol.T * (1 - q)) for q in INSTANTS])
     gap, size = 0.0, max(float(max(map(abs, x0))), 1e-300)
-    starts = [V([ball(x) for x in x0]) for _, V in forms]
+    initial_set = [V([ball(x) for x in x0]) for _, V in forms]
     for i, q in enumerate(INSTANTS):
         flint.ctx.prec = BITS
         X = states(graph, clock(protocol, q), x0)
@@ -89,13 +93,13 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
         if not forms:
             assert np.abs(exact - np.array([float(x) for x in x0])).max() <= 1e-12 * size
             continue
-        if distances is not None:
-            for k, bound in enumerate(distances[:, i]):
+        if deviations is not None:
+            for k, bound in enumerate(deviations[:, i]):
                 if bound > 0 and bound < np.inf and (X[k] - final[k]).is_finite():
                     ratio = abs(X[k] - final[k]) / flint.arb(float(bound))
                     assert not ratio > 1, (name, seed, q, k)
                     farthest = max(farthest, float(ratio.lower()))
-        for (rate, V), V0 in zip(forms, starts, strict=True):
+        for (rate, V), V0 in zip(forms, initial_set, strict=True):
             if V0 == 0 or not V0 > 0:
                 continue
             flint.ctx.prec = BITS
@@ -118,7 +122,7 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
 def test_bounds_hold_for_exact_and_integrated_trajectories(name: str, kwargs: dict):
     seen = judge(name, kwargs, seed=11)
     assert seen.exact <= 1 + 1e-12
-    assert seen.distance <= 1
+    assert seen.deviation <= 1
     assert seen.integrated <= 1 + 1e-6
     assert seen.gap <= 1e-7
 
@@ -152,8 +156,8 @@ def test_vector_valued_agents():
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol)
     assert cert.lyapunov is not None and cert.proof.rate is not None
-    starts = [[Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)] for _ in range(3)]
-    run = simulate(graph, protocol, np.array([[float(x) for x in column] for column in zip(*starts, strict=True)]))
+    initial_set = [[Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)] for _ in range(3)]
+    run = simulate(graph, protocol, np.array([[float(x) for x in column] for column in zip(*initial_set, strict=True)]))
     seen = cert.envelope.compare(run)
     assert seen.worst_ratio <= 1 + 1e-6
     assert run.states.shape[:2] == (graph.n_nodes, 3)
@@ -162,9 +166,9 @@ def test_vector_valued_agents():
     for q in (Fraction(1, 2), Fraction(1, 100), Fraction(1, 10**8)):
         s = clock(protocol, q)
         at = int(np.argmin(np.abs(run.remaining - float(q))))
-        columns = [states(graph, s, x0) for x0 in starts]
+        columns = [states(graph, s, x0) for x0 in initial_set]
         total = sum((value(graph, cert.lyapunov, None, X) for X in columns), flint.arb(0))
-        start = sum((value(graph, cert.lyapunov, None, [ball(x) for x in x0]) for x0 in starts), flint.arb(0))
+        start = sum((value(graph, cert.lyapunov, None, [ball(x) for x in x0]) for x0 in initial_set), flint.arb(0))
         assert total < (-ball(cert.proof.rate) * s).exp() * start
         if abs(run.remaining[at] - float(q)) < 1e-12:
             exact = np.array([[float(x) for x in X] for X in columns]).T
@@ -177,8 +181,8 @@ def pair_envelope(rate: float) -> tuple[Envelope, NominalProtocol, SignedDigraph
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol, [3, 1], simulation=False)
     assert cert.lyapunov is not None
-    member = replace(cert.lyapunov, rate=rate)
-    return Envelope(cert.structure, protocol.gain, (member,)), protocol, graph
+    function = replace(cert.lyapunov, rate=rate)
+    return Envelope(cert.structure, protocol.gain, (function,)), protocol, graph
 
 
 def test_a_rate_that_is_too_high_is_seen_as_violated():
@@ -203,19 +207,19 @@ def asked(tmp_path_factory) -> dict[str, Callable[[object], object]]:
     return {
         "remaining of residual": cert.envelope.residual,
         "remaining of norm_bound": lambda q: cert.envelope.norm_bound(q, x0),
-        "remaining of outcome_distance": lambda q: cert.envelope.outcome_distance(q, x0),
+        "remaining of outcome_distance": lambda q: cert.envelope.deviation_bound(q, x0),
         "remaining of a certificate's norm": cert.norm_bound,
-        "remaining of a certificate's distance": cert.outcome_distance,
+        "remaining of a certificate's distance": cert.deviation_bound,
         "remaining of a certificate's slowest mode": cert.best_possible_residual,
         "remaining of a saved norm": saved.norm_bound,
-        "remaining of a saved distance": saved.outcome_distance,
+        "remaining of a saved distance": saved.deviation_bound,
         "remaining of sliding norm_bound": lambda q: slid.envelope.norm_bound(q, x0),
         "remaining of sliding state_bound": lambda q: slid.envelope.state_bound(q, x0),
-        "remaining of sliding outcome_distance": lambda q: slid.envelope.outcome_distance(q, x0),
+        "remaining of sliding outcome_distance": lambda q: slid.envelope.deviation_bound(q, x0),
         "clock of norm_factor": cert.envelope.norm_factor,
         "clock of bound": lambda s: cert.envelope.bound(s, x0),
-        "clock of distance": lambda s: cert.envelope.distance(s, x0),
-        "clock of distance_norm": lambda s: cert.envelope.distance_norm(s, x0),
+        "clock of distance": lambda s: cert.envelope.deviation(s, x0),
+        "clock of distance_norm": lambda s: cert.envelope.deviation_norm(s, x0),
         "z of sliding_norm": slid.envelope.sliding_norm,
     }
 
@@ -248,20 +252,20 @@ def test_the_residual_is_what_the_bound_leaves():
     envelope, protocol, _ = pair_envelope(1.0)
     for q in (0.5, 0.1, 1e-6):
         s = protocol.gain.clock_at_remaining(q)
-        assert envelope.residual(q) == pytest.approx(np.exp(-s / 2) * envelope.members[0].prefactor ** 0.5)
+        assert envelope.residual(q) == pytest.approx(np.exp(-s / 2) * envelope.functions[0].overshoot ** 0.5)
     assert envelope.norm_factor(np.array([0.0, np.inf]))[1] == 0.0
     assert envelope.bound(0.0, np.array([3.0, 1.0])) >= np.linalg.norm(-np.array([[1, 1], [-1, 1]]) @ [3, 1]) * (
         1 - 1e-12
     )
 
 
-def test_more_members_make_the_envelope_the_pointwise_best():
+def test_more_functions_make_the_envelope_the_pointwise_best():
     envelope, _, _ = pair_envelope(1.0)
-    slow = envelope.members[0]
+    slow = envelope.functions[0]
     fast = replace(slow, rate=Fraction(2), ends=(slow.lowest, 100 * slow.lowest))
-    both = replace(envelope, members=(slow, fast))
+    both = replace(envelope, functions=(slow, fast))
     for s in (0.0, 1.0, 5.0, 50.0):
-        alone = [replace(envelope, members=(m,)).norm_factor(s) for m in (slow, fast)]
+        alone = [replace(envelope, functions=(m,)).norm_factor(s) for m in (slow, fast)]
         assert both.norm_factor(s) == min(alone)
 
 

@@ -24,9 +24,9 @@ from ptcc_certify.checker import check, digest
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
-from ptcc_certify.lyapunov import search as sharpen
+from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -57,8 +57,8 @@ def slow() -> Certificate:
 
 def largest_at_start(cert: Certificate) -> Fraction:
     """``max_k |x_k(0) - x_k(T)|``, exactly."""
-    assert cert.start is not None and cert.outcome is not None
-    return max(abs(x - Fraction(end)) for x, end in zip(cert.start, cert.outcome.final_state, strict=True))
+    assert cert.start is not None and cert.final_state is not None
+    return max(abs(x - Fraction(end)) for x, end in zip(cert.start, cert.final_state.states, strict=True))
 
 
 # ---------------------------------------------------------------------- bounds
@@ -69,12 +69,12 @@ def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str
     rng = np.random.default_rng(5)
     graph = random_graph(rng, **{"weights": "small ints", **kwargs}).graph
     cert = certify(graph, NOMINAL, numbers(rng, graph.n_nodes), method="perron", simulation=False)
-    bounds = cert.outcome_distance(REMAINING)
+    bounds = cert.deviation_bound(REMAINING)
     assert (bounds <= float(largest_at_start(cert)) * (1 + 1e-14)).all()
     assert cert.start is not None
     assert (bounds <= 2 * float(max(map(abs, cert.start))) * (1 + 1e-14)).all()
     cert.save(tmp_path / "c.json")
-    assert np.array_equal(read_certificate(tmp_path / "c.json").outcome_distance(REMAINING), bounds)
+    assert np.array_equal(read_certificate(tmp_path / "c.json").deviation_bound(REMAINING), bounds)
 
 
 def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_something():
@@ -82,10 +82,10 @@ def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
         cert = slow()
-        assert cert.start is not None and cert.outcome is not None
+        assert cert.start is not None and cert.final_state is not None
         for q in (Fraction(9, 10), Fraction(1, 2), Fraction(1, 10), Fraction(1, 100)):
-            X, bound = states(cert.graph, clock(NOMINAL, q), cert.start), cert.outcome_distance([float(q)])[:, 0]
-            gaps = [abs(x - ball(Fraction(end))) for x, end in zip(X, cert.outcome.final_state, strict=True)]
+            X, bound = states(cert.graph, clock(NOMINAL, q), cert.start), cert.deviation_bound([float(q)])[:, 0]
+            gaps = [abs(x - ball(Fraction(end))) for x, end in zip(X, cert.final_state.states, strict=True)]
             assert not any(gap > flint.arb(float(b)) for gap, b in zip(gaps, bound, strict=True))
             if q == Fraction(1, 2):
                 assert bound.max() <= 5 * max(float(gap) for gap in gaps)
@@ -93,7 +93,7 @@ def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_
         flint.ctx.prec = before
 
 
-@pytest.mark.parametrize("disturbance", ["adversary", "sin(5*k*t)"])
+@pytest.mark.parametrize("disturbance", ["worst-case", "sin(5*k*t)"])
 def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(disturbance: str):
     """``max_k |x_k(0) - x_k(T)| + sum_k |sigma_k(0)|`` is never exceeded, by any run, and the bound knows it."""
     rng = np.random.default_rng(8)
@@ -101,10 +101,10 @@ def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(di
         graph = random_graph(rng, **kwargs).graph
         x0, sigma0 = numbers(rng, graph.n_nodes), numbers(rng, graph.n_nodes, 200)
         cert = certify(graph, SLIDING, x0, sigma0=sigma0, disturbance=disturbance, method="perron")
-        assert cert.trajectory is not None and cert.outcome is not None and cert.comparison is not None
+        assert cert.trajectory is not None and cert.final_state is not None and cert.comparison is not None
         most = float(largest_at_start(cert) + sum(map(abs, sigma0)))
-        assert (cert.outcome_distance(REMAINING) <= most * (1 + 1e-12)).all(), name
-        assert np.abs(cert.trajectory.states - cert.outcome.values[:, None]).max() <= most * (1 + 1e-9), name
+        assert (cert.deviation_bound(REMAINING) <= most * (1 + 1e-12)).all(), name
+        assert np.abs(cert.trajectory.states - cert.final_state.values[:, None]).max() <= most * (1 + 1e-9), name
         assert not cert.comparison.violated, name
 
 
@@ -112,33 +112,33 @@ def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
     cert = slow()
     assert cert.start is not None
     size = float(largest_at_start(cert)) * len(cert.start) ** 0.5
-    assert cert.envelope.distance_norm(0.0, cert.start) <= size * (1 + 1e-12)
-    d = [float(x) - float(end) for x, end in zip(cert.start, cert.outcome.final_state, strict=True)]  # type: ignore[union-attr]
-    assert cert.envelope.distance_norm(0.0, cert.start) >= np.linalg.norm(d)
+    assert cert.envelope.deviation_norm(0.0, cert.start) <= size * (1 + 1e-12)
+    d = [float(x) - float(end) for x, end in zip(cert.start, cert.final_state.states, strict=True)]  # type: ignore[union-attr]
+    assert cert.envelope.deviation_norm(0.0, cert.start) >= np.linalg.norm(d)
 
 
 # ---------------------------------------------------------------------- a Lyapunov function for deviations
 
 
-def test_a_member_for_deviations_changes_no_rate_and_improves_their_bound(monkeypatch: pytest.MonkeyPatch):
+def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monkeypatch: pytest.MonkeyPatch):
     cert = slow()
-    monkeypatch.setattr(sharpen, "_for_deviations", lambda *args: None)
+    monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
     plain = certify(cert.graph, NOMINAL, cert.start, method="full", simulation=False)
-    assert (cert.rate, cert.prefactor, cert.diagonal_rate) == (plain.rate, plain.prefactor, plain.diagonal_rate)
-    more, fewer = cert.envelope.members, plain.envelope.members
+    assert (cert.rate, cert.overshoot, cert.diagonal_rate) == (plain.rate, plain.overshoot, plain.diagonal_rate)
+    more, fewer = cert.envelope.functions, plain.envelope.functions
     assert len(more) == len(fewer) + 1
     instants = [1 - f for f in FRACTIONS]
-    worst = [c.outcome_distance(instants).max(axis=0) for c in (cert, plain)]
+    worst = [c.deviation_bound(instants).max(axis=0) for c in (cert, plain)]
     assert (worst[0] <= worst[1]).all() and (worst[1] / worst[0]).max() > 1.5
 
 
 def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
     graphs = [load_graph(name) for name in ("fig1a", "fig1b", "fig3a", "fig5b")]
     with_it = [certify(g, NOMINAL, method="full", simulation=False) for g in graphs]
-    monkeypatch.setattr(sharpen, "_for_deviations", lambda *args: None)
+    monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
     without = [certify(g, NOMINAL, method="full", simulation=False) for g in graphs]
     for a, b in zip(with_it, without, strict=True):
-        assert (a.rate, a.prefactor) == (b.rate, b.prefactor)
+        assert (a.rate, a.overshoot) == (b.rate, b.overshoot)
 
 
 def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real_data: Path):
@@ -151,10 +151,10 @@ def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real
         graph = read_graph(real_data / f"{name}.csv")
         x0 = [x for (x,) in random_states(0, graph.n_nodes)]
         cert = certify(graph, NOMINAL, x0, method="full", simulation=False)
-        assert cert.outcome is not None
-        d = np.array([float(x - Fraction(end)) for x, end in zip(x0, cert.outcome.final_state, strict=True)])
+        assert cert.final_state is not None
+        d = np.array([float(x - Fraction(end)) for x, end in zip(x0, cert.final_state.states, strict=True)])
         true = np.abs(expm(-float(NOMINAL.gain.clock_at_remaining(0.5)) * graph.dense_laplacian()) @ d).max()
-        bound = cert.outcome_distance([0.5]).max()
+        bound = cert.deviation_bound([0.5]).max()
         assert true <= bound <= 2 * float(max(map(abs, x0)))
         ratios.append(bound / true)
     assert np.median(ratios) <= 5
@@ -175,18 +175,18 @@ def test_a_constant_lowered_by_a_millionth_is_rejected(stdlib: bool):
     for cert in (small, slow()):
         told = json.loads(cert.to_json())
         assert check(told, stdlib=stdlib).accepted
-        for k, member in enumerate(told["lyapunov"]["members"]):
-            assert member["distance"] is not None
-            farthest = max(member["distance"]["agents"], key=lambda a: Fraction(member["distance"]["agents"][a]))
+        for k, function in enumerate(told["lyapunov"]["functions"]):
+            assert function["deviation"] is not None
+            farthest = max(function["deviation"]["agents"], key=lambda a: Fraction(function["deviation"]["agents"][a]))
             paths = [("norm",), ("agents", farthest)]
             for path in paths if cert is small else paths[stdlib:][:1]:
                 spoilt = copy.deepcopy(told)
-                place = spoilt["lyapunov"]["members"][k]["distance"]
+                place = spoilt["lyapunov"]["functions"][k]["deviation"]
                 for key in path[:-1]:
                     place = place[key]
                 place[path[-1]] = str(Fraction(place[path[-1]]) * (1 - Fraction(1, 10**6)))
                 report = check(signed(spoilt), stdlib=stdlib)
-                assert report.rejected == f"distance of lyapunov.members[{k}]", (path, report.reason)
+                assert report.rejected == f"deviation of lyapunov.functions[{k}]", (path, report.reason)
 
 
 @pytest.mark.parametrize("n", [3, FLINT_ROWS, FLINT_ROWS + 8])
@@ -236,12 +236,12 @@ def test_what_a_limited_gain_leaves_is_capped_by_the_start_and_the_check_knows_i
         most = largest_at_start(limited)
         assert (max(entry.agents) <= most * (1 + Fraction(1, 2**39))) is capped
         told = json.loads(limited.to_json())
-        agents = told["effort"]["residual"][0]["agents"]
+        agents = told["input"]["residual"][0]["agents"]
         label = next(a for a, x in agents.items() if Fraction(x) >= most)
         agents[label] = str(most)
         assert check(signed(told)).accepted and check(signed(told), stdlib=True).accepted
         agents[label] = str(most * (1 - Fraction(1, 10**6)))
-        assert check(signed(told)).rejected == "limited-gain of effort.residual[0]"
+        assert check(signed(told)).rejected == "limited-gain of input.residual[0]"
 
 
 def test_a_held_input_may_leave_more_than_the_start():
@@ -253,7 +253,7 @@ def test_a_held_input_may_leave_more_than_the_start():
     )
     assert cert.effort is not None and cert.effort.residual
     told = json.loads(cert.to_json())
-    agents = told["effort"]["residual"][0]["agents"]
+    agents = told["input"]["residual"][0]["agents"]
     most = largest_at_start(cert)
     assert cert.verdict == "certified"
     for label, x in agents.items():

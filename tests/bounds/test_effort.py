@@ -14,17 +14,17 @@ from generators import KINDS, all_classes, class_cases, random_graph, smallest
 from mutations import at, changed, resealed
 from scipy.linalg import expm
 
-from ptcc_certify.bounds.final_state import outcome
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.input import (
     Effort,
     EnergyIntegral,
+    InitialSet,
     InputRequest,
     Limits,
-    Starts,
     bound_effort,
     ellipsoid,
-    starts_within,
-    worst_start,
+    initial_set_within,
+    worst_initial_state,
 )
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -35,7 +35,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
@@ -87,34 +87,36 @@ class Motion:
         #: What rounding of the exponential may leave of an entry.
         self.noise = 4e-15 * (1 + np.abs(L).sum(axis=1).max() * s) * np.abs(self.M).max(axis=(1, 2))
 
-    def seen(self, starts: np.ndarray) -> Seen:
-        u = np.maximum(np.abs(self.M @ starts) - np.multiply.outer(self.noise, np.abs(starts).max(axis=0))[:, None], 0)
+    def seen(self, initial_set: np.ndarray) -> Seen:
+        u = np.maximum(
+            np.abs(self.M @ initial_set) - np.multiply.outer(self.noise, np.abs(initial_set).max(axis=0))[:, None], 0
+        )
         norm = np.linalg.norm(u, axis=1)
         dt = (DZ * self.T * np.exp(-self.z))[:, None]
         return Seen(u.max(axis=0), norm.max(axis=0), (dt * norm[1:] ** 2).sum(axis=0), (dt * norm[1:]).sum(axis=0))
 
-    def supremum(self, starts: Starts) -> np.ndarray:
+    def supremum(self, initial_set: InitialSet) -> np.ndarray:
         """``sup |u_k|`` over the set, at the instants exact."""
-        middle, size = self.M @ floats(starts.center), np.abs(floats(starts.center)).max()
+        middle, size = self.M @ floats(initial_set.center), np.abs(floats(initial_set.center)).max()
         reach = np.zeros(middle.shape)
-        if starts.radius:
-            reach, size = np.abs(self.M) @ floats(starts.radius), size + floats(starts.radius).max()
-        if starts.axes:
-            shares = self.M @ floats(starts.axes).T
-            reach, size = np.linalg.norm(shares, axis=2), size + np.abs(floats(starts.axes)).sum(axis=0).max()
+        if initial_set.radius:
+            reach, size = np.abs(self.M) @ floats(initial_set.radius), size + floats(initial_set.radius).max()
+        if initial_set.axes:
+            shares = self.M @ floats(initial_set.axes).T
+            reach, size = np.linalg.norm(shares, axis=2), size + np.abs(floats(initial_set.axes)).sum(axis=0).max()
         return np.maximum(np.abs(middle) + reach - self.noise[:, None] * size, 0).max(axis=0)
 
 
-def draw(rng: np.random.Generator, starts: Starts, count: int) -> np.ndarray:
+def draw(rng: np.random.Generator, initial_set: InitialSet, count: int) -> np.ndarray:
     """Starts of a set, corners and points of the surface among them: (N, count)."""
-    center, n = floats(starts.center)[:, None], len(starts.center)
-    if starts.radius:
+    center, n = floats(initial_set.center)[:, None], len(initial_set.center)
+    if initial_set.radius:
         v = rng.uniform(-1, 1, (n, count))
         v[:, ::2] = np.sign(v[:, ::2])
-        return center + floats(starts.radius)[:, None] * v
-    if starts.axes:
-        v = rng.normal(size=(len(starts.axes), count))
-        return center + floats(starts.axes).T @ (v / np.linalg.norm(v, axis=0))
+        return center + floats(initial_set.radius)[:, None] * v
+    if initial_set.axes:
+        v = rng.normal(size=(len(initial_set.axes), count))
+        return center + floats(initial_set.axes).T @ (v / np.linalg.norm(v, axis=0))
     return center
 
 
@@ -131,12 +133,12 @@ def protocol_at(rng: np.random.Generator, graph: SignedDigraph, over: Fraction) 
     return NominalProtocol(T=F(int(rng.integers(1, 40)), 10), rho1=F(int(rng.integers(1, 30)), 20), rho2=k / 2, kappa=2)
 
 
-def sets(rng: np.random.Generator, graph: SignedDigraph) -> list[Starts]:
+def sets(rng: np.random.Generator, graph: SignedDigraph) -> list[InitialSet]:
     """The box ``||X(0)||_inf <= R``, another box with sides of length 0, an ellipsoid."""
     n = graph.n_nodes
     radius = [abs(x) * (rng.random() < 0.8) for x in rationals(rng, n)]
-    within = starts_within(analyse(graph), int(rng.integers(1, 9)))
-    return [within, Starts(rationals(rng, n), radius), ellipsoid(rationals(rng, n), rationals(rng, min(n, 3), n))]
+    within = initial_set_within(analyse(graph), int(rng.integers(1, 9)))
+    return [within, InitialSet(rationals(rng, n), radius), ellipsoid(rationals(rng, n), rationals(rng, min(n, 3), n))]
 
 
 def assert_holds(effort: Effort, seen: Seen, ratios: list[tuple[str, float]]) -> None:
@@ -165,8 +167,8 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     for over in overs:
         protocol = protocol_at(rng, graph, over)
         motion = Motion(graph, protocol.gain)
-        for starts in [None, *sets(rng, graph)]:
-            effort = proved.changed(protocol=protocol, starts=starts).effort
+        for initial_set in [None, *sets(rng, graph)]:
+            effort = proved.changed(protocol=protocol, initial_set=initial_set).effort
             assert effort is not None
             if proved.constant:
                 assert effort.bounded and effort.peak is effort.energy is effort.path_length is None
@@ -174,20 +176,20 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
             assert effort.bounded == (over >= 1)
             assert (effort.peak is not None) == (proved.rate is not None and proved.rate * protocol.rho2 >= 1)
             assert effort.path_length is not None
-            if starts is None:
+            if initial_set is None:
                 assert_holds(effort, motion.seen(floats(x0)[:, None]), ratios)
                 continue
-            worst = worst_start(proved.structure, protocol, starts)
-            points = np.column_stack([draw(rng, starts, 5), worst.x0])
+            worst = worst_initial_state(proved.structure, protocol, initial_set)
+            points = np.column_stack([draw(rng, initial_set, 5), worst.x0])
             assert_holds(effort, motion.seen(points), ratios)
-            top = motion.supremum(starts)
+            top = motion.supremum(initial_set)
             size = np.abs(motion.M[:, worst.agent] @ worst.x0)
             assert worst.size <= top.max() * (1 + 1e-3) + 1e-9
             assert size.max() >= worst.size * (1 - 1e-3) - 1e-9
             if effort.peak is not None:
                 assert (top <= floats(effort.peak.agents) * SLACK).all()
             if effort.first is not None:
-                at_once = Motion(graph, protocol.gain, np.zeros(1)).supremum(starts).max()
+                at_once = Motion(graph, protocol.gain, np.zeros(1)).supremum(initial_set).max()
                 assert float(effort.first) == pytest.approx(at_once, rel=1e-9)
     return ratios
 
@@ -263,16 +265,16 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
     assert proved.verdict == "certified", proved.notes
     # From x(0) = sigma(0) it is the sliding variables alone that move the agents.
     for sigma0, begin in ((push, x0), (push, push), ([F(0)] * n, x0)):
-        for starts in (None, Starts(begin, [F(1)] * n)):
-            cert = proved.changed(start=tuple(begin), sigma0=tuple(sigma0), reaching=None, starts=starts)
+        for initial_set in (None, InitialSet(begin, [F(1)] * n)):
+            cert = proved.changed(start=tuple(begin), sigma0=tuple(sigma0), reaching=None, initial_set=initial_set)
             effort = cert.effort
             assert effort is not None and effort.sliding is not None and effort.path_length is not None
             assert effort.bounded
             assert effort.sliding.bounded == (power >= 1)
             if power < 1 and any(sigma0):
                 assert effort.peak is None and effort.sliding.agents is None
-            for disturbance in ("adversary", "sin(7*k*t)"):
-                x = floats(begin) if starts is None else draw(rng, starts, 1)[:, 0]
+            for disturbance in ("worst-case", "sin(7*k*t)"):
+                x = floats(begin) if initial_set is None else draw(rng, initial_set, 1)[:, 0]
                 s = floats(sigma0)
                 run = simulate(graph, protocol, x, sigma0=s, disturbance=disturbance, samples=401, remaining=1e-6)
                 assert isinstance(run, SlidingTrajectory)
@@ -336,7 +338,7 @@ def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
     numbers = {key: F(x) for key, x in data["proof"][i]["numbers"].items()}
     at_step = ("proof", i, "numbers")
     forged = [
-        changed(data, ("effort", "energy"), str(F(data["effort"]["energy"]) * LESS)),
+        changed(data, ("input", "energy"), str(F(data["input"]["energy"]) * LESS)),
         *(changed(data, (*at_step, m), str(numbers[m] * F(11, 10))) for m in ("m0", "m1")),
         *(changed(data, (*at_step, m), str(-numbers[m])) for m in ("m0", "m1")),
         changed(data, (*at_step, "p"), "-1"),
@@ -350,7 +352,7 @@ def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
         forged.append(changed(data, ("proof", i, "witness", name), lower[:-1]))
         forged.append(changed(data, ("proof", i, "witness", name), [[str(-F(x)) for x in row] for row in lower]))
     for mutant in forged:
-        assert check(resealed(mutant), stdlib=True).rejected in ("input-energy of effort", "effort.energy")
+        assert check(resealed(mutant), stdlib=True).rejected in ("input-energy of input", "input.energy")
 
 
 # ---------------------------------------------------------------------- held gains
@@ -436,7 +438,7 @@ def test_certificates_tell_the_threshold_too(seed: int):
         low, high = effort.threshold
         assert low is None or float(low) <= over * (1 + 1e-5)
         assert high is None or float(high) >= over * (1 - 1e-5)
-        assert effort.peak is effort.energy is effort.path_length is effort.starts is None
+        assert effort.peak is effort.energy is effort.path_length is effort.initial_set is None
 
 
 def edges(*given: tuple[Any, Any, Any]) -> SignedDigraph:
@@ -481,13 +483,13 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
     """Every kind of limits, from a start and from a box; returns bound over simulated of what was certified."""
     rng, ratios = np.random.default_rng(seed), []  # type: ignore[var-annotated]
     protocol, x0 = protocol_at(rng, graph, OVER[seed % 4]), rationals(rng, graph.n_nodes)
-    box = starts_within(analyse(graph), 5)
+    box = initial_set_within(analyse(graph), 5)
     proved = certify(graph, protocol, x0, simulation=False, limits=some_limits(rng, protocol))
     assert proved.verdict == "certified", proved.notes
     L = graph.laplacian().toarray()
-    for cert, x in ((proved, floats(x0)), (proved.changed(starts=box), draw(rng, box, 2)[:, seed % 2])):
+    for cert, x in ((proved, floats(x0)), (proved.changed(initial_set=box), draw(rng, box, 2)[:, seed % 2])):
         assert cert.effort is not None
-        final = outcome(cert.structure, x.tolist()).values
+        final = final_state(cert.structure, x.tolist()).values
         unsampled = [limits for limits in proved.limits if limits.sample_period is None]
         assert [entry.limits for entry in cert.effort.residual][: len(unsampled)] == unsampled
         for entry in cert.effort.residual:
@@ -553,7 +555,7 @@ def test_disturbances_add_no_more_than_certified(name: str):
         protocol = protocol_at(rng, graph, over)
         cert = proved.changed(protocol=protocol)
         assert cert.verdict == "certified", cert.notes
-        assert cert.effort is not None and cert.outcome is not None and cert.rate is not None
+        assert cert.effort is not None and cert.final_state is not None and cert.rate is not None
         assert (cert.effort.disturbed is not None) == (cert.rate * protocol.rho2 > 1)
         if cert.effort.disturbed is None:
             continue
@@ -573,7 +575,7 @@ def test_disturbances_add_no_more_than_certified(name: str):
         ):
             run = simulate(graph, protocol, floats(x0), disturbance=d, delta=delta, remaining=1e-5, past=0)
             still = simulate(graph, protocol, [0] * n, disturbance=d, delta=delta, remaining=1e-5, past=0)
-            moved = np.abs(run.final_state - cert.outcome.values)
+            moved = np.abs(run.final_state - cert.final_state.values)
             assert (moved <= drift + 1e-7).all()
             if isinstance(d, list) and d == (0.75 * signs).tolist():
                 assert moved.max() == pytest.approx(drift.max(), rel=1e-6, abs=1e-7)  # it is attained
@@ -599,12 +601,14 @@ def nominal_certificate(name: str) -> Certificate:
     T, n = protocol.T, graph.n_nodes
     first = protocol.rho1 + protocol.rho2 * 2 / T
     limits = [Limits(first * 9), Limits(None, T / 50), Limits(first * 3, T / 9), Limits(first * 2, None, T / 10**5)]
-    starts = [
-        starts_within(analyse(graph), 3),
+    initial_set = [
+        initial_set_within(analyse(graph), 3),
         ellipsoid(rationals(rng, n), rationals(rng, 2, n)),
-        Starts(rationals(rng, n), [F(1, 3)] * n),
+        InitialSet(rationals(rng, n), [F(1, 3)] * n),
     ][len(name) % 3]
-    return certify(graph, protocol, rationals(rng, n), simulation=False, starts=starts, limits=limits, delta="0.7")
+    return certify(
+        graph, protocol, rationals(rng, n), simulation=False, initial_set=initial_set, limits=limits, delta="0.7"
+    )
 
 
 def sliding_certificate(push: Fraction) -> Certificate:
@@ -612,7 +616,7 @@ def sliding_certificate(push: Fraction) -> Certificate:
     graph = random_graph(rng, **dict(CLASSES["2.2"], n=6)).graph
     x0, sigma0 = rationals(rng, 6), [push * x for x in rationals(rng, 6)]
     protocol = sliding(rng, graph, F(5, 4), F(3, 2))
-    return certify(graph, protocol, x0, sigma0=sigma0, simulation=False, starts=4 if push else None)
+    return certify(graph, protocol, x0, sigma0=sigma0, simulation=False, initial_set=4 if push else None)
 
 
 #: By how much a forger improves what is claimed.
@@ -652,11 +656,11 @@ def assert_no_forgery_passes(data: dict[str, Any]) -> set[str]:
     for stdlib in (True, False):
         assert check(data, stdlib=stdlib).accepted
     tried, passed = set(), []
-    for path, value in forged(data["effort"]):
-        mutant = resealed(changed(data, ("effort", *path), value))
+    for path, value in forged(data["input"]):
+        mutant = resealed(changed(data, ("input", *path), value))
         if path[:2] == ("peak", "agents"):  # the largest follows
-            agents = mutant["effort"]["peak"]["agents"]
-            mutant = resealed(changed(mutant, ("effort", "peak", "largest"), max(agents.values(), key=F)))
+            agents = mutant["input"]["peak"]["agents"]
+            mutant = resealed(changed(mutant, ("input", "peak", "largest"), max(agents.values(), key=F)))
         report = check(mutant, stdlib=True)
         if report.accepted:
             passed.append(path)
@@ -670,8 +674,8 @@ def assert_no_forgery_passes(data: dict[str, Any]) -> set[str]:
 @pytest.mark.parametrize("name", ["1.1", "1.2", "3.1 mixed", "disconnected mixed"])
 def test_certificates_of_the_input_are_checked(name: str):
     data = written(nominal_certificate(name))
-    effort = data["effort"]
-    assert effort["bounded"] and effort["starts"] and effort["peak"] and effort["energy"] and effort["disturbed"]
+    effort = data["input"]
+    assert effort["bounded"] and effort["initial_set"] and effort["peak"] and effort["energy"] and effort["disturbed"]
     assert len(effort["residual"]) >= 3 and any(effort["constants"])
     tried = assert_no_forgery_passes(data)
     assert any(path.startswith("residual.clock") for path in tried)
@@ -680,13 +684,13 @@ def test_certificates_of_the_input_are_checked(name: str):
 @pytest.mark.parametrize("push", [F(0), F(1, 20)])
 def test_certificates_of_the_sliding_input_are_checked(push: Fraction):
     data = written(sliding_certificate(push))
-    assert data["effort"]["sliding"]["agents"] and data["effort"]["peak"]
+    assert data["input"]["sliding"]["agents"] and data["input"]["peak"]
     assert_no_forgery_passes(data)
 
 
 def test_growing_inputs_are_checked_by_every_proof():
-    """Bounded by a rate, not by a limit of rates, and either by the spectrum."""
-    for graph, k, by in ((RING, F(1), "rate"), (RING, F(1, 2), "limit"), (CHAIN, F(1), "spectrum")):
+    """Bounded by a rate, not by a upper bound on the decay rate, and either by the spectrum."""
+    for graph, k, by in ((RING, F(1), "rate"), (RING, F(1, 2), "upper_bound"), (CHAIN, F(1), "spectrum")):
         cert = certify(graph, NominalProtocol(1, 1, k, 1), [1, 2, 4], simulation=False)
         assert cert.effort is not None and cert.effort.by == by
         assert_no_forgery_passes(written(cert))
@@ -699,8 +703,8 @@ def test_a_set_of_one_start_is_that_start(name: str):
     x0, protocol = rationals(rng, graph.n_nodes), protocol_at(rng, graph, F(2))
     alone = certify(graph, protocol, x0, simulation=False)
     assert alone.effort is not None and alone.effort.peak is not None
-    for starts in (Starts(x0), Starts(x0, [F(0)] * graph.n_nodes), ellipsoid(x0, [[0] * graph.n_nodes])):
-        cert = alone.changed(starts=starts)
+    for initial_set in (InitialSet(x0), InitialSet(x0, [F(0)] * graph.n_nodes), ellipsoid(x0, [[0] * graph.n_nodes])):
+        cert = alone.changed(initial_set=initial_set)
         assert cert.effort is not None and cert.effort.peak is not None
         assert cert.effort.peak.largest >= alone.effort.peak.largest
         report = cert.checked
@@ -727,13 +731,13 @@ N3 = [F(1), F(2), F(3)]
         {"limits": [Limits(None, F(1))]},
         {"limits": [Limits(None, None, F(-1, 9))]},
         {"limits": [Limits()]},
-        {"starts": Starts(N3, [F(1), F(-1), F(1)])},
-        {"starts": Starts(N3, [F(1)] * 2)},
-        {"starts": Starts(N3, axes=[[F(1)] * 2])},
-        {"starts": Starts(N3, [F(1)] * 3, [[F(1)] * 3])},
-        {"starts": Starts(N3[:2])},
-        {"starts": 0},
-        {"starts": "nan"},
+        {"initial_set": InitialSet(N3, [F(1), F(-1), F(1)])},
+        {"initial_set": InitialSet(N3, [F(1)] * 2)},
+        {"initial_set": InitialSet(N3, axes=[[F(1)] * 2])},
+        {"initial_set": InitialSet(N3, [F(1)] * 3, [[F(1)] * 3])},
+        {"initial_set": InitialSet(N3[:2])},
+        {"initial_set": 0},
+        {"initial_set": "nan"},
         {"delta": 0},
         {"delta": "-1"},
     ],

@@ -23,7 +23,7 @@ from generators import KINDS, Made, all_classes, class_cases, made_graphs, rando
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lmi.exact.rounding import float_up
+from lmi.exact.directed_rounding import float_up
 from ptcc_certify.batch import certify_many
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
@@ -109,7 +109,7 @@ def kernel(A: Rows) -> flint.fmpq_mat:
 
 
 #: Obligations with a witness.
-WITNESSED = ("rate-limit", "rate-mean", "input-threshold", "input-peak", "input-energy", "input-length")
+WITNESSED = ("rate-upper-bound", "rate-mean", "input-threshold", "input-peak", "input-energy", "input-length")
 
 
 class Recheck:
@@ -277,42 +277,44 @@ class Recheck:
 
     def outline(self) -> None:
         """The proof has the steps that the claims need, in order, and no others."""
-        assert self.data["reaching_time"] is None and self.data["sigma0"] is None  # nominal
+        assert self.data["reaching_time"] is None and self.data["sliding_variable"] is None  # nominal
         expected: list[tuple[str, str, list[str]]] = [("structure", "graph", []), ("claim", "graph", [])]
-        if self.data["outcome"] is not None:
-            expected.append(("outcome", "graph", []))
+        if self.data["influence"] is not None:
+            expected.append(("final-state", "graph", []))
         expected += self.own_steps
-        for k, member in enumerate(self.data["lyapunov"]["members"]):
-            of = f"lyapunov.members[{k}]"
-            assert (member["class"] == "paper") == (k == 0)
-            expected += [("rate", of, ["b"])] if member["class"] != "paper" else []
-            expected += [("prefactor", of, ["lowest", "highest"])] if member["class"] == "full" else []
-            expected += [("distance", of, [])] if member["distance"] is not None else []
-        if self.data["rates"]["limit"] is not None:
-            expected.append((self.limited_by, "rates", ["limit"]))
+        for k, function in enumerate(self.data["lyapunov"]["functions"]):
+            of = f"lyapunov.functions[{k}]"
+            assert (function["class"] == "paper") == (k == 0)
+            expected += [("rate", of, ["b"])] if function["class"] != "paper" else []
+            expected += [("overshoot", of, ["lowest", "highest"])] if function["class"] == "full" else []
+            expected += [("deviation", of, [])] if function["deviation"] is not None else []
+        if self.data["rates"]["upper_bound"] is not None:
+            expected.append((self.limited_by, "rates", ["upper_bound"]))
         expected += self.effort_steps
         assert [(s["kind"], s["of"], list(s["numbers"])) for s in self.data["proof"]] == expected
         for step in self.data["proof"]:
-            assert set(step) == {"kind", "of", "statement", "lemma", "numbers", "witness"}
+            assert set(step) == {"kind", "of", "proves", "lemma", "numbers", "witness"}
             assert (step["witness"] is not None) == (step["kind"] in WITNESSED)  # the outcome is exact, not in balls
 
     @property
     def effort_steps(self) -> list[tuple[str, str, list[str]]]:
         """The steps about the input; what they state is judged in test_effort.py."""
-        said = self.data["effort"]
-        assert (said is None) == (self.data["rates"]["certified"] is None and bool(self.data["graph"]["edges"]))
+        said = self.data["input"]
+        assert (said is None) == (self.data["rates"]["proved"] is None and bool(self.data["graph"]["edges"]))
         if said is None:
             return []
         steps: list[tuple[str, str, list[str]]] = []
-        steps += [("input-threshold", "effort", [])] if said["bounded"] is not None else []
+        steps += [("input-threshold", "input", [])] if said["bounded"] is not None else []
         steps += [
-            ("input-constants", f"lyapunov.members[{k}]", []) for k, c in enumerate(said["constants"]) if c is not None
+            ("input-constants", f"lyapunov.functions[{k}]", [])
+            for k, c in enumerate(said["constants"])
+            if c is not None
         ]
         kinds = {"peak": "input-peak", "energy": "input-energy", "path_length": "input-length"}
         for key, kind in kinds.items():
             if said[key] is not None:
                 integral = any(s["kind"] == kind and "p" in s["numbers"] for s in self.data["proof"])
-                steps.append((kind, "effort", ["p", "m0", "m1"] if integral else ["z"]))
+                steps.append((kind, "input", ["p", "m0", "m1"] if integral else ["z"]))
         return steps
 
     def digest(self) -> None:
@@ -450,32 +452,32 @@ class Recheck:
 
     def rates(self) -> None:
         data = self.data
-        paper, members = data["paper"], data["lyapunov"]["members"]
+        paper, functions = data["paper"], data["lyapunov"]["functions"]
         if not paper["blocks"]:
             assert not any(any(row) for row in self.L)  # nobody listens, nothing moves
             assert paper["rate"] is None and paper["rho_interval"] is None
-            assert data["rates"] == dict.fromkeys(("paper", "diagonal", "certified", "limit"))
-            assert members == [] and data["prefactor"] is None
+            assert data["rates"] == dict.fromkeys(("paper", "diagonal", "proved", "upper_bound"))
+            assert functions == [] and data["overshoot"] is None
             return
         rate = number(paper["rate"])
         assert rate > 0
         assert self.proves(rate)
         assert self.decreases(rate)
         self.paper_steps()
-        assert number(paper["prefactor"]) == max(self.weights.values()) / min(self.weights.values())
-        shared = {k: paper[k] for k in ("coordinates", "blocks", "rho", "rate", "prefactor")}
-        assert members[0] == {"class": "paper", **shared, "distance": members[0]["distance"]}
-        self.distances(members[0], self.paper_form)
-        self.sharper(members[1:])
+        assert number(paper["overshoot"]) == max(self.weights.values()) / min(self.weights.values())
+        shared = {k: paper[k] for k in ("coordinates", "blocks", "rho", "rate", "overshoot")}
+        assert functions[0] == {"class": "paper", **shared, "deviation": functions[0]["deviation"]}
+        self.deviations(functions[0], self.paper_form)
+        self.sharper(functions[1:])
         self.limit()
-        assert set(data["rates"]) == {"paper", "diagonal", "certified", "limit"}
+        assert set(data["rates"]) == {"paper", "diagonal", "proved", "upper_bound"}
         assert data["rates"]["paper"] == paper["rate"]
-        for key, classes in (("diagonal", ("perron", "lmi")), ("certified", ("paper", "perron", "lmi", "full"))):
-            positive = [number(m["rate"]) for m in members if m["class"] in classes and number(m["rate"]) > 0]
+        for key, classes in (("diagonal", ("perron", "lmi")), ("proved", ("paper", "perron", "lmi", "full"))):
+            positive = [number(m["rate"]) for m in functions if m["class"] in classes and number(m["rate"]) > 0]
             assert data["rates"][key] == (str(max(positive)) if positive else None)
-        fastest = [m for m in members if m["rate"] == data["rates"]["certified"]]
-        least = min(fastest, key=lambda m: number(m["prefactor"]))
-        assert {"value": least["prefactor"], "of": f"||{least['coordinates']}||^2"} == data["prefactor"]
+        fastest = [m for m in functions if m["rate"] == data["rates"]["proved"]]
+        least = min(fastest, key=lambda m: number(m["overshoot"]))
+        assert {"value": least["overshoot"], "of": f"||{least['coordinates']}||^2"} == data["overshoot"]
 
     # ------------------------------------------------------------------ what no rate exceeds
 
@@ -497,17 +499,17 @@ class Recheck:
     @property
     def limited_by(self) -> str:
         """Which of two obligations limits the rates."""
-        return "rate-mean" if ("rate-mean", "rates") in self.steps else "rate-limit"
+        return "rate-mean" if ("rate-mean", "rates") in self.steps else "rate-upper-bound"
 
     def limit(self) -> None:
         """No rate exceeds the limit, which some eigenvalue does not, though by less than a thousandth."""
-        said = self.data["rates"]["limit"]
-        assert said is not None and self.step(self.limited_by, "rates") == {"limit": number(said)}
+        said = self.data["rates"]["upper_bound"]
+        assert said is not None and self.step(self.limited_by, "rates") == {"upper_bound": number(said)}
         assert not self.slowest > ball(number(said))
         assert not self.sharp or ball(number(said)) < self.slowest * (1 + ball(Fraction(1, 1000)))
-        for member in self.data["lyapunov"]["members"]:
-            assert number(member["rate"]) < number(said)
-            assert not ball(number(member["rate"])) > self.slowest
+        for function in self.data["lyapunov"]["functions"]:
+            assert number(function["rate"]) < number(said)
+            assert not ball(number(function["rate"])) > self.slowest
         witness = self.steps[self.limited_by, "rates"]["witness"]
         (self.mean if self.limited_by == "rate-mean" else self.inertia)(witness, number(said) / 2)
 
@@ -555,7 +557,7 @@ class Recheck:
         return part(self.L, list(range(self.n)), self.kept)
 
     @cached_property
-    def beyond_outcome(self) -> Rows:
+    def beyond_final_state(self) -> Rows:
         """``I - Q`` on ``kept``, with ``Q = U (V'U)^-1 V'`` for ``L U = 0`` and ``V'L = 0``."""
         U, V = kernel(self.L), kernel(transposed(self.L))
         Q = rows_of(U * (V.transpose() * U).inv() * V.transpose()) if U.ncols() else [[Fraction(0)] * self.n] * self.n
@@ -569,14 +571,14 @@ class Recheck:
         weights = [self.weights.get(v, Fraction(0)) for v in range(self.n)]
         return product(transposed(self.range), product(diagonal(weights), self.range))
 
-    def matrix(self, member: dict[str, Any]) -> Rows:
+    def matrix(self, function: dict[str, Any]) -> Rows:
         """``P`` of a sharper member, on the rows ``moving``."""
-        (block,) = member["blocks"]
+        (block,) = function["blocks"]
         assert set(block) == {
             "name",
             "nodes",
             "times_rho",
-            "lower_triangle" if "full" in member["class"] else "diagonal",
+            "lower_triangle" if "full" in function["class"] else "diagonal",
         }
         assert block["name"] == "P" and block["times_rho"] is False
         nodes = self.numbers(block["nodes"])
@@ -598,35 +600,35 @@ class Recheck:
         S = combined(combined(PA, transposed(PA), Fraction(1)), P, -rate)
         return positive_definite(product(transposed(basis), product(S, basis)))
 
-    def sharper(self, members: list[dict[str, Any]]) -> None:
+    def sharper(self, functions: list[dict[str, Any]]) -> None:
         """Rate, prefactor and distances of every member beside the paper's, and that the proof speaks of them."""
-        for k, member in enumerate(members, start=1):
-            of = f"lyapunov.members[{k}]"
-            assert set(member) == {"class", "coordinates", "blocks", "rho", "rate", "prefactor", "distance"}
-            assert member["class"] in ("perron", "lmi", "full")
-            assert member["coordinates"] == "E" and member["rho"] is None
-            P, rate, prefactor = self.matrix(member), number(member["rate"]), number(member["prefactor"])
+        for k, function in enumerate(functions, start=1):
+            of = f"lyapunov.functions[{k}]"
+            assert set(function) == {"class", "coordinates", "blocks", "rho", "rate", "overshoot", "deviation"}
+            assert function["class"] in ("perron", "lmi", "full")
+            assert function["coordinates"] == "E" and function["rho"] is None
+            P, rate, overshoot = self.matrix(function), number(function["rate"]), number(function["overshoot"])
             assert self.step("rate", of) == {"b": rate}
             assert self.decays(P, rate)
-            if member["class"] == "full":
-                ends = self.step("prefactor", of)
+            if function["class"] == "full":
+                ends = self.step("overshoot", of)
                 lowest, highest = ends["lowest"], ends["highest"]
                 unit = diagonal([Fraction(1)] * len(P))
-                assert lowest > 0 and prefactor == highest / lowest
+                assert lowest > 0 and overshoot == highest / lowest
                 assert positive_definite(combined(P, unit, -lowest))
                 assert positive_definite(combined(diagonal([highest] * len(P)), P, Fraction(-1)))
             else:
                 weights = [P[i][i] for i in range(len(P))]
-                assert min(weights) > 0 and prefactor == max(weights) / min(weights)
+                assert min(weights) > 0 and overshoot == max(weights) / min(weights)
             basis = part(self.range, self.moving, list(range(len(self.kept))))
-            self.distances(member, product(transposed(basis), product(P, basis)))
+            self.deviations(function, product(transposed(basis), product(P, basis)))
 
-    def distances(self, member: dict[str, Any], V: Rows) -> None:
+    def deviations(self, function: dict[str, Any], V: Rows) -> None:
         """``|x_k - (Q x)_k|^2 <= c_k V`` and ``||x - Q x||^2 <= norm V``, and constants hardly smaller would not do.
 
         For ``V`` and ``x - Q x = D x`` on ``kept`` the least ``c_k`` is ``D_k V^-1 D_k'``.
         """
-        said, D = member["distance"], self.beyond_outcome
+        said, D = function["deviation"], self.beyond_final_state
         assert set(said) == {"agents", "norm"} and list(said["agents"]) == self.nodes
         assert positive_definite(V)
         solved = rows_of(exact_matrix(V).solve(exact_matrix(transposed(D))))
@@ -642,38 +644,38 @@ class Recheck:
 
     # ------------------------------------------------------------------ the outcome
 
-    def outcome(self) -> None:
+    def final_state(self) -> None:
         """``L x = 0`` and ``eta' G (x - x0) = 0``: together they determine the limit."""
-        said = self.data["outcome"]
-        x = self.state(said["final_state"])
+        said = self.data["influence"]
+        x = self.state(self.data["final_state"])
         x0 = self.state(self.data["initial_state"])
         assert not any(sum((a * v for a, v in zip(row, x, strict=True) if a), Fraction(0)) for row in self.L)
         balanced = [group for group in self.closed if self.camps(group) is not None]
-        voices = said["influence"]["components"]
-        assert [self.numbers(c["nodes"]) for c in voices] == balanced
+        left_null_vectors = said["components"]
+        assert [self.numbers(c["nodes"]) for c in left_null_vectors] == balanced
         degenerate = []
-        for group, entry in zip(balanced, voices, strict=True):
+        for group, entry in zip(balanced, left_null_vectors, strict=True):
             camp = self.camps(group)
             assert camp is not None
-            voice = [number(v) for v in entry["voices"]]
-            eta = [camp[v] * w * camp[group[0]] for v, w in zip(group, voice, strict=True)]
+            null_vector = [number(v) for v in entry["left_null_vector"]]
+            eta = [camp[v] * w * camp[group[0]] for v, w in zip(group, null_vector, strict=True)]
             eta = eta if eta[0] > 0 else [-w for w in eta]
             assert min(eta) > 0 and sum(eta) == 1
             for j in group:  # eta' M(L_k) = 0
                 M = [abs(self.L[i][j]) * (1 if i == j else -1) for i in group]
                 assert sum(a * b for a, b in zip(eta, M, strict=True)) == 0
-            assert sum(w * (x[v] - x0[v]) for v, w in zip(group, voice, strict=True)) == 0
+            assert sum(w * (x[v] - x0[v]) for v, w in zip(group, null_vector, strict=True)) == 0
             if all(x[v] == 0 for v in group):
                 degenerate.append(self.closed.index(group) + 1)
         assert said["degenerate"] == degenerate
         assert all(x[v] == 0 for group in self.closed if group not in balanced for v in group)
-        self.pulls(said["influence"], balanced)
+        self.containment_weights(said, balanced)
         for entry in self.data.get("components", []):
-            assert entry["outcome"] == {label: said["final_state"][label] for label in entry["nodes"]}
+            assert entry["final_state"] == {label: self.data["final_state"][label] for label in entry["nodes"]}
 
-    def pulls(self, influence: dict[str, Any], balanced: list[list[int]]) -> None:
+    def containment_weights(self, influence: dict[str, Any], balanced: list[list[int]]) -> None:
         """Each column of the followers' weights extends ``G_k 1`` to a vector of the kernel of ``L``."""
-        assert self.numbers(list(influence["followers"])) == self.followers
+        assert self.numbers(list(influence["containment_weights"])) == self.followers
         for k, entry in enumerate(self.data["structure"]["closed_components"]):
             if not entry["balanced"]:
                 continue
@@ -681,9 +683,9 @@ class Recheck:
             state = [Fraction(0)] * self.n
             for v, sign in zip(self.closed[k], entry["gauge"], strict=True):
                 state[v] = Fraction(sign)
-            for label, pull in influence["followers"].items():
-                state[self.index[label]] = number(pull[column])
-                assert sum(abs(number(w)) for w in pull) <= 1
+            for label, weights in influence["containment_weights"].items():
+                state[self.index[label]] = number(weights[column])
+                assert sum(abs(number(w)) for w in weights) <= 1
             assert not any(sum((a * v for a, v in zip(row, state, strict=True) if a), Fraction(0)) for row in self.L)
 
     def state(self, values: dict[str, str]) -> list[Fraction]:
@@ -695,7 +697,7 @@ class Recheck:
         self.structure()
         self.outline()
         self.rates()
-        self.outcome()
+        self.final_state()
 
 
 # ---------------------------------------------------------------------- certificates to judge
@@ -748,7 +750,7 @@ def test_the_examples_behave_as_the_paper_reports(name: str):
     assert cert.notes == ()
     assert 0 < cert.comparison.worst_ratio <= 1 + 1e-6
     assert cert.optimality_ratio is not None and 0 < cert.optimality_ratio <= 1
-    assert cert.outcome is not None and cert.outcome.exact and cert.outcome.degenerate == ()
+    assert cert.final_state is not None and cert.final_state.exact and cert.final_state.degenerate == ()
     Recheck(through_json(cert)).everything()
 
 
@@ -757,14 +759,14 @@ def test_the_examples_behave_as_the_paper_reports(name: str):
 def test_at_the_last_instant_the_run_lacks_what_the_exact_clock_leaves(name: str):
     """x - Qx0 at 1 - t/T = 1e-8 is exp(-L s) x0 - Q x0, to the integrator's accuracy."""
     cert = example(name)
-    run, outcome, start = cert.trajectory, cert.outcome, cert.start
-    assert run is not None and outcome is not None and start is not None
+    run, final_state, start = cert.trajectory, cert.final_state, cert.start
+    assert run is not None and final_state is not None and start is not None
     last = int(np.flatnonzero(run.remaining > 0)[-1])
     assert run.remaining[last] == pytest.approx(1e-8)
     exact = states(cert.graph, clock(cert.protocol, Fraction(float(run.remaining[last]))), start)
-    left = np.array([float(x - ball(Fraction(y))) for x, y in zip(exact, outcome.final_state, strict=True)])
+    left = np.array([float(x - ball(Fraction(y))) for x, y in zip(exact, final_state.states, strict=True)])
     size = float(max(map(abs, start)))
-    assert np.abs(run.states[:, last] - outcome.values - left).max() <= 1e-9 * size
+    assert np.abs(run.states[:, last] - final_state.values - left).max() <= 1e-9 * size
     if name == "fig5b":  # rho2 kappa min Re lambda = 0.78: far from settled, and seen to be
         assert np.abs(left).max() > 1e-7 * size
 
@@ -772,32 +774,31 @@ def test_at_the_last_instant_the_run_lacks_what_the_exact_clock_leaves(name: str
 # ---------------------------------------------------------------------- the schema
 
 KEYS = {
-    "": "schema producer graph structure claim protocol paper lyapunov rates prefactor initial_state sigma0 outcome "
-    "reaching_time effort proof verdict digest unverified",
+    "": "schema producer graph structure claim protocol paper lyapunov rates overshoot initial_state sliding_variable "
+    "influence final_state reaching_time input proof verdict digest unverified",
     "graph": "nodes edges read sha256",
     "graph.read": "orientation duplicates self_loops undirected",
     "structure": "connectivity closed_components leaders followers balanced sign_symmetric",
     "claim": "theorem behaviour corollaries",
     "protocol": "kind T rho1 rho2 kappa",
-    "paper": "theorem objective coordinates blocks rho rho_interval rate prefactor",
-    "lyapunov": "members",
-    "rates": "paper diagonal certified limit",
-    "prefactor": "value of",
-    "outcome": "final_state degenerate influence",
-    "outcome.influence": "components followers",
-    "effort": "bounded threshold starts constants peak energy path_length sliding residual disturbed",
-    "effort.threshold": "lower upper",
+    "paper": "theorem objective coordinates blocks rho rho_interval rate overshoot",
+    "lyapunov": "functions",
+    "rates": "paper diagonal proved upper_bound",
+    "overshoot": "value of",
+    "influence": "components containment_weights degenerate",
+    "input": "bounded threshold initial_set constants peak energy path_length sliding residual disturbed",
+    "input.threshold": "lower upper",
     "unverified": "spectral optimality_ratio paper_rate search residual final_state asked simulation notes",
     "unverified.search": "method at tried diagonal_limit",
     "unverified.simulation": "worst_ratio floor resolved_until ratios stop tolerances deadline_resolved judged "
-    "distance_ratio",
+    "deviation_ratio",
 }
 
 
 @pytest.mark.parametrize("name", GRAPHS)
 def test_every_key_of_the_schema_is_there(name: str):
     data = through_json(example(name))
-    assert data["schema"] == "ptcc-certificate/1"
+    assert data["schema"] == "ptcc-certificate/2"
     assert data["producer"].startswith("ptcc-certify ")
     for path, keys in KEYS.items():
         place = data
@@ -805,13 +806,15 @@ def test_every_key_of_the_schema_is_there(name: str):
             place = place[step]
         assert set(place) >= set(keys.split()), path
         assert set(place) == set(keys.split()) or path.startswith("unverified"), path  # about which nothing is claimed
-    for member in data["lyapunov"]["members"]:
-        assert set(member) == {"class", "coordinates", "blocks", "rho", "rate", "prefactor", "distance"}
-        assert set(member["distance"]) == {"agents", "norm"}
-    rates = {member["rate"] for member in data["lyapunov"]["members"]}  # one that bounds the growth may be negative
+    for function in data["lyapunov"]["functions"]:
+        assert set(function) == {"class", "coordinates", "blocks", "rho", "rate", "overshoot", "deviation"}
+        assert set(function["deviation"]) == {"agents", "norm"}
+    rates = {
+        function["rate"] for function in data["lyapunov"]["functions"]
+    }  # one that bounds the growth may be negative
     for step in data["proof"]:
-        assert set(step) == {"kind", "of", "statement", "lemma", "numbers", "witness"}
-        assert (step["statement"], step["lemma"]) == OBLIGATIONS[step["kind"]]
+        assert set(step) == {"kind", "of", "proves", "lemma", "numbers", "witness"}
+        assert (step["proves"], step["lemma"]) == OBLIGATIONS[step["kind"]]
         assert all(number(text) > 0 or text in (rates | {"0"}) for text in step["numbers"].values())
     assert len(data["graph"]["sha256"]) == 64
     Recheck(data).digest()
@@ -822,26 +825,26 @@ def test_every_key_of_the_schema_is_there(name: str):
 #: Where integers and booleans may stand outside ``unverified``; everything else there is text.
 PLAIN = re.compile(
     r"\.structure\.(balanced|sign_symmetric)|\.structure\.closed_components\[\]\.(balanced|gauge\[\])"
-    r"|\.graph\.read\.undirected|.*\.times_rho|\.outcome\.degenerate\[\]|\.effort\.bounded"
+    r"|\.graph\.read\.undirected|.*\.times_rho|\.influence\.degenerate\[\]|\.input\.bounded"
     r"|\.proof\[\]\.witness(\.norm|\.agents\.\*\[\])?"
 )
 #: Where the texts are exact numbers.
 EXACT = re.compile(
-    r"\.graph\.edges\[\]\[2\]|\.protocol\.(T|rho1|rho2|kappa)|\.(paper|lyapunov\.members\[\])\.(rho|rate|prefactor)"
-    r"|.*\.diagonal\[\]|.*\.(lower_triangle|vectors)\[\]\[\]|.*\.distance\.(norm|agents\.\*)|\.paper\.rho_interval\.\w+|\.rates\.\w+|\.prefactor\.value|\.initial_state\.\*"
-    r"|\.outcome\.final_state\.\*|\.outcome\.influence\.components\[\]\.voices\[\]"
-    r"|\.outcome\.influence\.followers\.\*\[\]|\.components\[\]\.outcome\.\*|\.proof\[\]\.numbers\.\w+"
-    r"|\.effort\.(threshold\.\w+|constants\[\]\.\*|peak\.(agents\.\*|largest|norm)|energy|path_length)"
+    r"\.graph\.edges\[\]\[2\]|\.protocol\.(T|rho1|rho2|kappa)|\.(paper|lyapunov\.functions\[\])\.(rho|rate|overshoot)"
+    r"|.*\.diagonal\[\]|.*\.(lower_triangle|vectors)\[\]\[\]|.*\.deviation\.(norm|agents\.\*)|\.paper\.rho_interval\.\w+|\.rates\.\w+|\.overshoot\.value|\.initial_state\.\*"
+    r"|\.final_state\.\*|\.influence\.components\[\]\.left_null_vector\[\]"
+    r"|\.influence\.containment_weights\.\*\[\]|\.components\[\]\.final_state\.\*|\.proof\[\]\.numbers\.\w+"
+    r"|\.input\.(threshold\.\w+|constants\[\]\.\*|peak\.(agents\.\*|largest|norm)|energy|path_length)"
 )
 #: Objects whose keys are labels of nodes.
 BY_LABEL = {
     ".initial_state",
-    ".outcome.final_state",
-    ".outcome.influence.followers",
-    ".components[].outcome",
-    ".lyapunov.members[].distance.agents",
-    ".effort.constants[]",
-    ".effort.peak.agents",
+    ".final_state",
+    ".influence.containment_weights",
+    ".components[].final_state",
+    ".lyapunov.functions[].deviation.agents",
+    ".input.constants[]",
+    ".input.peak.agents",
     ".proof[].witness.agents",
 }
 
@@ -907,7 +910,7 @@ BROKEN: dict[str, Callable[[str], str | bytes]] = {
     "NaN": lambda text: text.replace('"spectral": ', '"spectral": NaN, "was": ', 1),
     "infinite": lambda text: text.replace('"spectral": ', '"spectral": -Infinity, "was": ', 1),
     "beyond float64": lambda text: text.replace('"spectral": ', '"spectral": 1e999, "was": ', 1),
-    "another schema": lambda text: text.replace("ptcc-certificate/1", "ptcc-certificate/999"),
+    "another schema": lambda text: text.replace("ptcc-certificate/2", "ptcc-certificate/999"),
     "a list": lambda text: f"[{text}]",
     "nested": lambda text: "[" * 200_000,
     "an integer of 10^5 digits": lambda text: text.replace('"spectral": ', f'"spectral": {"7" * 10**5}, "was": ', 1),
@@ -971,7 +974,7 @@ def refused(data: dict[str, Any]) -> bool:
     true = stands(Recheck(data, sharp=False))
     assert not check(data).accepted  # the digest tells, whatever the change
     report = check({**data, "digest": digest(data)})
-    if (report.rejected or "").startswith(("input-", "effort")):  # judged in test_effort.py
+    if (report.rejected or "").startswith(("input-", "input")):  # judged in test_effort.py
         return True
     assert report.accepted == true, report.reason
     assert true or report.rejected != "digest"
@@ -996,14 +999,14 @@ def test_the_recheck_sees_what_is_wrong(name: str, kwargs: dict):
 
     def state(data: dict[str, Any]) -> None:
         label = data["graph"]["nodes"][-1]
-        data["outcome"]["final_state"][label] = more(data["outcome"]["final_state"][label])
+        data["final_state"][label] = more(data["final_state"][label])
 
     def sign(data: dict[str, Any]) -> None:
         for edge in data["graph"]["edges"]:
             edge[2] = str(-Fraction(edge[2]))
 
     assert spoilt(weight) and spoilt(state) and spoilt(sign)
-    assert spoilt(lambda data: data["paper"].update(prefactor=more(data["paper"]["prefactor"])))
+    assert spoilt(lambda data: data["paper"].update(overshoot=more(data["paper"]["overshoot"])))
     assert spoilt(lambda data: data["structure"].update(balanced=not data["structure"]["balanced"]))
     assert spoilt(lambda data: data["structure"].update(leaders=data["structure"]["leaders"][:-1]))
     for k, step in enumerate(of_class(name)["proof"]):
@@ -1022,34 +1025,34 @@ def written_anew(data: dict[str, Any], old: str, new: Fraction) -> dict[str, Any
 
 
 @pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "1.2", "3.1 mixed no single"), ROWS))
-def test_the_recheck_sees_what_is_wrong_with_a_sharper_member(name: str, kwargs: dict):
+def test_the_recheck_sees_what_is_wrong_with_a_sharper_function(name: str, kwargs: dict):
     data = of_class(name)
     Recheck(data).everything()
 
     spoilt = refused
-    members = data["lyapunov"]["members"]
-    assert len(members) > 1
-    for k, member in enumerate(members):
-        for entry in (member["distance"]["norm"], max(member["distance"]["agents"].values(), key=number)):
+    functions = data["lyapunov"]["functions"]
+    assert len(functions) > 1
+    for k, function in enumerate(functions):
+        for entry in (function["deviation"]["norm"], max(function["deviation"]["agents"].values(), key=number)):
             assert spoilt(written_anew(data, entry, number(entry) * Fraction(99, 100)))
         if k == 0:
             continue
-        rate = number(member["rate"])
-        assert spoilt(written_anew(data, member["rate"], rate + abs(rate) / 100))
-        assert spoilt(written_anew(data, member["prefactor"], number(member["prefactor"]) * Fraction(99, 100)))
-        if member["class"] == "full":
-            numbers = Recheck(data).steps["prefactor", f"lyapunov.members[{k}]"]["numbers"]
+        rate = number(function["rate"])
+        assert spoilt(written_anew(data, function["rate"], rate + abs(rate) / 100))
+        assert spoilt(written_anew(data, function["overshoot"], number(function["overshoot"]) * Fraction(99, 100)))
+        if function["class"] == "full":
+            numbers = Recheck(data).steps["overshoot", f"lyapunov.functions[{k}]"]["numbers"]
             lowest, highest = numbers["lowest"], numbers["highest"]
-            assert number(highest) / number(lowest) == number(member["prefactor"])
+            assert number(highest) / number(lowest) == number(function["overshoot"])
             for old, new in (
                 (lowest, number(lowest) * Fraction(100, 99)),
                 (highest, number(highest) * Fraction(99, 100)),
             ):
                 less = written_anew(data, old, new)
                 ratio = new / number(lowest) if old == highest else number(highest) / new
-                assert spoilt(written_anew(less, member["prefactor"], ratio))
+                assert spoilt(written_anew(less, function["overshoot"], ratio))
         copy = json.loads(json.dumps(data))
-        block = copy["lyapunov"]["members"][k]["blocks"][0]
+        block = copy["lyapunov"]["functions"][k]["blocks"][0]
         row = block["diagonal"] if "diagonal" in block else block["lower_triangle"][-1]
         row[0] = str(number(row[0]) + max(abs(number(x)) for x in row) / 1000)
         assert spoilt(copy)
@@ -1060,11 +1063,11 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
     """A limit below the slowest mode, an earlier claim about its witness, a witness of less or of something else."""
     data = of_class(name, method="paper")
     Recheck(data).everything()
-    limit = number(data["rates"]["limit"])
+    limit = number(data["rates"]["upper_bound"])
     assert refused(written_anew(data, str(limit), limit * Fraction(99, 100)))
     assert refused(written_anew(data, str(limit), -limit))
     copy = json.loads(json.dumps(data))
-    copy["rates"]["limit"] = str(limit * 2)
+    copy["rates"]["upper_bound"] = str(limit * 2)
     assert refused(copy)
 
     def spoilt(change: Callable[[dict[str, Any]], None]) -> bool:
@@ -1072,7 +1075,7 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
         change(copy["proof"][place]["witness"])
         return refused(copy)
 
-    (place,) = (k for k, step in enumerate(data["proof"]) if step["kind"] in ("rate-limit", "rate-mean"))
+    (place,) = (k for k, step in enumerate(data["proof"]) if step["kind"] in ("rate-upper-bound", "rate-mean"))
     witness = data["proof"][place]["witness"]
     if data["proof"][place]["kind"] == "rate-mean":
         for node in data["graph"]["nodes"]:
@@ -1156,16 +1159,16 @@ def test_real_graphs_are_certified(name: str, real_data: Path):
     judge.structure()
     judge.outline()
     judge.digest()
-    judge.outcome()
+    judge.final_state()
     assert cert.limit is not None and cert.rate is not None and cert.spectral_rate is not None
-    assert cert.rate < cert.limit.value == number(judge.data["rates"]["limit"])
+    assert cert.rate < cert.limit.value == number(judge.data["rates"]["upper_bound"])
     eigenvalues = np.linalg.eigvals(graph.laplacian().toarray())
     slowest = 2 * np.sort(eigenvalues[np.argsort(np.abs(eigenvalues))][len(cert.influence.balanced) :].real)[0]
     assert slowest == pytest.approx(cert.spectral_rate, rel=1e-6)
     assert slowest * (1 - 1e-6) <= float(cert.limit.value) <= slowest * (1 + 1e-3)
     assert cert.optimality_ratio is not None and 0.99 <= cert.optimality_ratio <= 1
-    for member in judge.data["lyapunov"]["members"][1:] if graph.n_nodes <= 20 else ():
-        assert judge.decays(judge.matrix(member), number(member["rate"]))
+    for function in judge.data["lyapunov"]["functions"][1:] if graph.n_nodes <= 20 else ():
+        assert judge.decays(judge.matrix(function), number(function["rate"]))
     rate = number(judge.data["paper"]["rate"])
     assert judge.proves(rate)
     assert not judge.proves(rate * (1 + Fraction(1, 10**6)))
@@ -1195,18 +1198,18 @@ def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     path = tmp_path / "g.csv"
     path.write_text("a,b,-1\nb,a,-2\nc,d,1\nd,c,1\nb,e,1\nd,e,1\n")  # eta' G = (1, -2)/3 on a, b
     data = json.loads(ptcc("certify", str(path), "--x0", "a=1,b=2,c=1,d=1,e=5", "--json").out)
-    assert data["outcome"]["degenerate"] == []
-    assert data["outcome"]["final_state"] == {"a": "-1", "b": "1", "c": "1", "d": "1", "e": "1"}
+    assert data["influence"]["degenerate"] == []
+    assert data["final_state"] == {"a": "-1", "b": "1", "c": "1", "d": "1", "e": "1"}
     special = "a=2,b=1,c=1,d=1,e=5"
     data = json.loads(ptcc("certify", str(path), "--x0", special, "--json").out)
-    assert data["outcome"]["degenerate"] == [1]
-    assert data["outcome"]["final_state"] == {"a": "0", "b": "0", "c": "1", "d": "1", "e": "1/2"}
+    assert data["influence"]["degenerate"] == [1]
+    assert data["final_state"] == {"a": "0", "b": "0", "c": "1", "d": "1", "e": "1/2"}
     Recheck(data).everything()
     screen = ptcc("certify", str(path), "--x0", special).out
-    assert "degenerate start: leader group 1 meets at 0, although it is balanced" in screen
+    assert "degenerate initial state: leader group 1 meets at 0, although it is balanced" in screen
     assert len(screen.splitlines()) <= 24
     unbalanced = certify(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), PROTOCOL, [1, 1], simulation=False)
-    assert unbalanced.to_dict()["outcome"]["degenerate"] == []  # 0 is what an unbalanced group is for
+    assert unbalanced.to_dict()["influence"]["degenerate"] == []  # 0 is what an unbalanced group is for
 
 
 def test_a_disconnected_graph_has_components_and_no_claim():
@@ -1219,26 +1222,26 @@ def test_a_disconnected_graph_has_components_and_no_claim():
             "nodes": ["1", "2"],
             "connectivity": "strong",
             "claim": {"theorem": "1.2", "behaviour": "stability", "corollaries": []},
-            "outcome": {"1": "0", "2": "0"},
+            "final_state": {"1": "0", "2": "0"},
         },
         {
             "nodes": ["3", "4", "5"],
             "connectivity": "quasi-strong",
             "claim": {"theorem": "2.1", "behaviour": "interval bipartite consensus", "corollaries": ["3"]},
-            "outcome": {"3": "-1/2", "4": "1/2", "5": "1/2"},
+            "final_state": {"3": "-1/2", "4": "1/2", "5": "1/2"},
         },
         {
             "nodes": ["6"],
             "connectivity": "strong",
             "claim": {"theorem": "1.1", "behaviour": "bipartite consensus", "corollaries": ["1.1", "2"]},
-            "outcome": {"6": "6"},
+            "final_state": {"6": "6"},
         },
     ]
     assert data["unverified"]["simulation"]["worst_ratio"] <= 1 + 1e-6
     without = certify(graph, PROTOCOL).to_dict()
-    assert [c["outcome"] for c in without["components"]] == [None] * 3
-    assert without["initial_state"] is None and without["outcome"]["final_state"] is None
-    assert without["outcome"]["influence"] == data["outcome"]["influence"]
+    assert [c["final_state"] for c in without["components"]] == [None] * 3
+    assert without["initial_state"] is None and without["final_state"] is None
+    assert without["influence"] | {"degenerate": data["influence"]["degenerate"]} == data["influence"]
     assert without["unverified"]["simulation"] is None
 
 
@@ -1261,13 +1264,13 @@ def test_one_agent_keeps_its_state():
     data = through_json(certify(SignedDigraph.from_edges([], ["alone"]), PROTOCOL, ["22/7"]))
     Recheck(data).everything()
     assert data["claim"] == {"theorem": "1.1", "behaviour": "bipartite consensus", "corollaries": ["1.1", "2"]}
-    assert data["outcome"]["final_state"] == {"alone": "22/7"}
-    assert data["rates"] == dict.fromkeys(("paper", "diagonal", "certified", "limit"))
+    assert data["final_state"] == {"alone": "22/7"}
+    assert data["rates"] == dict.fromkeys(("paper", "diagonal", "proved", "upper_bound"))
     assert [(step["kind"], step["of"]) for step in data["proof"]] == [
         ("structure", "graph"),
         ("claim", "graph"),
-        ("outcome", "graph"),
-        ("input-threshold", "effort"),
+        ("final-state", "graph"),
+        ("input-threshold", "input"),
     ]
     assert data["paper"]["objective"] == "none: every agent keeps its state"
 
@@ -1285,7 +1288,7 @@ def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_o
     data = through_json(cert)
     assert data["verdict"] == "certified" and check(data).accepted
     assert data["rates"]["paper"] is None and cert.upper_bound == Fraction(2 * n, n - 1 if last > 0 else n)
-    assert [step["kind"] for step in data["proof"]] == ["structure", "claim", "outcome", "dominance", "rate-mean"]
+    assert [step["kind"] for step in data["proof"]] == ["structure", "claim", "final-state", "dominance", "rate-mean"]
     assert data["claim"]["theorem"] == ("1.1" if last > 0 else "1.2")
     judge = Recheck(data)
     judge.structure()
@@ -1293,9 +1296,9 @@ def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_o
     said = data["unverified"]
     rate = 2 * (1 - np.cos((2 if last > 0 else 1) * np.pi / n))
     assert said["spectral"] == pytest.approx(rate, rel=1e-6)
-    assert rate * (1 - 1e-4) <= float(Fraction(data["rates"]["certified"])) <= rate
+    assert rate * (1 - 1e-4) <= float(Fraction(data["rates"]["proved"])) <= rate
     mean = (n - 1) / 2 if last > 0 else 0.0
-    for end in data["outcome"]["final_state"].values():
+    for end in data["final_state"].values():
         if isinstance(end, dict):
             assert abs(Fraction(end["mid"]) - Fraction(mean)) <= Fraction(end["radius"]) < Fraction(1, 10**6)
         else:
@@ -1318,9 +1321,9 @@ def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_an_upper_bound(
     data = through_json(cert)
     assert data["verdict"] == "undecided"
     limit = str(Fraction(2 * n, n - 1 if last > 0 else n))
-    assert data["rates"] == {"paper": None, "diagonal": None, "certified": None, "limit": limit}
-    assert data["lyapunov"]["members"] == [] and data["prefactor"] is None
-    assert [step["kind"] for step in data["proof"]] == ["structure", "claim", "outcome", "rate-mean"]
+    assert data["rates"] == {"paper": None, "diagonal": None, "proved": None, "upper_bound": limit}
+    assert data["lyapunov"]["functions"] == [] and data["overshoot"] is None
+    assert [step["kind"] for step in data["proof"]] == ["structure", "claim", "final-state", "rate-mean"]
     assert cert.checked is None
     report = check(data)
     assert report.accepted and report.verdict == "undecided" and len(report.steps) == 4
@@ -1353,7 +1356,7 @@ def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Mad
     for key in ("claim", "protocol", "verdict"):
         assert first[key] == second[key]
     assert {names[k]: v for k, v in first["initial_state"].items()} == second["initial_state"]
-    assert {names[k]: v for k, v in first["outcome"]["final_state"].items()} == second["outcome"]["final_state"]
+    assert {names[k]: v for k, v in first["final_state"].items()} == second["final_state"]
     for key in ("connectivity", "balanced", "sign_symmetric"):
         assert first["structure"][key] == second["structure"][key]
     for key in ("leaders", "followers"):
@@ -1363,14 +1366,14 @@ def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Mad
         for d, name in ((first, names), (second, dict(zip(labels, labels, strict=True))))
     ]
     assert groups[0] == groups[1]
-    assert len(first["outcome"]["degenerate"]) == len(second["outcome"]["degenerate"])
+    assert len(first["influence"]["degenerate"]) == len(second["influence"]["degenerate"])
     assert first["paper"]["objective"] == second["paper"]["objective"]
     if first["paper"]["blocks"]:
-        rates = [float(number(d["rates"]["certified"])) for d in (first, second)]
+        rates = [float(number(d["rates"]["proved"])) for d in (first, second)]
         assert rates[1] == pytest.approx(rates[0], rel=1e-6)
         assert second["unverified"]["spectral"] == pytest.approx(first["unverified"]["spectral"], rel=1e-6)
-        assert float(number(second["rates"]["limit"])) == pytest.approx(
-            float(number(first["rates"]["limit"])), rel=1e-3
+        assert float(number(second["rates"]["upper_bound"])) == pytest.approx(
+            float(number(first["rates"]["upper_bound"])), rel=1e-3
         )
         steps = [[(kind, names) for kind, _, names in Recheck(d).own_steps] for d in (first, second)]
         assert sorted(steps[0]) == sorted(steps[1])
@@ -1397,7 +1400,7 @@ def of_size(name: str, n: int = 7, seed: int = 5, weights: str = "small ints") -
     return random_graph(np.random.default_rng(seed), **{"weights": weights, "n": n, **kwargs}).graph
 
 
-def members_of(graph: SignedDigraph, protocol: NominalProtocol = PROTOCOL, **more: Any) -> Certificate:
+def functions_of(graph: SignedDigraph, protocol: NominalProtocol = PROTOCOL, **more: Any) -> Certificate:
     cert = certify(graph, protocol, simulation=False, **more)
     assert cert.verdict == "certified"
     return cert
@@ -1414,13 +1417,13 @@ def same_rates(first: Certificate, second: Certificate, scale: int = 1) -> None:
         assert second.envelope.residual(remaining) == pytest.approx(bound, rel=0.1)
 
 
-def same_members(first: Certificate, second: Certificate, order: np.ndarray, scale: int = 1) -> None:
+def same_functions(first: Certificate, second: Certificate, order: np.ndarray, scale: int = 1) -> None:
     """Member by member equal, node ``v`` of the first being ``order[v]`` of the second."""
-    assert len(first.sharpening.members) == len(second.sharpening.members)
-    for a, b in zip(first.sharpening.members, second.sharpening.members, strict=True):
+    assert len(first.search.functions) == len(second.search.functions)
+    for a, b in zip(first.search.functions, second.search.functions, strict=True):
         assert a.kind == b.kind and a.matrix is None and b.matrix is None
         assert float(b.rate) == pytest.approx(float(a.rate) * scale, rel=1e-6)
-        assert float(b.prefactor) == pytest.approx(float(a.prefactor), rel=1e-3)
+        assert float(b.overshoot) == pytest.approx(float(a.overshoot), rel=1e-3)
         weights = {int(order[v]): float(w) for v, w in zip(a.nodes, a.weights, strict=True)}
         assert dict(zip(b.nodes, map(float, b.weights), strict=True)) == pytest.approx(weights, rel=1e-3)
 
@@ -1428,16 +1431,16 @@ def same_members(first: Certificate, second: Certificate, order: np.ndarray, sca
 @pytest.mark.parametrize(
     ("name", "method"), [*((name, "perron") for name in SOME), *((name, "best") for name in SOME[::2])]
 )
-def test_relabelling_permutes_the_sharper_members(name: str, method: str):
+def test_relabelling_permutes_the_sharper_functions(name: str, method: str):
     graph = of_size(name)
     order = np.random.default_rng(1).permutation(graph.n_nodes)
     moved = SignedDigraph.from_edges(
         [(int(order[int(s)]), int(order[int(t)]), w) for s, t, w in graph.edges], range(graph.n_nodes)
     )
-    first, second = members_of(graph, method=method), members_of(moved, method=method)
+    first, second = functions_of(graph, method=method), functions_of(moved, method=method)
     same_rates(first, second)
     if method == "perron":
-        same_members(first, second, order)
+        same_functions(first, second, order)
 
 
 @pytest.mark.parametrize("name", SOME[::2])
@@ -1446,9 +1449,9 @@ def test_heavier_edges_scale_every_rate(name: str):
     graph = of_size(name)
     heavier = SignedDigraph.from_edges([(s, t, 3 * w) for s, t, w in exact_edges(graph)], graph.labels)
     slower = NominalProtocol(T=1, rho1="1/3", rho2="1/3", kappa=2)
-    same_rates(members_of(graph), members_of(heavier, slower), 3)
-    perron = [members_of(graph, method="perron"), members_of(heavier, slower, method="perron")]
-    same_members(*perron, np.arange(graph.n_nodes), 3)
+    same_rates(functions_of(graph), functions_of(heavier, slower), 3)
+    perron = [functions_of(graph, method="perron"), functions_of(heavier, slower, method="perron")]
+    same_functions(*perron, np.arange(graph.n_nodes), 3)
 
 
 @pytest.mark.parametrize("name", SOME[1::2])
@@ -1458,9 +1461,9 @@ def test_a_gauge_changes_no_rate(name: str):
     v = graph.labels[0]
     flipped = [(s, t, -w if (s == v) != (t == v) else w) for s, t, w in exact_edges(graph)]
     other = SignedDigraph.from_edges(flipped, graph.labels)
-    same_rates(members_of(graph), members_of(other))
-    perron = [members_of(g, method="perron") for g in (graph, other)]
-    same_members(*perron, np.arange(graph.n_nodes))
+    same_rates(functions_of(graph), functions_of(other))
+    perron = [functions_of(g, method="perron") for g in (graph, other)]
+    same_functions(*perron, np.arange(graph.n_nodes))
 
 
 def exact_edges(graph: SignedDigraph) -> list[tuple[str, str, Fraction]]:
@@ -1472,8 +1475,8 @@ def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     parts = [of_size(one, 5), of_size(other, 5, seed=6)]
     edges = [(f"{k}.{s}", f"{k}.{t}", w) for k, g in enumerate(parts) for s, t, w in exact_edges(g)]
     labels = [f"{k}.{v}" for k, g in enumerate(parts) for v in g.labels]
-    union = members_of(SignedDigraph.from_edges(edges, labels))
-    rates = [members_of(g, method="paper").spectral_rate for g in parts]
+    union = functions_of(SignedDigraph.from_edges(edges, labels))
+    rates = [functions_of(g, method="paper").spectral_rate for g in parts]
     assert union.spectral_rate == pytest.approx(min(r for r in rates if r is not None), rel=1e-6)
     assert union.optimality_ratio is not None and 0.99 <= union.optimality_ratio <= 1
 
@@ -1483,9 +1486,9 @@ def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
     graph = of_size(name, seed=7)
     rates = {}
     for method in METHODS:
-        cert = members_of(graph, method=method)
+        cert = functions_of(graph, method=method)
         data = through_json(cert)
-        kinds = [member["class"] for member in data["lyapunov"]["members"]]
+        kinds = [function["class"] for function in data["lyapunov"]["functions"]]
         assert kinds[0] == "paper"
         beside = set(kinds[1:])
         if method == "best":
@@ -1512,19 +1515,19 @@ UNDIRECTED = [name for name, kwargs in CLASSES if kwargs.get("special") == "undi
 def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weights: str):
     """``L`` is symmetric but for a gauge: the identity reaches every eigenvalue."""
     for seed in range(3):
-        cert = members_of(of_size(name, 9, seed, weights), method="perron")
+        cert = functions_of(of_size(name, 9, seed, weights), method="perron")
         assert cert.optimality_ratio is not None and 1 - 1e-6 <= cert.optimality_ratio <= 1
-        assert cert.sharpening.members
+        assert cert.search.functions
 
 
 def test_an_instant_of_interest_is_served():
     """With ``at`` the bound there is no larger than without; only instants of [0, T) will do."""
     graph = of_size("2.2")
-    without, early = members_of(graph), members_of(graph, at="0.05")
+    without, early = functions_of(graph), functions_of(graph, at="0.05")
     assert through_json(without)["unverified"]["search"]["at"] is None
     assert through_json(early)["unverified"]["search"]["at"] == 0.05
     assert early.envelope.residual(0.95) <= without.envelope.residual(0.95) * (1 + 1e-9)
-    members_of(graph, at=0)
+    functions_of(graph, at=0)
 
 
 @pytest.mark.parametrize(
@@ -1578,7 +1581,7 @@ def test_a_number_is_written_exactly_or_enclosed(numerator: int, power: int):
         assert all(len(text) < 500 for text in written.values())
 
 
-def test_an_outcome_too_long_to_write_is_enclosed_and_proved():
+def test_an_final_state_too_long_to_write_is_enclosed_and_proved():
     """Weights of 250 digits: voices and pulls are balls, which hold the exact ones, and no distance is claimed.
 
     A ring of two camps leads another ring together with an agent that listens to nobody.
@@ -1595,25 +1598,27 @@ def test_an_outcome_too_long_to_write_is_enclosed_and_proved():
     edges += [(n + i, n + (i + 3) % n, weight()) for i in range(n)]
     cert = certify(SignedDigraph.from_edges(edges), PROTOCOL, range(2 * n + 1), simulation=False, method="perron")
     data = through_json(cert)
-    assert cert.verdict == data["verdict"] == "certified" and cert.outcome is not None
-    step = Recheck(data).steps["outcome", "graph"]
+    assert cert.verdict == data["verdict"] == "certified" and cert.final_state is not None
+    step = Recheck(data).steps["final-state", "graph"]
     assert set(step["witness"]) == {"u"} and list(step["witness"]["u"]) == data["graph"]["nodes"]
-    assert [step["kind"] for step in data["proof"]].count("distance") == 0
-    assert {member["distance"] for member in data["lyapunov"]["members"]} == {None}
+    assert [step["kind"] for step in data["proof"]].count("deviation") == 0
+    assert {function["deviation"] for function in data["lyapunov"]["functions"]} == {None}
 
     def enclosed(written: Any, exact: Fraction) -> None:
         assert set(written) == {"mid", "radius"}
         assert abs(parse_exact(written["mid"]) - exact) <= parse_exact(written["radius"]) <= Fraction(1, 10**57)
 
-    *final, alone = zip(data["outcome"]["final_state"].values(), cert.outcome.final_state, strict=True)
+    *final, alone = zip(data["final_state"].values(), cert.final_state.states, strict=True)
     assert alone == (str(2 * n), 2 * n)
     for written, exact in final:
         enclosed(written, Fraction(exact))
-    own, leader = (component["voices"] for component in data["outcome"]["influence"]["components"])
+    own, leader = (component["left_null_vector"] for component in data["influence"]["components"])
     assert leader == ["1"]
-    for written, exact in zip(own, cert.influence.voices[0], strict=True):
+    for written, exact in zip(own, cert.influence.left_null_vectors[0], strict=True):
         enclosed(written, Fraction(exact))
-    for said, row in zip(data["outcome"]["influence"]["followers"].values(), cert.influence.pulls, strict=True):
+    for said, row in zip(
+        data["influence"]["containment_weights"].values(), cert.influence.containment_weights, strict=True
+    ):
         for written, exact in zip(said, row, strict=True):
             enclosed(written, Fraction(exact))
 
@@ -1641,7 +1646,7 @@ def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int
     assert cert.upper_bound is not None and cert.rate is not None
     cert.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
-    assert saved.upper_bound == cert.upper_bound == number(cert.to_dict()["rates"]["limit"])
+    assert saved.upper_bound == cert.upper_bound == number(cert.to_dict()["rates"]["upper_bound"])
     (row,) = certify_many([graph], PROTOCOL)
     assert row["upper_bound"] == float_up(cert.upper_bound)
     assert row["optimality_ratio"] == saved.optimality_ratio == cert.optimality_ratio
@@ -1667,18 +1672,18 @@ def test_a_mean_that_is_not_that_of_a_strong_component_is_rejected():
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", 2)])
     strong = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
     data = through_json(certify(graph, strong, simulation=False, method="paper"))
-    place = [step["kind"] for step in data["proof"]].index("rate-limit")
+    place = [step["kind"] for step in data["proof"]].index("rate-upper-bound")
     told = {
         "kind": "rate-mean",
         "of": "rates",
-        **dict(zip(("statement", "lemma"), OBLIGATIONS["rate-mean"], strict=True)),
+        **dict(zip(("proves", "lemma"), OBLIGATIONS["rate-mean"], strict=True)),
     }
 
     def with_mean(limit: str, node: Any) -> CheckReport:
         copy = json.loads(json.dumps(data))
-        copy["proof"][place] = {**told, "numbers": {"limit": limit}, "witness": {"node": node}}
-        copy["rates"]["limit"] = limit
-        copy["effort"]["threshold"]["upper"] = str(Fraction(limit) * number(copy["protocol"]["rho2"]) / 2)
+        copy["proof"][place] = {**told, "numbers": {"upper_bound": limit}, "witness": {"node": node}}
+        copy["rates"]["upper_bound"] = limit
+        copy["input"]["threshold"]["upper"] = str(Fraction(limit) * number(copy["protocol"]["rho2"]) / 2)
         copy["digest"] = digest(copy)
         return check(copy)
 

@@ -18,9 +18,9 @@ from scipy.linalg import expm
 from scipy.sparse.linalg import eigs
 
 from lmi.errors import NoCertificate
-from lmi.iterative import SparseHMatrix
-from ptcc_certify.bounds import final_state as outcomes
-from ptcc_certify.bounds.final_state import outcome
+from lmi.sparse_h_matrix import SparseHMatrix
+from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -30,7 +30,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
-from ptcc_certify.lyapunov.dominance import dominant_members
+from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.interrupt import interruptible
@@ -44,7 +44,7 @@ CLASSES = dict(all_classes())
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Treat every graph as a large one."""
     monkeypatch.setattr(procedure, "EXACT_NODES", 0)
-    monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
+    monkeypatch.setattr(final_states, "EXACT_NODES", 0)
 
 
 def made(name: str, seed: int = 3) -> tuple[Certificate, Json]:
@@ -68,14 +68,14 @@ def test_every_class_is_certified_as_a_large_graph(name: str, kwargs: dict):
         spectral = laplacian_spectrum(cert.structure).spectral_rate
         assert spectral is not None and 0 < float(cert.rate) <= spectral * (1 + 1e-9)
         assert cert.limit is None or cert.rate <= cert.limit.value
-        assert {step["kind"] for step in data["proof"]} >= {"dominance", "outcome"}
-    exact = outcome(cert.structure, cert.start or (), exact=True)
-    for value, said in zip(exact.final_state, data["outcome"]["final_state"].values(), strict=True):
+        assert {step["kind"] for step in data["proof"]} >= {"dominance", "final-state"}
+    exact = final_state(cert.structure, cert.start or (), exact=True)
+    for value, said in zip(exact.states, data["final_state"].values(), strict=True):
         if isinstance(said, dict):
             assert abs(Fraction(value) - Fraction(said["mid"])) <= Fraction(said["radius"]) < Fraction(1, 10**8)
         else:
             assert Fraction(value) == Fraction(said)
-    assert data["outcome"]["degenerate"] == list(exact.degenerate)
+    assert data["influence"]["degenerate"] == list(exact.degenerate)
 
 
 def rejected(data: Json, where: str) -> None:
@@ -88,12 +88,12 @@ def rejected(data: Json, where: str) -> None:
 @pytest.mark.parametrize("name", ["2.1 K>=2", "2.2", "3.1 mixed", "3.2", "3.1 all single"])
 def test_false_rates_and_narrow_intervals_are_rejected(name: str):
     _, data = made(name, 5)
-    for k, member in enumerate(data["lyapunov"]["members"]):
-        of = f"lyapunov.members[{k}]"
+    for k, function in enumerate(data["lyapunov"]["functions"]):
+        of = f"lyapunov.functions[{k}]"
         step = next(i for i, s in enumerate(data["proof"]) if s["of"] == of and s["kind"] == "dominance")
-        higher = str(Fraction(member["rate"]) * (1 + Fraction(1, 10**6)))
+        higher = str(Fraction(function["rate"]) * (1 + Fraction(1, 10**6)))
         forged = changed(
-            changed(data, ("lyapunov", "members", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
+            changed(data, ("lyapunov", "functions", k, "rate"), higher), ("proof", step, "numbers"), {"b": higher}
         )
         rejected(forged, f"dominance of {of}")
         vector = data["proof"][step]["witness"]["vector"]
@@ -103,16 +103,16 @@ def test_false_rates_and_narrow_intervals_are_rejected(name: str):
             more = str(Fraction(g) * (1 + Fraction(1, 10**6)))
             rejected(changed(data, ("proof", step, "witness", "groups", i), more), f"dominance of {of}")
     for label in data["structure"]["followers"]:
-        ball = data["outcome"]["final_state"][label]
+        ball = data["final_state"][label]
         if isinstance(ball, str):  # nobody is followed but groups that end at 0
-            rejected(changed(data, ("outcome", "final_state", label), "1e-30"), "outcome of graph")
+            rejected(changed(data, ("final_state", label), "1e-30"), "final-state of graph")
             continue
         for new in ({**ball, "radius": "1e-300"}, {**ball, "mid": str(float(ball["mid"]) + 1e-6)}):
-            rejected(changed(data, ("outcome", "final_state", label), new), "outcome of graph")
+            rejected(changed(data, ("final_state", label), new), "final-state of graph")
     leader = data["structure"]["leaders"][0]
-    rejected(changed(data, ("outcome", "final_state", leader), "7/3"), "outcome of graph")
-    at = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "outcome")
-    rejected(changed(data, ("proof", at, "witness"), None), "outcome of graph")
+    rejected(changed(data, ("final_state", leader), "7/3"), "final-state of graph")
+    at = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "final-state")
+    rejected(changed(data, ("proof", at, "witness"), None), "final-state of graph")
 
 
 def random_sparse(n: int, seed: int) -> SignedDigraph:
@@ -152,7 +152,7 @@ def test_a_sparse_graph_of_a_thousand_nodes(n: int, slides: bool, tmp_path: Path
     comparison = SparseHMatrix(block).smallest()
     assert cert.rate is not None
     assert float(cert.rate) <= 2 * least * (1 + 1e-9)
-    slowest_group = min(group.rate for group in dominant_members(cert.structure)[0].dominance.groups)
+    slowest_group = min(group.rate for group in dominant_functions(cert.structure)[0].dominance.groups)
     assert float(cert.rate) >= 0.99 * min(2 * comparison, float(slowest_group))
 
 
@@ -179,7 +179,7 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     for stdlib in (True, False):
         report = check(cert.to_dict(), stdlib=stdlib)
         assert report.accepted, (report.rejected, report.reason)
-    (group,) = cert.sharpening.members[0].dominance.groups  # type: ignore[union-attr]
+    (group,) = cert.search.functions[0].dominance.groups  # type: ignore[union-attr]
     leaders = graph.subgraph(np.arange(150))
     half = np.sqrt(left_vector(leaders))
     S = half[:, None] * leaders.dense_laplacian() / half
@@ -189,9 +189,9 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     assert float(cert.rate) <= cert.spectral_rate * (1 + 1e-9)
     # The end from the long run of the state itself.
     end = expm(-40.0 / float(cert.rate) * graph.dense_laplacian()) @ start
-    assert cert.outcome is not None and cert.outcome.radius is not None
-    assert (np.abs(end - cert.outcome.values) <= np.array(cert.outcome.radius, float) + 1e-6).all()
-    assert max(cert.outcome.radius) < 1e-8
+    assert cert.final_state is not None and cert.final_state.radius is not None
+    assert (np.abs(end - cert.final_state.values) <= np.array(cert.final_state.radius, float) + 1e-6).all()
+    assert max(cert.final_state.radius) < 1e-8
 
 
 @pytest.mark.parametrize("balanced", [True, False])
@@ -205,8 +205,8 @@ def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool)
     perron, best, both = (float(found[m].rate or 0) for m in ("perron", "lmi", "best"))
     assert perron < 0.95 * best and both == pytest.approx(best, rel=1e-6)
     assert best <= (found["lmi"].spectral_rate or 0) * (1 + 1e-9)
-    assert {m.kind for m in found["lmi"].sharpening.members} == {"lmi"}
-    assert set(found["best"].sharpening.tried) == {"perron", "lmi"}
+    assert {m.kind for m in found["lmi"].search.functions} == {"lmi"}
+    assert set(found["best"].search.tried) == {"perron", "lmi"}
 
 
 @pytest.mark.parametrize("balanced", [True, False])
@@ -225,10 +225,14 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
     rejected(changed(data, (*where, "factor"), None), "dominance of")
     rejected(changed(data, where, said["rate"] + "0"), "dominance of")
     if balanced:
-        voice = data["outcome"]["influence"]["components"][0]["voices"][5]
-        where = ("outcome", "influence", "components", 0, "voices", 5)
-        for new in ({**voice, "radius": "1e-300"}, {**voice, "mid": str(float(voice["mid"]) + 1e-6)}, "0.01"):
-            rejected(changed(data, where, new), "outcome of graph")
+        null_vector = data["influence"]["components"][0]["left_null_vector"][5]
+        where = ("influence", "components", 0, "left_null_vector", 5)
+        for new in (
+            {**null_vector, "radius": "1e-300"},
+            {**null_vector, "mid": str(float(null_vector["mid"]) + 1e-6)},
+            "0.01",
+        ):
+            rejected(changed(data, where, new), "final-state of graph")
 
 
 def test_a_leader_group_beyond_the_limit_is_undecided_with_a_note(monkeypatch: pytest.MonkeyPatch):
@@ -252,12 +256,12 @@ def test_no_dominance_where_the_comparison_matrix_is_singular():
         SparseHMatrix([[0.0, -1.0], [-1.0, 1.0]])
 
 
-def test_frontier_of_rate_and_prefactor_is_monotone():
-    found = dominant_members(analyse(random_sparse(600, 3)))
+def test_frontier_of_rate_and_overshoot_is_monotone():
+    found = dominant_functions(analyse(random_sparse(600, 3)))
     rates = [m.rate for m in found]
-    prefactors = [m.highest / m.lowest for m in found]
+    overshoots = [m.highest / m.lowest for m in found]
     assert rates == sorted(rates, reverse=True)
-    assert prefactors == sorted(prefactors, reverse=True)
+    assert overshoots == sorted(overshoots, reverse=True)
 
 
 @pytest.mark.parametrize(
@@ -281,7 +285,7 @@ def test_the_screen_tells_how_near_the_final_state_is_known():
     graph = random_sparse(150, 4)
     cert = certify(graph, NOMINAL, [1] * 150, simulation=False)
     lines = certificate_lines(cert, "g")
-    (said,) = [line for line in lines if line.startswith("ends at")]
+    (said,) = [line for line in lines if line.startswith("x(T)")]
     assert said.endswith("proved; here to 5 digits)") and "to within" in said
     assert lines[-1].startswith("verdict    certified")
 
@@ -351,8 +355,8 @@ def test_a_leader_group_over_many_decades():
 
 def test_long_chains_have_a_bound_that_says_something():
     """The fastest member has an astronomical prefactor; the slowest one bounds the first instants."""
-    found = certify(chain([1] * 141), NOMINAL, simulation=False).sharpening.members
-    assert min(m.prefactor for m in found) < 10**5
+    found = certify(chain([1] * 141), NOMINAL, simulation=False).search.functions
+    assert min(m.overshoot for m in found) < 10**5
 
 
 # ---------------------------------------------------------------------- slow mixing, degenerate starts
@@ -387,7 +391,7 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
     assert cert.rate is not None and 0.7 * best <= float(cert.rate) <= best * (1 + 1e-6)
     camps = cert.structure.closed_components[0].gauge or ()
     mean = sum((Fraction(g * k) for k, g in enumerate(camps)), Fraction(0)) / n
-    assert cert.outcome is not None and list(cert.outcome.final_state) == [g * mean for g in camps]
+    assert cert.final_state is not None and list(cert.final_state.states) == [g * mean for g in camps]
 
 
 @pytest.mark.parametrize(
@@ -396,12 +400,14 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
 def test_starts_that_meet_at_zero_and_tiny_ones(start: list[Any]):
     cert = certify(undirected([(i, (i + 1) % 130, 1) for i in range(130)]), NOMINAL, start, simulation=False)
     assert cert.verdict == "certified", cert.notes
-    assert cert.outcome is not None and cert.outcome.degenerate == (() if start[-1] == "1e-320" else (1,))
+    assert cert.final_state is not None and cert.final_state.degenerate == (() if start[-1] == "1e-320" else (1,))
 
 
 def test_a_directed_group_that_starts_at_zero_meets_there():
     directed = certify(strong_graph(150, True, 2), NOMINAL, [0] * 150, simulation=False)
-    assert directed.verdict == "certified" and directed.outcome is not None and directed.outcome.degenerate == (1,)
+    assert (
+        directed.verdict == "certified" and directed.final_state is not None and directed.final_state.degenerate == (1,)
+    )
 
 
 def test_what_is_printed_lies_in_the_intervals_of_the_certificate():
@@ -409,8 +415,8 @@ def test_what_is_printed_lies_in_the_intervals_of_the_certificate():
     start = [Fraction(1, 10), Fraction(2, 10), Fraction(-3, 10) + Fraction(1, 10**17), *[1] * 130]
     cert = certify(SignedDigraph.from_edges(edges), NOMINAL, start, simulation=False)
     data = cert.to_dict()
-    assert data["outcome"]["degenerate"] == [] and cert.outcome is not None and cert.outcome.degenerate == ()
-    for seen, said in zip(cert.outcome.final_state, data["outcome"]["final_state"].values(), strict=True):
+    assert data["influence"]["degenerate"] == [] and cert.final_state is not None and cert.final_state.degenerate == ()
+    for seen, said in zip(cert.final_state.states, data["final_state"].values(), strict=True):
         middle, radius = (said["mid"], said["radius"]) if isinstance(said, dict) else (said, "0")
         assert abs(Fraction(seen) - Fraction(middle)) <= Fraction(radius)
     assert not any("degenerate" in line for line in certificate_lines(cert, "g"))
@@ -426,7 +432,7 @@ def test_a_forged_tree_is_rejected():
     loop = [(i + 1) % 300 for i in range(300)]
     for new in (None, tree[:-1], two, loop, [300, *tree[1:]], [*loop[:-1], -2], [0, *tree[1:]]):
         rejected(changed(data, where, new), "dominance of")
-    weights = ("lyapunov", "members", 0, "blocks", 0, "diagonal", 0)
+    weights = ("lyapunov", "functions", 0, "blocks", 0, "diagonal", 0)
     rejected(changed(data, weights, "0.9"), "dominance of")
 
 
@@ -447,7 +453,7 @@ def test_long_undirected_groups_have_an_exact_left_vector(closed: bool):
     assert cert.verdict == "certified" and cert.rate is not None, cert.notes
     best = 4 / 3 * (1 - np.cos((2 if closed else 1) * np.pi / n))
     assert 0.7 * best <= float(cert.rate) <= best * (1 + 1e-6)
-    assert cert.outcome is not None and list(cert.outcome.final_state) == mean_of_start(cert)
+    assert cert.final_state is not None and list(cert.final_state.states) == mean_of_start(cert)
 
 
 def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
@@ -472,8 +478,8 @@ def test_weights_near_the_largest_float_are_undecided(weight: float, method: str
 def test_ends_below_the_floats_are_kept():
     graph = SignedDigraph.from_edges([(i, (i + 1) % 130, Fraction(1, 1 + i % 3)) for i in range(130)])
     cert = certify(graph, NOMINAL, ["1e-400"] * 130, simulation=False)
-    assert cert.outcome is not None and cert.outcome.degenerate == ()
-    for value in (*cert.outcome.final_state, *cert.outcome.consensus_values):
+    assert cert.final_state is not None and cert.final_state.degenerate == ()
+    for value in (*cert.final_state.states, *cert.final_state.consensus_values):
         assert abs(Fraction(value) * 10**400 - 1) < 1e-9
 
 

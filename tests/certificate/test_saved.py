@@ -66,13 +66,13 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
     assert structure_document(saved.structure) == structure_document(made.structure)
     assert (saved.protocol, saved.start, saved.sigma0) == (made.protocol, made.start, made.sigma0)
     assert (saved.reaching, saved.verdict, saved.claims) == (made.reaching, made.verdict, made.claims)
-    assert (saved.rate, saved.prefactor, saved.paper_rate) == (made.rate, made.prefactor, made.proof.rate)
+    assert (saved.rate, saved.overshoot, saved.paper_rate) == (made.rate, made.overshoot, made.proof.rate)
     assert saved.upper_bound == made.upper_bound and saved.optimality_ratio == made.optimality_ratio
     assert type(saved.envelope) is type(made.envelope)
-    assert len(saved.envelope.members) == len(made.envelope.members)
-    for own, other in zip(saved.envelope.members, made.envelope.members, strict=True):
+    assert len(saved.envelope.functions) == len(made.envelope.functions)
+    for own, other in zip(saved.envelope.functions, made.envelope.functions, strict=True):
         assert (own.kind, own.coordinates, own.weights) == (other.kind, other.coordinates, other.weights)
-        assert (own.rate, own.prefactor, own.lowest) == (other.rate, other.prefactor, other.lowest)
+        assert (own.rate, own.overshoot, own.lowest) == (other.rate, other.overshoot, other.lowest)
         assert own.deviation == other.deviation and own.name == other.name
         assert own.nodes == other.nodes and own.gauge == other.gauge and np.array_equal(own.array, other.array)
     labels = made.graph.labels
@@ -91,11 +91,11 @@ def test_a_certificate_comes_back_as_it_was(name: str, tmp_path: Path):
     agree(saved, made)
     assert saved.report.accepted and saved.document == json.loads((tmp_path / "c.json").read_text("utf-8"))
     assert np.array_equal(saved.norm_bound(REMAINING), made.norm_bound(REMAINING))
-    assert np.array_equal(saved.outcome_distance(REMAINING), made.outcome_distance(REMAINING))
+    assert np.array_equal(saved.deviation_bound(REMAINING), made.deviation_bound(REMAINING))
     assert [saved.envelope.residual(q) for q in REMAINING] == [made.envelope.residual(q) for q in REMAINING]
-    if made.outcome is not None and made.outcome.exact:
-        assert saved.final_state == tuple((x, 0) for x in made.outcome.final_state)
-        assert saved.degenerate == made.outcome.degenerate
+    if made.final_state is not None and made.final_state.exact:
+        assert saved.final_state.intervals == tuple((x, 0) for x in made.final_state.states)
+        assert saved.degenerate == made.final_state.degenerate
 
 
 @pytest.mark.parametrize("name", ["1.1", "2.1 K>=2 reducible followers", "3.2 chain"])
@@ -105,14 +105,14 @@ def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Pa
     agree(saved, made)
     assert not saved.direct
     assert np.array_equal(saved.norm_bound([0.5, 0.1, 1e-6]), made.norm_bound([0.5, 0.1, 1e-6]))
-    assert np.array_equal(saved.outcome_distance([0.5, 1e-6]), made.outcome_distance([0.5, 1e-6]))
+    assert np.array_equal(saved.deviation_bound([0.5, 1e-6]), made.deviation_bound([0.5, 1e-6]))
 
 
 @pytest.mark.parametrize(
     "options",
     [
-        {"starts": 2},
-        {"starts": ptcc.ellipsoid([0] * 6, [[1, 0, 0, 0, 0, 0], [0, 2, 0, 0, 0, 0]])},
+        {"initial_set": 2},
+        {"initial_set": ptcc.ellipsoid([0] * 6, [[1, 0, 0, 0, 0, 0], [0, 2, 0, 0, 0, 0]])},
         {"delta": "1/2"},
         {"limits": [ptcc.Actuator(gain_cap=50), ptcc.Actuator(stop_before="0.01")], "noise": "1/100"},
         {"limits": [ptcc.Actuator(sample_period="1/1000", gain_cap=20)]},
@@ -134,8 +134,8 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(tmp_path: Path):
         p, L = saved.protocol, saved.graph.exact_laplacian()
         n, start = len(L), saved.start or ()
         E = [-sum(L[i][j] * start[j] for j in range(n)) for i in range(n)]
-        for k, said in enumerate(saved.document["lyapunov"]["members"]):
-            alone = replace(saved.envelope, members=saved.envelope.members[k : k + 1])
+        for k, said in enumerate(saved.document["lyapunov"]["functions"]):
+            alone = replace(saved.envelope, functions=saved.envelope.functions[k : k + 1])
             rate, where = Fraction(said["rate"]), []
             V, lowest = Fraction(0), None
             for block in said["blocks"]:
@@ -148,7 +148,7 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(tmp_path: Path):
                         for j, x in enumerate(row)
                     )
                     steps = {(s["kind"], s["of"]): s for s in saved.document["proof"]}
-                    lowest = Fraction(steps["prefactor", f"lyapunov.members[{k}]"]["numbers"]["lowest"])
+                    lowest = Fraction(steps["overshoot", f"lyapunov.functions[{k}]"]["numbers"]["lowest"])
                     continue
                 rho = Fraction(said["rho"]) if block["times_rho"] else 1
                 weights = [Fraction(x) * rho for x in block["diagonal"]]
@@ -180,8 +180,8 @@ def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     saved = written(made, tmp_path)
     assert list(tmp_path.glob("*-source.npy")) and list(tmp_path.glob("*-diagonal.npy"))
     agree(saved, made)
-    assert made.outcome is not None and made.outcome.radius is not None and saved.final_state is not None
-    for (middle, radius), value in zip(saved.final_state, made.outcome.values.tolist(), strict=True):
+    assert made.final_state is not None and made.final_state.radius is not None and saved.final_state is not None
+    for (middle, radius), value in zip(saved.final_state.intervals, made.final_state.values.tolist(), strict=True):
         assert abs(middle - Fraction(value)) <= radius + Fraction(1, 10**12)
     assert np.array_equal(saved.norm_bound(REMAINING), made.norm_bound(REMAINING))
 
@@ -203,8 +203,8 @@ def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Pa
     assert np.array_equal(saved.trajectory.states, made.trajectory.states)
 
 
-@pytest.mark.parametrize("said", [None, "adversary", "telegraph", "none", "no such", "9*sin(t)", "__import__('os')"])
-def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_adversary(said: str | None, tmp_path: Path):
+@pytest.mark.parametrize("said", [None, "worst-case", "telegraph", "none", "no such", "9*sin(t)", "__import__('os')"])
+def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst_case(said: str | None, tmp_path: Path):
     pair = ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     ptcc.certify(pair, SLIDING, [3, 5], sigma0=[1, 0], simulation=False).save(tmp_path / "c.json")
     data = json.loads((tmp_path / "c.json").read_text())
@@ -213,14 +213,14 @@ def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_adver
     (tmp_path / "c.json").write_text(json.dumps(data))
     saved = read_certificate(tmp_path / "c.json").with_simulation()
     assert saved.trajectory is not None and saved.comparison is not None and not saved.comparison.violated
-    assert saved.trajectory.source == ("none" if said == "none" else "adversary: delta sign(sigma_k)")
+    assert saved.trajectory.source == ("none" if said == "none" else "worst-case disturbance: delta sign(sigma_k)")
 
 
 def test_a_false_certificate_is_not_read(tmp_path: Path):
     made = certified("1.2 opposite mutual")
     made.save(tmp_path / "c.json")
     data = json.loads((tmp_path / "c.json").read_text())
-    data["rates"]["certified"] = str(2 * Fraction(data["rates"]["certified"]))
+    data["rates"]["proved"] = str(2 * Fraction(data["rates"]["proved"]))
     data["digest"] = digest(data)
     (tmp_path / "c.json").write_text(json.dumps(data))
     with pytest.raises(RejectedCertificate, match=r"c\.json: the independent check rejects rates") as caught:
@@ -238,18 +238,18 @@ def test_what_is_no_certificate_is_refused_in_one_line(content: str, tmp_path: P
 
 
 def test_an_undecided_certificate_says_so(tmp_path: Path):
-    made = replace_outcome(certified("1.1"), tmp_path)
+    made = replace_final_state(certified("1.1"), tmp_path)
     assert made.verdict == "undecided" and made.final_state is None and made.rate is not None
 
 
-def replace_outcome(made: ptcc.Certificate, folder: Path) -> Certificate:
+def replace_final_state(made: ptcc.Certificate, folder: Path) -> Certificate:
     """Take the outcome out of a certificate: what is left proves the decay, and decides nothing."""
     made.save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())
-    data |= {"outcome": None, "verdict": "undecided"}
-    data["proof"] = [s for s in data["proof"] if s["kind"] not in ("outcome", "distance")]
-    for member in data["lyapunov"]["members"]:
-        member["distance"] = None
+    data |= {"influence": None, "final_state": None, "verdict": "undecided"}
+    data["proof"] = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
+    for function in data["lyapunov"]["functions"]:
+        function["deviation"] = None
     data["digest"] = digest(data)
     (folder / "c.json").write_text(json.dumps(data))
     return read_certificate(folder / "c.json")
@@ -259,7 +259,7 @@ def test_without_a_start_there_is_no_bound_from_it(tmp_path: Path):
     made = ptcc.certify(load_graph("fig1a"), NOMINAL)
     saved = written(made, tmp_path)
     agree(saved, made)
-    for ask in (lambda: saved.norm_bound([0.5]), lambda: saved.outcome_distance([0.5]), saved.simulate):
-        with pytest.raises(ParameterError, match="no start"):
+    for ask in (lambda: saved.norm_bound([0.5]), lambda: saved.deviation_bound([0.5]), saved.simulate):
+        with pytest.raises(ParameterError, match="no initial state"):
             ask()
     assert math.isfinite(saved.envelope.residual(0.5))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from generators import all_classes, class_cases, random_graph
 
-from ptcc_certify.bounds.final_state import outcome
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -32,7 +32,7 @@ from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 RUNS = [(number, name) for number in "456" for _, name, _ in select(number)]
-KINDS = ("expression", "adversary", "telegraph", "constant", "high frequency", "state-dependent", "sampled")
+KINDS = ("expression", "worst-case", "telegraph", "constant", "high frequency", "state-dependent", "sampled")
 
 
 @cache
@@ -57,7 +57,7 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     reported = next(behaviour for _, graph, behaviour in select(number) if graph == name)
     protocol = cert.protocol
     assert isinstance(protocol, SlidingModeProtocol)
-    assert cert.claim is not None and cert.comparison is not None and cert.outcome is not None
+    assert cert.claim is not None and cert.comparison is not None and cert.final_state is not None
     assert cert.reaching is not None and cert.start is not None and cert.sigma0 is not None
     assert cert.claim.behaviour == reported
     assert cert.claim.theorem == cert.theorem.number == f"{number}.{1 if reported != 'stability' else 2}"
@@ -72,13 +72,13 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     assert not cert.comparison.violated and cert.comparison.reaching_kept
     # The end state is Q (X(0) - sigma(0)), not Q X(0), up to what the clock leaves at the last sample before T.
     start = [x - s for x, s in zip(cert.start, cert.sigma0, strict=True)]
-    assert cert.outcome.final_state == outcome(cert.structure, start).final_state
+    assert cert.final_state.states == final_state(cert.structure, start).states
     spectrum = laplacian_spectrum(cert.structure).spectral_rate
     assert spectrum is not None
     last = np.flatnonzero(run.remaining > 0)[-1]
     left = math.exp(-spectrum / 2 * run.clock[last])
-    assert np.abs(run.states[:, last] - cert.outcome.values).max() <= 100 * left + 1e-8
-    assert np.abs(run.final_state - cert.outcome.values).max() <= 1e-8
+    assert np.abs(run.states[:, last] - cert.final_state.values).max() <= 100 * left + 1e-8
+    assert np.abs(run.final_state - cert.final_state.values).max() <= 1e-8
 
 
 def test_the_corollaries_are_those_of_the_sliding_mode():
@@ -103,15 +103,15 @@ def test_undirected_agents_meet_at_the_signed_average_of_start_minus_sigma():
     graph = SignedDigraph.from_edges([(1, 2, -2), (2, 1, -2), (2, 3, 1), (3, 2, 1)])
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     cert = certify(graph, protocol, [6, 1, 2], sigma0=[3, 0, 1])
-    assert cert.outcome is not None
-    assert cert.outcome.final_state == (Fraction(1, 3), Fraction(-1, 3), Fraction(-1, 3))
+    assert cert.final_state is not None
+    assert cert.final_state.states == (Fraction(1, 3), Fraction(-1, 3), Fraction(-1, 3))
 
 
 def test_a_start_that_meets_at_zero_because_of_sigma_is_degenerate():
     graph = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     cert = certify(graph, protocol, [3, 1], sigma0=[2, 0])
-    assert cert.outcome is not None and cert.outcome.degenerate == (1,)
+    assert cert.final_state is not None and cert.final_state.degenerate == (1,)
 
 
 # ---------------------------------------------------------------------- what the file says
@@ -127,11 +127,11 @@ def test_every_key_about_the_sliding_mode_is_exact_and_readable():
     )
     assert data["protocol"]["disturbance"] == "sin(2*k*t + pi/3)"
     assert data["claim"]["theorem"] == data["paper"]["theorem"] == "4.1"
-    assert data["sigma0"]["1"] == "-9"
+    assert data["sliding_variable"]["1"] == "-9"
     steps = [step for step in data["proof"] if not step["kind"].startswith("input")]
     places = [(step["kind"], step["of"], step["numbers"], step["witness"]) for step in steps]
-    assert [kind for kind, _, _, _ in places[:4]] == ["structure", "claim", "outcome", "deviation-decrease"]
-    assert places[-3][:2] == ("rate-limit", "rates")
+    assert [kind for kind, _, _, _ in places[:4]] == ["structure", "claim", "final-state", "deviation-decrease"]
+    assert places[-3][:2] == ("rate-upper-bound", "rates")
     assert places[-2:] == [("sliding-bound", "protocol", {}, None), ("reaching-time", "reaching_time", {}, None)]
     assert data["reaching_time"]["bound"] == SLIDING_BOUND and data["reaching_time"]["clock"] == SLIDING_CLOCK
     assert cert.reaching is not None
@@ -183,8 +183,8 @@ def test_the_check_sees_a_reaching_time_that_is_too_early_and_gains_that_prove_n
     for label, z in data["reaching_time"]["z"].items():
         early = str(Fraction(z) * Fraction(999, 1000))
         assert spoilt(data, "reaching_time", "z", label, to=early) == "reaching-time of reaching_time"
-        farther = str(Fraction(data["sigma0"][label]) * Fraction(1001, 1000))
-        moved = spoilt(data, "sigma0", label, to=farther)
+        farther = str(Fraction(data["sliding_variable"][label]) * Fraction(1001, 1000))
+        moved = spoilt(data, "sliding_variable", label, to=farther)
         assert moved is not None  # the outcome is that of another sigma(0), and the time too
         assert spoilt(data, "reaching_time", "z", label, to=str(-Fraction(z))) == "reaching-time of reaching_time"
     assert spoilt(data, "protocol", "mu1", to=data["protocol"]["delta"]) is not None
@@ -210,9 +210,9 @@ def test_without_a_start_the_reaching_times_are_proved_all_the_same():
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     cert = certify(SignedDigraph.from_edges([("a", "b", 1)]), protocol, sigma0={"b": 2, "a": 0})
     assert cert.reaching is not None and [r.z is not None and r.z > 0 for r in cert.reaching] == [False, True]
-    assert cert.outcome is None and cert.trajectory is None
+    assert cert.final_state is None and cert.trajectory is None
     assert cert.verdict == "certified" and "reaching-time" in [o.kind for o in cert.obligations]
-    assert json.loads(cert.to_json())["sigma0"] == {"a": "0", "b": "2"}
+    assert json.loads(cert.to_json())["sliding_variable"] == {"a": "0", "b": "2"}
 
 
 def test_without_sigma_the_certificate_is_the_nominal_one():
@@ -220,8 +220,8 @@ def test_without_sigma_the_certificate_is_the_nominal_one():
     graph = load_graph("fig3a")
     slid, plain = certify(graph, protocol, [1, 2, 3, 4, 5, 6]), certify(graph, protocol.nominal, [1, 2, 3, 4, 5, 6])
     assert slid.rate == plain.rate
-    assert slid.outcome is not None and plain.outcome is not None
-    assert slid.outcome.final_state == plain.outcome.final_state
+    assert slid.final_state is not None and plain.final_state is not None
+    assert slid.final_state.states == plain.final_state.states
     assert slid.envelope.residual(0.01) == plain.envelope.residual(0.01)
     assert slid.verdict == plain.verdict == "certified"
     added = [o for o in slid.obligations if o.kind not in ("sliding-bound", "input-sliding", "input-peak")]
@@ -230,8 +230,8 @@ def test_without_sigma_the_certificate_is_the_nominal_one():
     assert slid.effort.energy == plain.effort.energy and slid.effort.path_length == plain.effort.path_length
     assert slid.effort.peak is not None and plain.effort.peak is not None
     assert slid.effort.peak.how == plain.effort.peak.how  # mu1 is added to each
-    assert json.loads(slid.to_json())["sigma0"] == dict.fromkeys(graph.labels, "0")
-    assert json.loads(plain.to_json())["sigma0"] is None
+    assert json.loads(slid.to_json())["sliding_variable"] == dict.fromkeys(graph.labels, "0")
+    assert json.loads(plain.to_json())["sliding_variable"] is None
 
 
 def test_what_belongs_to_the_sliding_mode_is_refused_elsewhere():
@@ -265,8 +265,8 @@ def test_the_bound_of_the_state_holds_along_the_run_and_falls_after_T_r(number: 
     x0 = np.array([float(x) for x in cert.start])
     before = run.remaining > 1e-7
     bound = cert.envelope.state_bound(run.remaining[before], x0)
-    member = cert.envelope.members[0]
-    z = member.coordinates_of(run.states[:, before], cert.graph.laplacian())
+    function = cert.envelope.functions[0]
+    z = function.coordinates_of(run.states[:, before], cert.graph.laplacian())
     assert (np.linalg.norm(z, axis=0) <= bound * (1 + 1e-9) + 1e-6).all()
     after = run.remaining[before] < float(run.protocol.T_s / run.protocol.T) * (1 - 1e-9)
     assert (np.diff(bound[after]) < 0).all()
@@ -280,7 +280,7 @@ def test_a_rate_that_is_too_high_is_seen_as_violated():
     protocol = SlidingModeProtocol("0.1", 1, 1, 1, 2, 200, 1, 1, 0)
     cert = certify(graph, protocol, [3, 1], sigma0=["0.01", 0])
     assert cert.comparison is not None and not cert.comparison.violated and cert.trajectory is not None
-    wrong = replace(cert.envelope, members=(replace(cert.envelope.members[0], rate=Fraction(6)),))
+    wrong = replace(cert.envelope, functions=(replace(cert.envelope.functions[0], rate=Fraction(6)),))
     assert wrong.compare(cert.trajectory).violated
 
 
@@ -356,7 +356,7 @@ def judged(name: str, kwargs: dict, kind: str, power: Fraction, seed: int) -> Ce
 
 
 def check(cert: Certificate, power: Fraction) -> None:
-    assert cert.comparison is not None and cert.outcome is not None and cert.reaching is not None
+    assert cert.comparison is not None and cert.final_state is not None and cert.reaching is not None
     assert cert.verdict == "certified", cert.notes
     assert not cert.comparison.violated, cert
     assert cert.comparison.reaching_kept
@@ -421,7 +421,7 @@ def path_protocol(**other: Any) -> SlidingModeProtocol:
 
 @pytest.mark.parametrize("mu1", ["1.001", "1.1", 2])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_function_that_is_the_adversary_is_not_taken_for_a_violation(mu1: Any, seed: int):
+def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any, seed: int):
     """It attains every certified reaching time; the integrator's last digits must not break one."""
     rng = np.random.default_rng(seed)
     sigma0 = rng.uniform(-1, 1, 3) * 10.0 ** rng.uniform(-6, 1, 3)
@@ -437,7 +437,7 @@ def test_two_agents_that_arrive_together_are_found_under_a_function_too():
     x0, sigma0 = [5, 2, -4], [0.006, 0.006, 0.01]
     run, own = (
         simulate(PATH, path_protocol(), x0, sigma0=sigma0, disturbance=d)
-        for d in (lambda t, x, sigma: np.sign(sigma), "adversary")
+        for d in (lambda t, x, sigma: np.sign(sigma), "worst-case")
     )
     assert isinstance(run, SlidingTrajectory) and isinstance(own, SlidingTrajectory)
     np.testing.assert_allclose(run.reaching_z, own.reaching_z, rtol=1e-8)

@@ -17,12 +17,12 @@ import pytest
 from bad_inputs import ptcc
 
 import lmi
-from lmi.apart import apart
-from lmi.deadline import checkpoint, seconds_left, share_of_time, time_limit
+from lmi.child_process import apart
+from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify import NominalProtocol, ParameterError, SignedDigraph, certify, check, simulate
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.examples import load_graph
-from ptcc_certify.lyapunov import search as sharpen
+from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import Candidate
 
@@ -86,7 +86,7 @@ def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
 
 
 def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch):
-    search = sharpen._lmi_candidates
+    search = search_functions._lmi_candidates
 
     def without_end(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
         yield next(search(system, thorough))
@@ -94,10 +94,10 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
             time.sleep(0.01)
             checkpoint()
 
-    monkeypatch.setattr(sharpen, "_lmi_candidates", without_end)
+    monkeypatch.setattr(search_functions, "_lmi_candidates", without_end)
     cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
     assert cert.cut_off == ("class lmi",)
-    assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.sharpening.tried)
+    assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.search.tried)
     assert check(cert.to_dict()).accepted
 
 

@@ -24,10 +24,10 @@ from ptcc_certify import (
     box,
     certify,
     ellipsoid,
+    initial_set_within,
     read_certificate,
     report_html,
     report_latex,
-    starts_within,
 )
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
@@ -92,7 +92,7 @@ def test_a_bound_is_useful_too_if_no_agent_has_more_than_a_hundredth_of_the_long
     found = []
     for rho2 in ("0.6", 1, 2):
         cert = certify(graph, NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), [0, 0, 0, 1], simulation=False)
-        way, left = cert.longest_way, float(cert.outcome_distance([float(LAST)]).max())
+        way, left = cert.longest_way, float(cert.deviation_bound([float(LAST)]).max())
         assert way is not None
         assert cert.assessment.useful == (cert.envelope.residual(float(LAST)) <= 0.01 or left <= 0.01 * way)
         found.append(cert.assessment.text)
@@ -210,7 +210,7 @@ def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
     weak.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert saved.expectations == asked and saved.assessment == weak.assessment
-    assert saved.assessment.text.startswith("refuted: rate >= 10 (none exceeds 9.04416")
+    assert saved.assessment.text.startswith("refuted: rate >= 10 (upper bound 9.04416")
     page, text = report_html(saved), report_latex(saved)
     assert '<div class="verdict doubt">' in page and "says little by T" in page and "refuted: rate &gt;= 10" in page
     assert "With these gains the bound says little by the deadline." in text
@@ -261,24 +261,26 @@ def test_noise_from_the_final_state_is_not_a_share_of_nothing():
 def test_of_a_set_no_share_is_stated_that_single_states_exceed():
     hub = SignedDigraph.from_edges([(1, 2, 1), *((2, k, 10) for k in range(3, 103))])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa="3.3")
-    found = limited(None, hub, protocol, starts=starts_within(analyse(hub), 1), limits=[Actuator(gain_cap="4.5")])
-    assert "||E(0)||" not in found.said and "from all these starts" in found.said
+    found = limited(
+        None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[Actuator(gain_cap="4.5")]
+    )
+    assert "||E(0)||" not in found.said and "from all these initial states" in found.said
 
 
 @pytest.mark.parametrize("size", ["0.01", "1000", "1e200"])
 def test_the_verdict_on_a_set_does_not_hang_on_another_start(size: str):
-    sets = starts_within(analyse(PAIR), size)
-    assert limited([7, 3], starts=sets, limits=[Actuator(gain_cap="0.01")]).useful is False
-    assert limited([7, 3], starts=sets, limits=[Actuator(gain_cap="100")]).useful is True
+    sets = initial_set_within(analyse(PAIR), size)
+    assert limited([7, 3], initial_set=sets, limits=[Actuator(gain_cap="0.01")]).useful is False
+    assert limited([7, 3], initial_set=sets, limits=[Actuator(gain_cap="100")]).useful is True
 
 
 @pytest.mark.parametrize("region", [box([1, 1], [1, 1]), ellipsoid([1, 1], [[1, 1]])])
 def test_an_unbounded_input_from_a_thin_set_is_not_called_proved(region: Any):
     weak_gains = NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1)
     asked = Expectations(max_input=Fraction(100))
-    found = limited(None, protocol=weak_gains, starts=region, expectations=asked)
+    found = limited(None, protocol=weak_gains, initial_set=region, expectations=asked)
     assert found.exit_code == 4 and "refuted" not in found.text
-    solid = limited(None, protocol=weak_gains, starts=box([0, 0], [2, 1]), expectations=asked)
+    solid = limited(None, protocol=weak_gains, initial_set=box([0, 0], [2, 1]), expectations=asked)
     assert solid.exit_code == 3 and "without limit, proved" in solid.text
 
 

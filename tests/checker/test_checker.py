@@ -31,7 +31,7 @@ import ptcc_certify
 from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
 from ptcc_certify import checker
-from ptcc_certify.bounds import final_state as outcomes
+from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input import box, ellipsoid
 from ptcc_certify.certificate import procedure, vectors
 from ptcc_certify.certificate.certificate import Certificate
@@ -45,7 +45,7 @@ from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent
@@ -176,8 +176,8 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
 
     def lying(certificate: Any, verdict: str, files: bool = False) -> tuple[Json, Any]:
         data, written = honest(certificate, verdict, files)
-        rate = Fraction(data["rates"]["limit"]) * 2
-        return resealed({**data, "rates": {**data["rates"], "certified": str(rate)}}), written
+        rate = Fraction(data["rates"]["upper_bound"]) * 2
+        return resealed({**data, "rates": {**data["rates"], "proved": str(rate)}}), written
 
     monkeypatch.setattr("ptcc_certify.certificate.certificate.certificate_document", lying)
     cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
@@ -196,27 +196,27 @@ def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
 
 @pytest.mark.parametrize("name", ["1.1", "2.1 K>=2", "2.1 K=1", "3.1 mixed", "3.1 all single", "disconnected 1.1 2.1"])
 @pytest.mark.parametrize("slides", [False, True])
-def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
+def test_an_final_state_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
     monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__(name, 5, slides)
     assert data["verdict"] == "certified"
     accepted(data)
-    influence, final = data["outcome"]["influence"], data["outcome"]["final_state"]
+    influence, final = data["influence"], data["final_state"]
     balls = [
-        ("outcome", "influence", kind, *path)
+        ("influence", kind, *path)
         for kind, rows in (
             (
                 "components",
                 [
-                    ((k, "voices", i), x)
+                    ((k, "left_null_vector", i), x)
                     for k, c in enumerate(influence["components"])
-                    for i, x in enumerate(c["voices"])
+                    for i, x in enumerate(c["left_null_vector"])
                 ],
             ),
             (
-                "followers",
-                [((label, i), x) for label, row in influence["followers"].items() for i, x in enumerate(row)],
+                "containment_weights",
+                [((label, i), x) for label, row in influence["containment_weights"].items() for i, x in enumerate(row)],
             ),
         )
         for path, x in rows
@@ -227,15 +227,15 @@ def test_an_outcome_too_long_to_write_is_enclosed(name: str, slides: bool, monke
         ball: Any = data
         for key in path:
             ball = ball[key]
-        rejected(changed(data, path, {**ball, "radius": "1e-130"}), "outcome of graph")
-        rejected(changed(data, path, {**ball, "mid": ball["mid"].replace("e", "1e")}), "outcome of graph")
+        rejected(changed(data, path, {**ball, "radius": "1e-130"}), "final-state of graph")
+        rejected(changed(data, path, {**ball, "mid": ball["mid"].replace("e", "1e")}), "final-state of graph")
     for label, ball in final.items():
         if isinstance(ball, dict):
-            rejected(changed(data, ("outcome", "final_state", label), {**ball, "radius": "1e-119"}), "outcome of graph")
-    step = proof_step(data, "outcome")
-    rejected(changed(data, ("proof", step, "witness"), None), "outcome of graph")
+            rejected(changed(data, ("final_state", label), {**ball, "radius": "1e-119"}), "final-state of graph")
+    step = proof_step(data, "final-state")
+    rejected(changed(data, ("proof", step, "witness"), None), "final-state of graph")
     zero = dict.fromkeys(data["graph"]["nodes"], "0")
-    rejected(changed(data, ("proof", step, "witness"), {"u": zero}), "outcome of graph")
+    rejected(changed(data, ("proof", step, "witness"), {"u": zero}), "final-state of graph")
 
 
 def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -273,10 +273,10 @@ SAMPLE = (("1.1", False), ("1.2", True), ("2.1 K>=2", False), ("2.1 K=1", True),
 #: Where one changed field may leave a statement that is true in its own right: other gains and starts, untrusted
 #: witnesses, constants that have a little slack, how the file was read. Only the digest tells that it was changed.
 OF_ITS_OWN_RIGHT = (
-    r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle|protocol\.|initial_state|sigma0"
+    r"producer|graph\.read|structure\.closed_components\.\d+\.negative_cycle|protocol\.|initial_state|sliding_variable"
     r"|reaching_time\.z|proof\.\d+\.(witness|numbers\.([bmpz]|m0|m1|growth))"
-    r"|lyapunov\.members\.\d+\.(distance|blocks\.0\.(lower_triangle|diagonal|nodes$))"
-    r"|effort\.(constants|energy|path_length|peak\.(agents|norm)|sliding\.agents)"
+    r"|lyapunov\.functions\.\d+\.(deviation|blocks\.0\.(lower_triangle|diagonal|nodes$))"
+    r"|input\.(constants|energy|path_length|peak\.(agents|norm)|sliding\.agents)"
 )
 
 
@@ -307,7 +307,7 @@ def test_no_mutant_is_accepted(name: str, slides: bool):
 
 
 #: Sets of starts may be smaller, bounds larger, limits others that leave no more.
-ABOUT_LIMITS = OF_ITS_OWN_RIGHT + r"|effort\.(starts|residual|disturbed)"
+ABOUT_LIMITS = OF_ITS_OWN_RIGHT + r"|input\.(initial_set|residual|disturbed)"
 
 
 def limited(name: str, ball: bool) -> Json:
@@ -315,10 +315,10 @@ def limited(name: str, ball: bool) -> Json:
     graph = random_graph(np.random.default_rng(5), **{"weights": "decimals", **CLASSES[name]}).graph
     n, half = graph.n_nodes, Fraction(1, 2)
     axes = [[half * (i == j) + Fraction(1, 8) * (j == 0) for i in range(n)] for j in range(n)]
-    starts = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
+    initial_set = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
     step = Fraction(1, 10**7)
     limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period=step)]
-    made = certify(graph, STRONG, starts=starts, limits=limits, delta="0.1", noise="0.01", simulation=False)
+    made = certify(graph, STRONG, initial_set=initial_set, limits=limits, delta="0.1", noise="0.01", simulation=False)
     assert made.effort is not None and len(made.effort.residual) == 3 and made.effort.disturbed is not None
     assert [entry.noise is None for entry in made.effort.residual] == [False, False, True]
     return json.loads(made.to_json())
@@ -337,13 +337,15 @@ def test_numbers_about_the_input_that_cost_too_much_are_refused():
     data = limited("1.1", False)
     primes = [p for p in range(10**6, 10**6 + 4000) if all(p % d for d in range(2, 1001))]
     rows = [f"1/{p**600}" for p in primes]
-    starts = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
-    many = changed(data, ("effort", "starts", "center"), starts)
+    initial_set = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
+    many = changed(data, ("input", "initial_set", "center"), initial_set)
     began = time.perf_counter()
     report = check(resealed(many), stdlib=True)
     assert not report.accepted and "denominator" in (report.reason or "")
     assert time.perf_counter() - began < 20
-    aside = changed(data, ("effort", "starts", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(starts)})
+    aside = changed(
+        data, ("input", "initial_set", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(initial_set)}
+    )
     assert "side file" in (check(resealed(aside), stdlib=True).reason or "")
     grown = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "limited-gain")
     odd = changed(data, ("proof", grown, "numbers", "growth"), "1")
@@ -413,22 +415,22 @@ def test_a_rate_beyond_the_slack_is_rejected():
     for name, slides in SAMPLE:
         data = made(name, 5, slides)
         least: dict[str, Fraction] = {}
-        for member in data["lyapunov"]["members"]:
-            own = Fraction(member["prefactor"])
-            least[member["rate"]] = min(least.get(member["rate"], own), own)
-        for k, member in enumerate(data["lyapunov"]["members"]):
-            of = f"lyapunov.members[{k}]"
+        for function in data["lyapunov"]["functions"]:
+            own = Fraction(function["overshoot"])
+            least[function["rate"]] = min(least.get(function["rate"], own), own)
+        for k, function in enumerate(data["lyapunov"]["functions"]):
+            of = f"lyapunov.functions[{k}]"
             # A rate that members share is that of the least prefactor; the others may have more to spare.
-            if member["class"] == "paper" or Fraction(member["prefactor"]) > least[member["rate"]]:
+            if function["class"] == "paper" or Fraction(function["overshoot"]) > least[function["rate"]]:
                 continue
             step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"] == of)
-            higher = str(Fraction(member["rate"]) + abs(Fraction(member["rate"])) / 10**9)
-            forged = changed(data, ("lyapunov", "members", k, "rate"), higher)
+            higher = str(Fraction(function["rate"]) + abs(Fraction(function["rate"])) / 10**9)
+            forged = changed(data, ("lyapunov", "functions", k, "rate"), higher)
             forged = changed(forged, ("proof", step, "numbers"), {"b": higher})
-            for key in ("certified", "diagonal"):
-                if data["rates"][key] == member["rate"]:
+            for key in ("proved", "diagonal"):
+                if data["rates"][key] == function["rate"]:
                     forged = changed(forged, ("rates", key), higher)
-            rejected(forged, rf"rate of lyapunov\.members\[{k}\]")
+            rejected(forged, rf"rate of lyapunov\.functions\[{k}\]")
             count += 1
     assert count >= 15
 
@@ -490,26 +492,26 @@ def test_an_open_component_called_closed():
 def test_a_rate_above_the_spectral_rate(name: str):
     """No matrix whatsoever proves it; here every member's rate is set above what is proved to limit all rates."""
     data = made(name, 5)
-    above = str(Fraction(data["rates"]["limit"]) * Fraction(1001, 1000))
-    members = len(data["lyapunov"]["members"])
-    for k in range(1, members):
+    above = str(Fraction(data["rates"]["upper_bound"]) * Fraction(1001, 1000))
+    functions = len(data["lyapunov"]["functions"])
+    for k in range(1, functions):
         step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "rate" and s["of"].endswith(f"[{k}]"))
-        forged = changed(data, ("lyapunov", "members", k, "rate"), above)
+        forged = changed(data, ("lyapunov", "functions", k, "rate"), above)
         forged = changed(forged, ("proof", step, "numbers"), {"b": above})
-        forged = changed(forged, ("rates", "certified"), above)
-        rejected(forged, rf"rate of lyapunov\.members\[{k}\]")
+        forged = changed(forged, ("rates", "proved"), above)
+        rejected(forged, rf"rate of lyapunov\.functions\[{k}\]")
 
 
 @pytest.mark.parametrize("name", ["1.1", "1.2", "2.1 K>=2", "2.2", "3.1 mixed", "3.2"])
 def test_a_limit_below_the_spectral_rate(name: str):
     """Nor is a limit accepted that some eigenvalue contradicts."""
     data = made(name, 5)
-    assert Fraction(data["rates"]["certified"]) <= Fraction(data["rates"]["limit"])
+    assert Fraction(data["rates"]["proved"]) <= Fraction(data["rates"]["upper_bound"])
     for factor in (Fraction(999, 1000), 1 - Fraction(1, 10**6)):
-        below = str(Fraction(data["rates"]["limit"]) * factor)
-        forged = changed(data, ("rates", "limit"), below)
-        forged = changed(forged, ("proof", proof_step(data, "rate-limit"), "numbers"), {"limit": below})
-        rejected(forged, "rate-limit of rates")
+        below = str(Fraction(data["rates"]["upper_bound"]) * factor)
+        forged = changed(data, ("rates", "upper_bound"), below)
+        forged = changed(forged, ("proof", proof_step(data, "rate-upper-bound"), "numbers"), {"upper_bound": below})
+        rejected(forged, "rate-upper-bound of rates")
 
 
 def test_the_rounding_trap_of_the_balanced_case():
@@ -546,13 +548,13 @@ def test_a_final_state_without_the_leaders_sigma():
     """K = 1: the leader's own sliding variable moves it, and everybody with it: not Q X(0) but Q (X(0) - sigma(0))."""
     data = made("2.1 K=1", 5, True)
     leader = data["structure"]["leaders"][0]
-    assert Fraction(data["sigma0"][leader]) != 0
-    weights = {k: Fraction(v[0]) for k, v in data["outcome"]["influence"]["followers"].items()} | {leader: Fraction(1)}
+    assert Fraction(data["sliding_variable"][leader]) != 0
+    weights = {k: Fraction(v[0]) for k, v in data["influence"]["containment_weights"].items()} | {leader: Fraction(1)}
     start = Fraction(data["initial_state"][leader])
     state = {label: str(weights[label] * start) for label in data["graph"]["nodes"]}
-    rejected(changed(data, ("outcome", "final_state"), state), "outcome of graph")
-    hidden = changed(data, ("sigma0", leader), "0")
-    rejected(hidden, "outcome of graph")
+    rejected(changed(data, ("final_state",), state), "final-state of graph")
+    hidden = changed(data, ("sliding_variable", leader), "0")
+    rejected(hidden, "final-state of graph")
 
 
 def test_a_reaching_time_that_comes_too_soon():
@@ -572,11 +574,11 @@ def test_a_disturbance_that_the_gain_does_not_cover():
 def test_a_matrix_that_is_not_definite():
     """V <= e^(-b s) V(0) says nothing if V is not positive."""
     data = made("1.2", 5)
-    k = next(i for i, m in enumerate(data["lyapunov"]["members"]) if m["class"] == "full")
-    rows = data["lyapunov"]["members"][k]["blocks"][0]["lower_triangle"]
+    k = next(i for i, m in enumerate(data["lyapunov"]["functions"]) if m["class"] == "full")
+    rows = data["lyapunov"]["functions"][k]["blocks"][0]["lower_triangle"]
     negated = [[str(-Fraction(x)) for x in row] for row in rows]
     rejected(
-        changed(data, ("lyapunov", "members", k, "blocks", 0, "lower_triangle"), negated), "(rate|prefactor) of lyap"
+        changed(data, ("lyapunov", "functions", k, "blocks", 0, "lower_triangle"), negated), "(rate|overshoot) of lyap"
     )
 
 
@@ -584,20 +586,27 @@ def test_nothing_is_claimed_of_decay_where_nothing_moves():
     """With no rows every matrix is definite, and its ends could be written in any order."""
     data = json.loads(certify(SignedDigraph.from_edges([], nodes=["a"]), NOMINAL, simulation=False).to_json())
     block = {"name": "P", "nodes": [], "lower_triangle": [], "times_rho": False}
-    member = {"class": "full", "coordinates": "E", "blocks": [block], "rho": None, "rate": "1000000", "prefactor": "-5"}
-    texts = {
-        kind: dict(zip(("statement", "lemma"), checker.OBLIGATIONS[kind], strict=True)) for kind in checker.OBLIGATIONS
+    function = {
+        "class": "full",
+        "coordinates": "E",
+        "blocks": [block],
+        "rho": None,
+        "rate": "1000000",
+        "overshoot": "-5",
     }
-    of = {"of": "lyapunov.members[0]", "witness": None}
+    texts = {
+        kind: dict(zip(("proves", "lemma"), checker.OBLIGATIONS[kind], strict=True)) for kind in checker.OBLIGATIONS
+    }
+    of = {"of": "lyapunov.functions[0]", "witness": None}
     steps = [
         {"kind": "rate", **of, **texts["rate"], "numbers": {"b": "1000000"}},
-        {"kind": "prefactor", **of, **texts["prefactor"], "numbers": {"lowest": "1", "highest": "-5"}},
+        {"kind": "overshoot", **of, **texts["overshoot"], "numbers": {"lowest": "1", "highest": "-5"}},
     ]
     forged = {
         **data,
-        "lyapunov": {"members": [{**member, "distance": None}]},
-        "rates": {**data["rates"], "certified": "1000000"},
-        "prefactor": {"value": "-5", "of": "||E||^2"},
+        "lyapunov": {"functions": [{**function, "deviation": None}]},
+        "rates": {**data["rates"], "proved": "1000000"},
+        "overshoot": {"value": "-5", "of": "||E||^2"},
         "proof": [*data["proof"], *steps],
     }
     rejected(forged, "lyapunov")
@@ -609,13 +618,13 @@ def test_both_arithmetics_reject_a_constant_that_is_only_reached():
         certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, method="paper", simulation=False).to_json()
     )
     for label in ("1", "2"):
-        rejected(changed(data, ("lyapunov", "members", 0, "distance", "agents", label), "1"), "distance of lyap")
+        rejected(changed(data, ("lyapunov", "functions", 0, "deviation", "agents", label), "1"), "deviation of lyap")
 
 
 def test_an_interval_that_says_nothing_is_rejected():
     data = made("2.1 K>=2", 5)
     label = data["graph"]["nodes"][0]
-    rejected(changed(data, ("outcome", "final_state", label), {"mid": "0", "radius": "1e400"}), "outcome of graph")
+    rejected(changed(data, ("final_state", label), {"mid": "0", "radius": "1e400"}), "final-state of graph")
 
 
 def test_one_end_of_rho_without_the_other_is_rejected():
@@ -661,7 +670,7 @@ def large(name: str, seed: int = 3, slides: bool = False) -> Json:
     """The JSON of a certificate of a small graph that is treated as a large one."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(procedure, "EXACT_NODES", 0)
-        patch.setattr(outcomes, "EXACT_NODES", 0)
+        patch.setattr(final_states, "EXACT_NODES", 0)
         return made.__wrapped__(name, seed, slides)
 
 
@@ -751,16 +760,16 @@ def test_side_vectors_that_are_odd_are_rejected(name: str, slides: bool):
 def test_a_state_of_vectors_is_that_state_and_no_other():
     data, files = with_side_files(large("3.1 mixed", 5))
     side = Side()
-    final = data["outcome"]["final_state"]
+    final = data["final_state"]
     mids, radii = (np.load(io.BytesIO(files[final[key]["file"]])).tolist() for key in ("mid", "radius"))
     for v in range(len(mids)):
         moved = [*mids[:v], mids[v] + max(3 * radii[v], 1e-7), *mids[v + 1 :]]
         wide = [*radii[:v], 1e3, *radii[v + 1 :]]
         for key, values in (("mid", moved), ("radius", wide)):
-            mutant = changed(data, ("outcome", "final_state", key), side.integers(values))
-            rejected_beside(mutant, {**files, **side.files}, "outcome of graph", "ends elsewhere|wider")
-    alone = changed(data, ("outcome", "final_state", "radius"), ["0"] * len(mids))
-    rejected_beside(alone, files, "outcome of graph", "not a side vector")
+            mutant = changed(data, ("final_state", key), side.integers(values))
+            rejected_beside(mutant, {**files, **side.files}, "final-state of graph", "ends elsewhere|wider")
+    alone = changed(data, ("final_state", "radius"), ["0"] * len(mids))
+    rejected_beside(alone, files, "final-state of graph", "not a side vector")
 
 
 def test_labels_that_are_the_keys_of_a_side_vector():
@@ -796,7 +805,7 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
     stops, passed = judge(data, 23, 0, False, files)
     assert sum(stops.values()) > 20
     # Of the paper's function nothing is proved there, and voices may be known less well than they are.
-    allowed = OF_ITS_OWN_RIGHT + r"|paper\.blocks|outcome\.influence\.components\.\d+\.voices\.\d+\.(mid|radius)"
+    allowed = OF_ITS_OWN_RIGHT + r"|paper\.blocks|influence\.components\.\d+\.left_null_vector\.\d+\.(mid|radius)"
     assert [path for path in passed if not re.match(allowed, path)] == []
 
 
@@ -856,10 +865,10 @@ def test_the_work_of_a_factor_is_bounded(monkeypatch: pytest.MonkeyPatch):
     data = with_factors(large("2.2", 5))
     monkeypatch.setattr("lmi.exact.definite.Arithmetic.products", 3)
     report = check(data, stdlib=True)
-    assert report.rejected == "dominance of lyapunov.members[0]" and "products; standard library takes 3" in (
+    assert report.rejected == "dominance of lyapunov.functions[0]" and "products; standard library takes 3" in (
         report.reason or ""
     )
-    monkeypatch.setattr("ptcc_certify.checker.dominance.LARGEST_PRODUCT", 3)
+    monkeypatch.setattr("ptcc_certify.checker.large_function.LARGEST_PRODUCT", 3)
     report = check(with_factors(large("1.1", 5)))
     assert "too many edges" in (report.reason or "")
 
@@ -898,26 +907,26 @@ def one_line(path: Path, seconds: float = 20) -> str:
 def test_huge_and_hostile_files_are_refused(tmp_path: Path):
     path = tmp_path / "c.json"
     with path.open("wb") as file:
-        file.write(b'{"schema": "ptcc-certificate/1", "x": "')
+        file.write(b'{"schema": "ptcc-certificate/2", "x": "')
         file.seek(10**9)
         file.write(b'"}')
     assert "more than 200000000 bytes" in one_line(path)
-    path.write_text('{"schema": "ptcc-certificate/1", "x": ' + "7" * 10**7 + "}")
+    path.write_text('{"schema": "ptcc-certificate/2", "x": ' + "7" * 10**7 + "}")
     assert "not a number" in one_line(path)
-    path.write_text('{"schema": "ptcc-certificate/1", "x": 1e999999999}')
+    path.write_text('{"schema": "ptcc-certificate/2", "x": 1e999999999}')
     assert "not a number" in one_line(path)
     for nested in ("[" * 10**6, "[" * 10**6 + "]" * 10**6, '{"a":' * 10**6):
-        path.write_text('{"schema": "ptcc-certificate/1", "x": ' + nested)
+        path.write_text('{"schema": "ptcc-certificate/2", "x": ' + nested)
         assert "not a readable certificate" in one_line(path)
-    path.write_text('{"schema": "ptcc-certificate/1", "schema": "ptcc-certificate/1"}')
+    path.write_text('{"schema": "ptcc-certificate/2", "schema": "ptcc-certificate/2"}')
     assert "a key occurs twice" in one_line(path)
     for text in ("NaN", "Infinity", "-Infinity"):
-        path.write_text('{"schema": "ptcc-certificate/1", "x": ' + text + "}")
+        path.write_text('{"schema": "ptcc-certificate/2", "x": ' + text + "}")
         assert "not a number" in one_line(path)
     path.write_bytes(b"\xff\xfe\x00")
     assert "not a readable certificate" in one_line(path)
-    path.write_text('{"schema": "ptcc-certificate/2"}')
-    assert 'not a certificate of schema "ptcc-certificate/1"' in one_line(path)
+    path.write_text('{"schema": "ptcc-certificate/1"}')
+    assert 'not a certificate of schema "ptcc-certificate/2"' in one_line(path)
     assert "no such file" in one_line(tmp_path / "missing.json").lower()
     assert "directory" in one_line(tmp_path).lower()
 
@@ -932,22 +941,22 @@ def timed(data: Json, seconds: float, **options: bool) -> None:
 def test_long_numbers_and_many_rows_take_bounded_time():
     """Coprime denominators of 1,000 digits, thousands of rows, dozens of distinct reaching times."""
     data = made("1.2", 5)
-    k = next(i for i, m in enumerate(data["lyapunov"]["members"]) if m["class"] == "full")
-    rows = data["lyapunov"]["members"][k]["blocks"][0]["lower_triangle"]
+    k = next(i for i, m in enumerate(data["lyapunov"]["functions"]) if m["class"] == "full")
+    rows = data["lyapunov"]["functions"][k]["blocks"][0]["lower_triangle"]
     long = [
         [f"{10**1000 + 7 * (50 * i + j)}/{10**1000 + 2 * (50 * i + j) + 1}" for j in range(i + 1)]
         for i in range(len(rows))
     ]
     for stdlib in (True, False):
-        timed(changed(data, ("lyapunov", "members", k, "blocks", 0, "lower_triangle"), long), 20, stdlib=stdlib)
+        timed(changed(data, ("lyapunov", "functions", k, "blocks", 0, "lower_triangle"), long), 20, stdlib=stdlib)
     n = 3000
     ring = [(i, (i + 1) % n, 1) for i in range(n)] + [(i, n + i, 1) for i in range(n)]
     wide = json.loads(certify(SignedDigraph.from_edges(ring), NOMINAL, method="paper", simulation=False).to_json())
     timed(wide, 10)
     nodes = wide["graph"]["nodes"]
     block = {"name": "P", "nodes": nodes, "diagonal": ["1"] * len(nodes), "times_rho": False}
-    member = {"class": "lmi", "coordinates": "E", "blocks": [block], "rho": None, "rate": "-9", "prefactor": "1"}
-    forged = {**wide, "lyapunov": {"members": [{**member, "distance": None}]}}
+    function = {"class": "lmi", "coordinates": "E", "blocks": [block], "rho": None, "rate": "-9", "overshoot": "1"}
+    forged = {**wide, "lyapunov": {"functions": [{**function, "deviation": None}]}}
     begin = time.monotonic()
     assert "rows" in (check(resealed(forged)).reason or "")
     assert time.monotonic() - begin < 10
@@ -967,10 +976,10 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
     for k in range(8):
         lower[30 * k + 9][7] = f"1/{10**3600 + 2 * k + 1}"
     block = {"name": "P", "nodes": nodes, "lower_triangle": lower, "times_rho": False}
-    member = {"class": "full", "coordinates": "E", "blocks": [block], "rho": None, "rate": "1", "prefactor": "1"}
+    function = {"class": "full", "coordinates": "E", "blocks": [block], "rho": None, "rate": "1", "overshoot": "1"}
     statement, lemma = checker.OBLIGATIONS["rate"]
-    step = {"kind": "rate", "of": "lyapunov.members[0]", "statement": statement, "lemma": lemma, "witness": None}
-    data["lyapunov"]["members"] = [{**member, "distance": None}]
+    step = {"kind": "rate", "of": "lyapunov.functions[0]", "proves": statement, "lemma": lemma, "witness": None}
+    data["lyapunov"]["functions"] = [{**function, "deviation": None}]
     data["proof"] = [*data["proof"][:3], {**step, "numbers": {"b": "1"}}]
     tracemalloc.start()
     for stdlib in (True, False):
@@ -986,7 +995,7 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
 def test_json_that_would_fill_the_memory_is_refused_before_it_is_parsed(piece: str, tmp_path: Path):
     path = tmp_path / "c.json"
     wide = ",".join([piece] * (100_000_000 // (len(piece) + 1)))
-    path.write_text(f'{{"schema": "ptcc-certificate/1", "unverified": [{wide}]}}')
+    path.write_text(f'{{"schema": "ptcc-certificate/2", "unverified": [{wide}]}}')
     tracemalloc.start()
     try:
         with pytest.raises(UnreadableError, match="GB in memory; allow more by --memory"):
@@ -1041,8 +1050,8 @@ def test_numbers_outside_the_grammar_are_rejected(text: str):
 def test_texts_of_obligations_are_those_of_the_checker():
     data = copy.deepcopy(made("3.1 mixed", 5, True))
     for step in data["proof"]:
-        assert (step["statement"], step["lemma"]) == checker.OBLIGATIONS[step["kind"]]
-    data["proof"][0]["statement"] = "everything is well"
+        assert (step["proves"], step["lemma"]) == checker.OBLIGATIONS[step["kind"]]
+    data["proof"][0]["proves"] = "everything is well"
     rejected(data, "structure of graph")
 
 
@@ -1055,10 +1064,10 @@ def test_a_cycle_through_a_follower_does_not_unbalance_its_leaders():
     cycle = [["a", "f"], ["b", "f"], ["b", "a"]]
     d["structure"]["closed_components"][0] = {"nodes": ["a", "b"], "balanced": False, "negative_cycle": cycle}
     d["claim"] = {"theorem": "2.2", "behaviour": "stability", "corollaries": []}
-    d |= {"paper": None, "lyapunov": {"members": []}, "rates": dict.fromkeys(d["rates"]), "prefactor": None}
-    influence = {"components": [], "followers": {"f": []}}
-    d["outcome"] = {"final_state": dict.fromkeys("abf", "0"), "degenerate": [], "influence": influence}
-    d["proof"] = [{**s, "witness": None} for s in d["proof"] if s["kind"] in ("structure", "claim", "outcome")]
+    d |= {"paper": None, "lyapunov": {"functions": []}, "rates": dict.fromkeys(d["rates"]), "overshoot": None}
+    d["influence"] = {"components": [], "containment_weights": {"f": []}, "degenerate": []}
+    d["final_state"] = dict.fromkeys("abf", "0")
+    d["proof"] = [{**s, "witness": None} for s in d["proof"] if s["kind"] in ("structure", "claim", "final-state")]
     d["verdict"] = "undecided"
     for stdlib in (True, False):
         report = check(resealed(d), stdlib=stdlib)

@@ -16,12 +16,12 @@ import pytest
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.document import Document
-from ptcc_certify.checker.fast import ArrayDigraph
 from ptcc_certify.checker.graph import check_graph
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError
-from ptcc_certify.checker.vectors import SideFiles
+from ptcc_certify.checker.side_vectors import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.nominal import NominalProtocol
 
@@ -113,10 +113,10 @@ def test_both_are_what_the_definitions_say(seed: int):
             assert {u for u, seen in enumerate(g.reached([v])) if seen} == nx.descendants(reference, v) | {v}
             assert {u for u, seen in enumerate(g.reached([v], back=True)) if seen} == nx.ancestors(reference, v) | {v}
         group = rng.integers(-1, 3, n).tolist()
-        members = [v for v in range(n) if group[v] >= 0]
+        functions = [v for v in range(n) if group[v] >= 0]
         inside = nx.DiGraph([(s, t) for s, t, _ in edges if group[s] == group[t]])
         inside.add_nodes_from(range(n))
-        for v in members:
+        for v in functions:
             found = {u for u, seen in enumerate(g.reached([v], group=group)) if seen}
             assert found == nx.descendants(inside, v) | {v}
         assert g.closed(group) == all(group[t] < 0 or group[s] == group[t] for s, t, _ in edges)

@@ -20,7 +20,7 @@ from mutations import Json, at, changed, containers, leaves
 from side_files import with_factors, with_side_files
 
 from ptcc_certify import checker
-from ptcc_certify.bounds import final_state as outcomes
+from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.certificate import procedure, vectors
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
@@ -126,7 +126,7 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
     pairs = [(f"a{i}", f"b{i}", -1) for i in range(MANY_COMPONENTS + 5)]
     data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, simulation=False).to_json())
     VALIDATOR.validate(data)
-    assert isinstance(data["components"], dict) and data["outcome"]["influence"]["followers"] is None
+    assert isinstance(data["components"], dict) and data["influence"]["containment_weights"] is None
     for key in data["components"]:
         assert not valid(changed(data, ("components", key), data["components"][key][:MANY_COMPONENTS]))
     monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
@@ -147,7 +147,7 @@ def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(procedure, "EXACT_NODES", 0)
-    monkeypatch.setattr(outcomes, "EXACT_NODES", 0)
+    monkeypatch.setattr(final_states, "EXACT_NODES", 0)
     data, _ = with_side_files(with_factors(made.__wrapped__("3.1 mixed", True, "best")))
     VALIDATOR.validate(data)
     assert depth({**data, "unverified": {}}) <= 8
@@ -155,9 +155,9 @@ def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
     for path in (
         ("structure", "leaders"),
         ("initial_state",),
-        ("outcome", "final_state", "mid"),
+        ("final_state", "mid"),
         ("proof", step, "witness", "vector"),
-        ("lyapunov", "members", 0, "blocks", 0, "diagonal"),
+        ("lyapunov", "functions", 0, "blocks", 0, "diagonal"),
     ):
         said = at(data, path)
         assert not valid(changed(data, path, {**said, "count": str(said["count"])})), path
@@ -238,25 +238,25 @@ def test_the_grammar_of_the_schema_is_that_of_the_checker():
 def test_words_and_sections_that_do_not_fit_are_not_valid():
     data, sliding = made("1.1"), made("2.1 K>=2", True)
     for path, new in (
-        (("schema",), "ptcc-certificate/2"),
+        (("schema",), "ptcc-certificate/1"),
         (("verdict",), "proved"),
-        (("effort",), "1"),
+        (("input",), "1"),
         (("claim", "theorem"), "7.1"),
         (("claim", "behaviour"), "consensus"),
         (("structure", "connectivity"), "disconnected"),
         (("claim",), None),
         (("protocol", "kind"), "sliding-mode"),
-        (("sigma0",), data["initial_state"]),
-        (("lyapunov", "members", 0, "class"), "best"),
+        (("sliding_variable",), data["initial_state"]),
+        (("lyapunov", "functions", 0, "class"), "best"),
         (("proof", 0, "kind"), "claim"),
-        (("proof", 0, "statement"), "everything is well"),
+        (("proof", 0, "proves"), "everything is well"),
         (("proof", 0, "witness"), {}),
         (("structure", "closed_components", 0, "gauge", 0), 2),
         (("digest",), data["digest"].upper()),
     ):
         assert not valid(changed(data, path, new)), path
     assert not valid({**data, "components": []})
-    assert not valid({**sliding, "sigma0": None}) and not valid({**sliding, "reaching_time": None})
+    assert not valid({**sliding, "sliding_variable": None}) and not valid({**sliding, "reaching_time": None})
 
 
 # ---------------------------------------------------------------------- the text
@@ -292,7 +292,7 @@ def test_obligations_are_described_with_their_texts():
     blocks = re.findall(r"```json\n(.*?)```", FORMAT, re.DOTALL)
     assert json.loads(blocks[0]) == {kind: list(texts) for kind, texts in OBLIGATIONS.items()}
     table = re.findall(r"^\| `([a-z-]+)` \| `[a-z]", FORMAT.partition("## 14.")[2].partition("## 15.")[0], re.MULTILINE)
-    assert table == ["structure", "claim", "outcome", *[kind for kind in table if kind not in table[:3]]]
+    assert table == ["structure", "claim", "final-state", *[kind for kind in table if kind not in table[:3]]]
     assert set(table) == set(OBLIGATIONS) and len(table) == len(OBLIGATIONS)
     for kind in OBLIGATIONS:
         assert f"- **{kind}**: " in FORMAT, kind
@@ -332,7 +332,8 @@ def test_the_example_is_the_file_that_is_made_and_is_accepted(tmp_path: Path):
     protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
     now = json.loads(certify(graph, protocol, [3, 5], simulation=False, method="paper").to_json())
     # Where the search's floats end, and so the last digits of rates and witnesses, is for the platform.
-    exactly = ("schema", "graph", "structure", "claim", "protocol", "initial_state", "sigma0", "outcome", "verdict")
+    exactly = ("schema", "graph", "structure", "claim", "protocol", "initial_state", "sliding_variable", "influence")
+    exactly += ("final_state", "verdict")
     assert {key: now[key] for key in exactly} == {key: told[key] for key in exactly}
     assert list(now) == list(told)
     assert [step["kind"] for step in now["proof"]] == [step["kind"] for step in told["proof"]]
@@ -343,9 +344,9 @@ def test_the_example_by_hand():
     told = example()
     numbers = {step["kind"]: step["numbers"] for step in told["proof"]}
     assert Fraction(numbers["deviation-decrease"]["b"]) < 4
-    distance = told["lyapunov"]["members"][0]["distance"]
-    assert all(Fraction(c) >= 1 for c in distance["agents"].values()) and Fraction(distance["norm"]) > 2
-    assert numbers["rate-mean"] == {"limit": "4"} and told["rates"]["limit"] == "4"
+    deviation = told["lyapunov"]["functions"][0]["deviation"]
+    assert all(Fraction(c) >= 1 for c in deviation["agents"].values()) and Fraction(deviation["norm"]) > 2
+    assert numbers["rate-mean"] == {"upper_bound": "4"} and told["rates"]["upper_bound"] == "4"
     lines = ['["1"]', '["2"]', '["1", "2", "-1"]', '["2", "1", "-1"]']
     canonical = "".join(f"{line}\n" for line in lines)
     assert hashlib.sha256(canonical.encode()).hexdigest() == told["graph"]["sha256"]

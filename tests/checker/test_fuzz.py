@@ -33,7 +33,7 @@ from oracle import false_claims, number
 from side_files import with_factors, with_side_files
 
 import ptcc_certify
-from ptcc_certify.bounds import final_state as outcomes
+from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input import box, ellipsoid
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
@@ -41,7 +41,7 @@ from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 
 CLASSES = dict(all_classes())
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
@@ -71,14 +71,14 @@ def made(name: str, seed: int, slides: bool = False, large: bool = False, **opti
         kappa = Fraction(int(rng.integers(1, 6)), 2)
         protocol = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=kappa, mu1=2, mu2=1, mu3=1, delta=1)
         options["sigma0"] = [Fraction(int(v), 100) * (seed % 2) for v in rng.integers(-200, 201, n)]
-    if (starts := options.pop("starts", None)) is not None:
+    if (initial_set := options.pop("initial_set", None)) is not None:
         axes = [[Fraction(i == j) / 2 + Fraction(j == 0) / 8 for i in range(n)] for j in range(n)]
-        options["starts"] = ellipsoid([1] * n, axes) if starts == "ball" else box([-1] * n, [2] * n)
+        options["initial_set"] = ellipsoid([1] * n, axes) if initial_set == "ball" else box([-1] * n, [2] * n)
         start = None
     with pytest.MonkeyPatch.context() as patch:
         if large:
             patch.setattr(procedure, "EXACT_NODES", 0)
-            patch.setattr(outcomes, "EXACT_NODES", 0)
+            patch.setattr(final_states, "EXACT_NODES", 0)
         certificate = certify(graph, protocol, start, simulation=False, **options)
         return {**json.loads(certificate.to_json()), "unverified": {}}
 
@@ -97,7 +97,7 @@ def cases() -> list[Case]:
             "delta": "0.1",
             "noise": "0.01",
             "rho2": 5,
-            "starts": ("ball", "box", None)[k % 3],
+            "initial_set": ("ball", "box", None)[k % 3],
         }
         found.append((f"{name}, limits", made(name, 6 + k, **more), {}))
     for k, name in enumerate(("1.1", "2.1 K>=2", "2.2", "3.1 mixed", "disconnected 1.1 2.1")):
@@ -352,19 +352,19 @@ def test_the_oracle_finds_nothing_false_in_what_is_proved():
 @pytest.mark.parametrize(
     ("path", "share"),
     [
-        (("lyapunov", "members", 0, "rate"), "1.01"),
-        (("lyapunov", "members", -1, "distance", "norm"), "0.5"),
-        (("lyapunov", "members", -1, "prefactor"), "0.5"),
-        (("rates", "limit"), "0.5"),
-        (("rates", "certified"), "1.01"),
-        (("effort", "threshold", "lower"), "3"),
-        (("effort", "peak", "norm"), "0.1"),
-        (("effort", "energy"), "0.001"),
-        (("effort", "path_length"), "0.1"),
-        (("effort", "residual", 0, "clock"), "1.01"),
-        (("effort", "residual", 0, "norm"), "1e-6"),
-        (("effort", "residual", 1, "largest"), "0.01"),
-        (("effort", "residual", 0, "noise", "norm"), "1e-3"),
+        (("lyapunov", "functions", 0, "rate"), "1.01"),
+        (("lyapunov", "functions", -1, "deviation", "norm"), "0.5"),
+        (("lyapunov", "functions", -1, "overshoot"), "0.5"),
+        (("rates", "upper_bound"), "0.5"),
+        (("rates", "proved"), "1.01"),
+        (("input", "threshold", "lower"), "3"),
+        (("input", "peak", "norm"), "0.1"),
+        (("input", "energy"), "0.001"),
+        (("input", "path_length"), "0.1"),
+        (("input", "residual", 0, "clock"), "1.01"),
+        (("input", "residual", 0, "norm"), "1e-6"),
+        (("input", "residual", 1, "largest"), "0.01"),
+        (("input", "residual", 0, "noise", "norm"), "1e-3"),
         (("initial_state",), ""),
         (("graph", "edges"), ""),
     ],
@@ -453,7 +453,7 @@ def deep(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 def long_numbers(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     """Long numbers in place of one of so many, in a part or everywhere."""
     share, digits = 10 ** rng.uniform(-2, 0), int(10 ** rng.uniform(1, 3.58))
-    key = pick(rng, [None, "graph", "lyapunov", "outcome", "proof", "effort", "protocol", "initial_state", "paper"])
+    key = pick(rng, [None, "graph", "lyapunov", "final_state", "proof", "input", "protocol", "initial_state", "paper"])
     for path, value in list(leaves(data)):
         if fraction(value) is not None and (key is None or path[0] == key) and rng.random() < share:
             data = changed(data, path, long_text(rng, digits))
@@ -521,17 +521,17 @@ def star(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     block = {"name": "P", "nodes": nodes, "times_rho": False}
     kind = pick(rng, ["full", "lmi"])
     shape = {"lower_triangle": lower} if kind == "full" else {"diagonal": [row[-1] for row in lower]}
-    member = {
+    function = {
         "class": "full" if kind == "full" else "lmi",
         "coordinates": "E",
         "blocks": [{**block, **shape}],
         "rho": None,
     }
-    member |= {"rate": pick(rng, ["1/2", "-9", long_text(rng, digits)]), "prefactor": "1", "distance": None}
+    function |= {"rate": pick(rng, ["1/2", "-9", long_text(rng, digits)]), "overshoot": "1", "deviation": None}
     steps = [s for s in data["proof"] if s["kind"] in ("structure", "claim")]
-    stated = {"statement": "P L + L'P - b P > 0 on the range of L", "lemma": "Lyapunov decrease"}
+    stated = {"proves": "P L + L'P - b P > 0 on the range of L", "lemma": "Lyapunov decrease"}
     steps.append(
-        {"kind": "rate", "of": "lyapunov.members[0]", **stated, "numbers": {"b": member["rate"]}, "witness": None}
+        {"kind": "rate", "of": "lyapunov.functions[0]", **stated, "numbers": {"b": function["rate"]}, "witness": None}
     )
     data = {
         **data,
@@ -540,10 +540,11 @@ def star(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
         "claim": {"theorem": row[0], "behaviour": row[1], "corollaries": corollaries},
         "protocol": {"kind": "nominal", "T": "1", "rho1": "1", "rho2": "1", "kappa": "2"},
         "paper": None,
-        "lyapunov": {"members": [member] * int(rng.choice([1, 1, 5]))},
+        "lyapunov": {"functions": [function] * int(rng.choice([1, 1, 5]))},
         "initial_state": None,
-        "sigma0": None,
-        "outcome": None,
+        "sliding_variable": None,
+        "influence": None,
+        "final_state": None,
         "reaching_time": None,
         "proof": steps,
     }

@@ -14,14 +14,14 @@ from generators import random_graph
 from scipy.integrate import quad
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from ptcc_certify.checker import input_bounds
-from ptcc_certify.checker.input_bounds import (
+from ptcc_certify.checker import input_formulas as input_bounds
+from ptcc_certify.checker.input_formulas import (
     Form,
+    InitialSet,
     InputBounds,
     Limits,
     PrescribedGain,
     Reaching,
-    Starts,
     decay_above,
     energy_above,
     integral_above,
@@ -370,14 +370,16 @@ def test_a_linear_function_is_largest_where_it_is_largest(seed: int):
     n = int(rng.integers(1, 6))
     center, row = rationals(rng, n), {j: x for j, x in enumerate(rationals(rng, n)) if x}
     r = [float(row.get(j, 0)) for j in range(n)]
-    assert Starts(center).point and Starts(center).largest(row) == abs(sum(x * center[j] for j, x in row.items()))
+    assert InitialSet(center).point and InitialSet(center).largest(row) == abs(
+        sum(x * center[j] for j, x in row.items())
+    )
     radius = [abs(x) for x in rationals(rng, n)]
-    box = Starts(center, radius)
+    box = InitialSet(center, radius)
     corners = product(*([c - s, c + s] for c, s in zip(center, radius, strict=True)))
     assert not box.point
     assert box.largest(row) == max(abs(sum(x * y[j] for j, x in row.items())) for y in corners)
     axes = rationals(rng, int(rng.integers(1, 4)), n)
-    bound = float(Starts(center, axes=axes).largest(row))
+    bound = float(InitialSet(center, axes=axes).largest(row))
     middle, along = np.dot(r, np.array(center, float)), np.array(axes, float) @ np.array(r)
     assert bound == pytest.approx(abs(middle) + math.sqrt(along @ along), rel=1e-12)
     v = rng.normal(size=(300, len(axes)))
@@ -425,20 +427,20 @@ def test_no_start_of_a_set_has_a_larger_form_than_its_bound(seed: int):
     v = rng.normal(size=(300, 2))
     around = floats(center) + v / np.linalg.norm(v, axis=1, keepdims=True) @ floats(axes)
     corners = floats(center) + floats(radius) * floats(list(product([-1, 1], repeat=n)))
-    for starts, points in (
-        (Starts(center), floats([center])),
-        (Starts(center, [F(0)] * n), floats([center])),
-        (Starts(center, radius), corners),
-        (Starts([F(0)] * n, radius), corners - floats(center)),
-        (Starts(center, axes=axes), around),
+    for initial_set, points in (
+        (InitialSet(center), floats([center])),
+        (InitialSet(center, [F(0)] * n), floats([center])),
+        (InitialSet(center, radius), corners),
+        (InitialSet([F(0)] * n, radius), corners - floats(center)),
+        (InitialSet(center, axes=axes), around),
     ):
-        bounds = InputBounds(rows, PrescribedGain(F(1), F(1), F(3)), forms, [None] * 3, starts)
+        bounds = InputBounds(rows, PrescribedGain(F(1), F(1), F(3)), forms, [None] * 3, initial_set)
         for k, form in enumerate(forms):
             P = np.diag(floats(weights)) if form.diagonal is not None else floats(matrix)
             z = points @ A[k].T
             top = math.sqrt(np.einsum("ij,jk,ik->i", z, P, z).max())
             assert top <= float(bounds.start(k)) * (1 + 1e-12)
-            if starts.point:
+            if initial_set.point:
                 assert top == pytest.approx(float(bounds.start(k)), rel=1e-9)
 
 
@@ -451,7 +453,7 @@ def test_the_pair_whose_input_is_known():
     gain = PrescribedGain(F(1), F(1, 10**12), F(1))
     form = Form(F(4), "E", [0, 1], [F(1), F(1)], None, F(1))
     deviation = Form(F(4), "eps", [0, 1], [F(1), F(1)], None, F(1), [1, -1])
-    bounds = InputBounds(rows, gain, [form, deviation, None], [None] * 3, Starts([F(3), F(1)]))
+    bounds = InputBounds(rows, gain, [form, deviation, None], [None] * 3, InitialSet([F(3), F(1)]))
     assert bounds.held == [4, 4] and float(bounds.held_norm) == pytest.approx(math.sqrt(32))
     assert float(bounds.start(0)) == pytest.approx(math.sqrt(32))
     assert float(bounds.start(1)) == pytest.approx(math.sqrt(8))  # deviations 2, -2 ... of x from the common one
@@ -464,7 +466,7 @@ def test_the_pair_whose_input_is_known():
         assert float(bounds.bound(length_above, None, k, F(0))) == pytest.approx(math.sqrt(32) / 2, rel=1e-9)
     with pytest.raises(ValueError, match="single agents"):
         bounds.bound(peak_above, 0, 2, F(0))
-    within = InputBounds(rows, gain, [form], [None], Starts([F(0), F(0)], [F(3), F(3)]))
+    within = InputBounds(rows, gain, [form], [None], InitialSet([F(0), F(0)], [F(3), F(3)]))
     assert within.held == [6, 6]
     assert [float(x) for x in bounds.disturbed(0, F(1))] == pytest.approx([math.sqrt(8)] * 2, rel=1e-9)
     with pytest.raises(ValueError, match="without limit"):
@@ -475,10 +477,10 @@ def test_sliding_variables_move_until_the_instant_is_quiet():
     rows = [{}, {0: F(-2), 1: F(2)}]
     gain = PrescribedGain(F(2), F(1), F(1))
     form = Form(F(4), "E", [1], [F(1)], None, F(1))
-    starts = Starts([F(5), F(1)])
-    still = InputBounds(rows, gain, [form], [None], starts)
+    initial_set = InitialSet([F(5), F(1)])
+    still = InputBounds(rows, gain, [form], [None], initial_set)
     moving = Reaching([F(0), F(3)], F(1), F(1), F(1, 2), F(1), F(2))
-    moved = InputBounds(rows, gain, [form], [None], starts, moving)
+    moved = InputBounds(rows, gain, [form], [None], initial_set, moving)
     assert still.quiet == 0 and float(moved.quiet) == pytest.approx(math.log(2))
     assert still.held == [0, 8]
     # |e| grows by 2 |sigma(0)| = 6 and 2 (mu1 + delta) T_r = 4 at most, |x| by 3 and 2
@@ -511,7 +513,7 @@ def test_no_sliding_variable_moves_the_error_further(seed: int):
     mu2, power, push = log_uniform(rng, 0.1, 5), F(int(rng.integers(1, 5)), 2), log_uniform(rng, 0.1, 5)
     reaching = Reaching(sigma0, 2 - T_s, T_s, mu2, power, push)
     constants = [F(float(x)) * F(1001, 1000) for x in np.diag(np.linalg.inv(P))]
-    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], Starts(x0), reaching)
+    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], InitialSet(x0), reaching)
     z = bounds.quiet
     peak, energy, length = (float(bounds.bound(of, None, 0, z)) for of in (peak_above, energy_above, length_above))
     agents, held = [float(bounds.bound(peak_above, v, 0, z)) for v in range(n)], floats(bounds.held)
@@ -553,7 +555,7 @@ def test_no_disturbance_adds_more_to_the_input(seed: int):
     form = Form(rate, "E", range(n), None, [[F(float(x)) for x in row] for row in P], F(float(lowest)))
     constants = [F(float(x)) * F(1001, 1000) for x in np.diag(np.linalg.inv(P))]
     gain = PrescribedGain(F(1), F(1, 10), 2 / rate * F(int(rng.integers(11, 40)), 10))
-    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], Starts([F(0)] * n))
+    bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], InitialSet([F(0)] * n))
     most = floats(bounds.disturbed(0, F(1, 2)))
     true = Decay(gain, F(1), F(1), rate)
     for d in (0.5 * np.sign(L[0]), 0.5 * np.ones(n), 0.5 * rng.choice([-1, 1], n)):

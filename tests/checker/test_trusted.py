@@ -20,7 +20,7 @@ from ptcc_certify.examples import load_graph, select
 ROOT = Path(ptcc_certify.__file__).parents[1]
 LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()
 ALL = [line for line in LISTED if not line.startswith("#")]
-TWINS = [line for line in ALL if line.endswith("/fast.py")]
+TWINS = [line for line in ALL if line.endswith(("/fast.py", "/array_digraph.py"))]
 PLAIN = [line for line in ALL if line not in TWINS]
 MODULES = [line for line in PLAIN if line.endswith(".py")]
 
@@ -45,14 +45,14 @@ STANDARD = {
 EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
 #: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
 FLOATS = {
-    ("lmi/exact/rounding.py", "float_up"): "the float next to a number",
-    ("lmi/exact/rounding.py", "_written"): "prints a number; the digits come from a Decimal",
+    ("lmi/exact/directed_rounding.py", "float_up"): "the float next to a number",
+    ("lmi/exact/directed_rounding.py", "_written"): "prints a number; the digits come from a Decimal",
     ("ptcc_certify/checker/__init__.py", "main"): "GB that are allowed",
     ("ptcc_certify/checker/__init__.py", "read_and_check"): "tells the GB that were needed",
     ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",
     ("ptcc_certify/checker/reading.py", "number"): "JSON numbers of `unverified`, which nothing reads",
-    ("ptcc_certify/checker/vectors.py", "column"): "side files of floats: finite",
-    ("ptcc_certify/checker/vectors.py", "numbers"): "side files of floats: each as the dyadic rational that it is",
+    ("ptcc_certify/checker/side_vectors.py", "column"): "side files of floats: finite",
+    ("ptcc_certify/checker/side_vectors.py", "numbers"): "side files of floats: each as the dyadic rational that it is",
 }
 
 
@@ -100,7 +100,7 @@ def test_the_list_is_what_the_checker_imports():
 
 
 def test_each_file_of_the_list_is_there_once():
-    assert TWINS == ["lmi/exact/fast.py", "ptcc_certify/checker/fast.py"] and ALL[-2:] == TWINS
+    assert TWINS == ["lmi/exact/fast.py", "ptcc_certify/checker/array_digraph.py"] and ALL[-2:] == TWINS
     assert len(set(ALL)) == len(ALL) and all((ROOT / name).is_file() for name in ALL)
 
 
@@ -203,7 +203,16 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
         command = [sys.executable, "-I", "-S", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {program}"]
         return subprocess.run([*command, *words], capture_output=True, text=True, cwd=tmp_path, env=dict(os.environ))
 
-    for name in ("numpy", "scipy", "casadi", "cvxpy", "clarabel", "flint", "ptcc_certify.errors", "lmi.witness"):
+    for name in (
+        "numpy",
+        "scipy",
+        "casadi",
+        "cvxpy",
+        "clarabel",
+        "flint",
+        "ptcc_certify.errors",
+        "lmi.definiteness_proofs",
+    ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
     check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
     for text in examples():

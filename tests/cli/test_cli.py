@@ -196,14 +196,14 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
 @pytest.mark.parametrize("method", ["paper", "perron", "lmi", "full", "best"])
 def test_the_method_decides_which_classes_are_searched(method: str):
     data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
-    classes = [member["class"] for member in data["lyapunov"]["members"]]
+    classes = [function["class"] for function in data["lyapunov"]["functions"]]
     wanted = {"paper": {"paper"}, "best": {"paper", "lmi", "full"}}.get(method, {"paper", method})
     assert classes[0] == "paper" and set(classes) == wanted
     assert set(data["unverified"]["search"]["tried"]) == (
         {"perron", "lmi", "full"} if method == "best" else wanted - {"paper"}
     )
     screen = ptcc("certify", "fig3a", "--method", method, "--x0", X0).out
-    assert ("tried" in screen) == ("taken" in screen) == (method != "paper")
+    assert ("searched" in screen) == ("used" in screen) == (method != "paper")
     assert len(screen.splitlines()) <= 24
 
 
@@ -346,11 +346,11 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
     assert run.code == 1
     assert run.out.splitlines()[-1].startswith("rejected   graph: another graph than fig5a: ")
     data = read("c.json")
-    data["rates"]["certified"] = "1000"
+    data["rates"]["proved"] = "1000"
     Path("false.json").write_text(json.dumps(data))
     run = ptcc("check", "false.json")
     assert run.code == 1
-    assert run.out.splitlines()[-1] == "rejected   rates: the rate certified is not the proved one"
+    assert run.out.splitlines()[-1] == "rejected   rates: rates.proved is not what was proved"
     assert ptcc("check", "false.json", "--json").code == 1
     Path("ring.csv").write_text("".join(f"{i},{(i + 1) % 130},1\n" for i in range(130)))
     assert ptcc("certify", "ring.csv", "--method", "full", "-o", "ring.json").code == 4
@@ -364,7 +364,7 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
 def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
     """fig1b: the bound by its slowest mode, below that by its mean eigenvalue; below it, doubt."""
     data = one_object(ptcc("certify", "fig1b", "--json").out)
-    proved, limit = Fraction(data["rates"]["certified"]), Fraction(data["rates"]["limit"])
+    proved, limit = Fraction(data["rates"]["proved"]), Fraction(data["rates"]["upper_bound"])
     mean = 2 * sum(abs(Fraction(w)) for _, _, w in data["graph"]["edges"]) / 5  # trace(L) over 5 nonzero eigenvalues
     hair = Fraction(1, 10**6)
     assert proved + hair < limit < mean
@@ -373,14 +373,14 @@ def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
         assert run.code == code
         verdict = run.out.splitlines()[-1].removeprefix("verdict    ")
         assert verdict.startswith({0: "certified; ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
-        bound = re.search(r"none exceeds ([0-9.]+), proved|at most ([0-9.]+) can be|met: rate", verdict)
+        bound = re.search(r"upper bound ([0-9.]+), proved|at most ([0-9.]+) can be|met: rate", verdict)
         assert bound is not None and (code == 0 or Fraction(bound[1] or bound[2]) >= limit)
 
 
 def test_of_one_mode_the_mean_eigenvalue_is_the_limit():
     """Two agents: 8 is twice the only nonzero eigenvalue."""
     name = save("pair.csv", [(1, 2, -1), (2, 1, -3)])
-    assert one_object(ptcc("certify", name, "--json").out)["rates"]["limit"] == "8"
+    assert one_object(ptcc("certify", name, "--json").out)["rates"]["upper_bound"] == "8"
     assert ptcc("certify", name, "--min-rate", "8").code == 4
     assert ptcc("certify", name, "--min-rate", "8.000000000001").code == 3
 
@@ -520,11 +520,11 @@ def test_starts_in_every_form(form: str):
 
 
 def test_a_random_start_depends_on_the_seed_alone():
-    starts = [
+    initial_set = [
         one_object(ptcc("certify", "fig1b", "--json", "--seed", seed).out)["initial_state"] for seed in ("0", "0", "7")
     ]
-    assert starts[0] == starts[1] != starts[2]
-    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in starts[2].values())
+    assert initial_set[0] == initial_set[1] != initial_set[2]
+    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in initial_set[2].values())
 
 
 def test_edges_are_read_the_way_that_is_asked_and_it_is_said():
@@ -621,7 +621,7 @@ def test_the_screen_of_certify_fits_24_lines(name: str):
         lines = run.out.splitlines()
         assert len(lines) <= 24
         heads = {line.split(maxsplit=1)[0] for line in lines}
-        expected = {"graph", "read", "structure", "claim", "protocol", "start", "ends", "rate", "left", "proof"}
+        expected = {"graph", "read", "structure", "claim", "protocol", "x(0)", "x(T)", "rate", "error", "proof"}
         assert expected | {"simulated", "verdict"} <= heads
         assert "Theorem" in run.out
 
@@ -666,7 +666,7 @@ def test_simulate_prints_csv_up_to_the_deadline_and_past_it():
     assert remaining[remaining > 0].min() == pytest.approx(1e-8)
     assert len(rows) >= 50
     assert states[0].tolist() == [float(x) for x in X0.split(",")]
-    final = one_object(ptcc("certify", "fig1b", "--T", "0.6", "--x0", X0, "--json").out)["outcome"]["final_state"]
+    final = one_object(ptcc("certify", "fig1b", "--T", "0.6", "--x0", X0, "--json").out)["final_state"]
     settled = states[remaining == 0]
     assert np.abs(settled - [float(Fraction(final[k])) for k in "123456"]).max() < 1e-8
 
@@ -782,7 +782,7 @@ def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
 
 def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     run = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "1/1000", "--delta", "0.1")
-    assert run.code == 0 and "held for 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
+    assert run.code == 0 and "zero-order hold 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
     coarse = ptcc("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "0.5")
     assert "not certified with this period; with 0.00" in coarse.out and coarse.code == 4
     assert "verdict    left open: limits (certified with a period of 0.00" in coarse.out
@@ -825,7 +825,7 @@ def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
         assert again.code == 0, (asked, command, again.err)
         proved = one_object(again.out)
         assert proved["protocol"] == {k: found["protocol"][k] for k in proved["protocol"]}
-        effort = proved["effort"]
+        effort = proved["input"]
         if found["gain_cap"] is None:
             agents = max(map(Fraction, effort["peak"]["agents"].values()))
             peak = Fraction(effort["peak"]["norm"]) if found["input_norm"] else agents
@@ -894,7 +894,7 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
         data = read(f"new/results/{graph}.json")
         assert data["claim"]["theorem"] == match[3]
         assert data["claim"]["behaviour"] == behaviour
-        assert rate <= Fraction(data["rates"]["certified"]) < rate + 1e-4
+        assert rate <= Fraction(data["rates"]["proved"]) < rate + 1e-4
     table = list(csv.DictReader(Path("new/results/examples.csv").read_text().splitlines()))
     assert [(row["example"], row["graph"], row["claim"]) for row in table] == reported
     assert {row["verdict"] for row in table} == {"certified"}

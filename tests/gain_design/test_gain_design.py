@@ -12,8 +12,8 @@ from scipy.linalg import expm
 
 from ptcc_certify import gain_design
 from ptcc_certify.bounds.final_state import influence
-from ptcc_certify.bounds.input import Starts, box, ellipsoid
-from ptcc_certify.bounds.input.search import usable_members
+from ptcc_certify.bounds.input import InitialSet, box, ellipsoid
+from ptcc_certify.bounds.input.tightest_bound import usable_functions
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
@@ -21,7 +21,7 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bo
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -44,8 +44,8 @@ def designed(name, U, R, **asked):
 
 
 @functools.cache
-def certified(graph, protocol, x0, starts):
-    options = {"x0": x0} if starts is None else {"starts": Starts(*starts)}
+def certified(graph, protocol, x0, initial_set):
+    options = {"x0": x0} if initial_set is None else {"initial_set": InitialSet(*initial_set)}
     return certify(graph, protocol, **options, simulation=False)
 
 
@@ -53,11 +53,11 @@ def certified(graph, protocol, x0, starts):
 def _certify_once(monkeypatch):
     """Lyapunov functions are searched once for all designs on a graph with the same starts."""
 
-    def again(graph, protocol, x0=None, starts=None, simulation=None, limits=()):
-        if starts is not None:
-            starts = tuple(map(tuple, (starts.center, starts.radius, starts.axes)))
+    def again(graph, protocol, x0=None, initial_set=None, simulation=None, limits=()):
+        if initial_set is not None:
+            initial_set = tuple(map(tuple, (initial_set.center, initial_set.radius, initial_set.axes)))
         first = gain_design._first_protocol(analyse(graph))
-        return certified(graph, first, x0, starts).changed(protocol=protocol, limits=tuple(limits))
+        return certified(graph, first, x0, initial_set).changed(protocol=protocol, limits=tuple(limits))
 
     monkeypatch.setattr(gain_design, "certify", again)
 
@@ -75,18 +75,18 @@ def assert_holds_in_simulations(graph, found, R):
     """From the worst start and 20 random vertices."""
     rng = np.random.default_rng(3)
     center, radius = (
-        np.array([float(x) for x in part]) for part in (found.asked.starts.center, found.asked.starts.radius)
+        np.array([float(x) for x in part]) for part in (found.asked.initial_set.center, found.asked.initial_set.radius)
     )
     vertices = center[:, None] + rng.choice([-1.0, 1.0], (graph.n_nodes, 20)) * radius[:, None]
-    starts = np.column_stack([found.worst.x0, vertices])
+    initial_set = np.column_stack([found.worst.x0, vertices])
     cap = None if found.limits is None else Actuator(gain_cap=found.limits.gain_cap)
-    run = simulate(graph, found.protocol, starts, actuator=cap, past=0)
+    run = simulate(graph, found.protocol, initial_set, actuator=cap, past=0)
     before = np.abs(run.input[..., run.t < float(found.deadline)])
     largest = np.linalg.norm(before, axis=0).max() if found.asked.input_norm == 2 else before.max()
     assert largest <= float(found.peak) * (1 + 1e-8)
     assert found.peak <= found.asked.max_input
     assert found.worst.size <= float(found.peak) * (1 + 1e-9)
-    left = np.abs(run.final_state - influence_matrix(graph) @ starts).max()
+    left = np.abs(run.final_state - influence_matrix(graph) @ initial_set).max()
     assert left <= float(found.residual) + 1e-6 * float(R)
 
 
@@ -219,7 +219,7 @@ def test_starts_without_inner_points_give_no_bound_by_the_spectrum():
 
 
 def test_a_point_a_box_and_an_ellipsoid():
-    point = design(TRIO, max_input=10, initial_bound=Starts((Fraction(1), Fraction(2), Fraction(-1))))
+    point = design(TRIO, max_input=10, initial_bound=InitialSet((Fraction(1), Fraction(2), Fraction(-1))))
     whole = design(TRIO, max_input=10, initial_bound=2)
     inside = design(TRIO, max_input=10, initial_bound=ellipsoid([0, 0, 0], [[2, 0, 0], [0, 2, 0], [0, 0, 2]]))
     moved = design(TRIO, max_input=10, initial_bound=box([0, 0, 0], [2, 2, 2]))
@@ -236,7 +236,7 @@ def test_who_does_not_move_takes_any_gains():
         found = design(alone, max_input=1, initial_bound=1, **asked)
         assert found.verdict == MET and found.peak == 0 and found.certificate.verdict == "certified"
         assert found.lines() and repr(found)
-    settled = design(PAIR, max_input=1, initial_bound=Starts((Fraction(2), Fraction(-2))))
+    settled = design(PAIR, max_input=1, initial_bound=InitialSet((Fraction(2), Fraction(-2))))
     assert settled.verdict == MET and settled.peak == 0
 
 
@@ -261,9 +261,9 @@ def test_units_of_weights_and_states_do_not_matter(factor):
     [
         ({"max_input": 0}, "max_input"),
         ({"max_input": "x"}, "max_input"),
-        ({"initial_bound": -1}, "bound of starts"),
-        ({"initial_bound": math.inf}, "bound of starts"),
-        ({"initial_bound": Starts((Fraction(1),))}, "1 values for 3 agents"),
+        ({"initial_bound": -1}, "bound of initial states"),
+        ({"initial_bound": math.inf}, "bound of initial states"),
+        ({"initial_bound": InitialSet((Fraction(1),))}, "1 values for 3 agents"),
         ({"initial_bound": box([0], [1])}, "1 entries for 3 agents"),
         ({"deadline": "-1"}, "deadline"),
         ({"deadline": math.nan}, "deadline"),
@@ -349,10 +349,10 @@ def test_the_bound_scales_with_one_over_the_deadline(name):
 def test_random_gains_are_not_certified_with_a_smaller_peak(name):
     found = designed(name, 10, 1)
     cert = found.certificate
-    bounds = _bounds(cert, cert.starts)
-    members = usable_members(bounds)
+    bounds = _bounds(cert, cert.initial_set)
+    functions = usable_functions(bounds)
     rng = np.random.default_rng(5)
-    least = 2 / max(bounds.form(i).rate for i in members)
+    least = 2 / max(bounds.form(i).rate for i in functions)
     for _ in range(12):
         a, k = (least * Fraction(float(x)) for x in np.exp([rng.uniform(-3, 2), rng.uniform(0, 1.5)]))
         fit = _at(cert, Option(a, k, None, Fraction(1)), Fraction(1), found.asked)

@@ -13,10 +13,10 @@ from scipy import sparse
 from test_lmi import random_h_matrix, random_m_matrix
 
 from lmi import closed_form
-from lmi.certificate import DiagonalCertificate, diagonal_rate
 from lmi.closed_form import h_matrix_certificate, m_matrix_certificate, perron_certificate
+from lmi.definiteness_proofs import prove_positive_definite
+from lmi.diagonal_certificate import DiagonalCertificate, diagonal_rate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
-from lmi.witness import prove_positive_definite
 
 SEEDS = st.integers(0, 2**32 - 1)
 

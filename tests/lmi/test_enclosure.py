@@ -10,7 +10,7 @@ from balls import ball
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lmi.exact import enclosure
+from lmi.exact import elementary_enclosures as enclosure
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import inverse_decay_integral
 

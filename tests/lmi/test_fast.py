@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import lmi
+from lmi.definiteness_proofs import _array_integers, dyadic_array
 from lmi.exact import fast
 from lmi.exact.definite import SparseFactor, eliminate, scaled
-from lmi.witness import _array_integers, dyadic_array
 
 
 def wide(rng: np.random.Generator, shape, bits: int) -> list:

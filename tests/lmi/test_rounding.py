@@ -15,7 +15,7 @@ from generators import all_classes, random_graph
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lmi.exact.rounding import down, float_down, float_up, near, up
+from lmi.exact.directed_rounding import down, float_down, float_up, near, up
 from ptcc_certify import Actuator, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
@@ -79,7 +79,7 @@ def made(k: int) -> Certificate:
         robust = SlidingModeProtocol(T_r=1, T_s=1, rho1="1/3", rho2="5/7", kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
         return certify(graph, robust, x0, sigma0=[x / 3 for x in x0], simulation=False)
     protocol = NominalProtocol(T="7/3", rho1="1/3", rho2=["1/7", "3/2", 9][k % 3], kappa=1)
-    more: dict[str, Any] = {"starts": "1/3"} if k % 5 == 1 else {}
+    more: dict[str, Any] = {"initial_set": "1/3"} if k % 5 == 1 else {}
     limits = [Actuator(gain_cap="100/3"), Actuator(stop_before="1/7")]
     return certify(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
 
@@ -105,19 +105,19 @@ def test_the_screen_rounds_to_the_safe_side(k: int):
     assert cert.upper_bound is not None and cert.effort is not None
     below(re.findall(rf"^rate +{NUMBER} per unit", text, re.M), cert.rate)
     below(re.findall(rf"rate {NUMBER}, ", repr(cert)), cert.rate)
-    above(re.findall(rf"none exceeds {NUMBER}, proved", text), cert.upper_bound)
+    above(re.findall(rf"upper bound {NUMBER}, proved", text), cert.upper_bound)
     below(
         re.findall(rf"optimality ratio at least {NUMBER}$", text.replace(" (", "\n("), re.M),
         cert.rate / cert.upper_bound,
     )
     if cert.proof.rate is not None and cert.lyapunov is not None:
         below(re.findall(rf"paper {NUMBER} =", text), cert.proof.rate)
-        above(re.findall(rf"\^2 prefactor {NUMBER}", text), cert.lyapunov.prefactor)
-    taken = re.findall(rf"(?:full|lmi|perron) {NUMBER} \(prefactor {NUMBER}\)", text)
-    assert len(taken) == len(cert.sharpening.members)
-    for (rate, factor), member in zip(taken, cert.sharpening.members, strict=True):
-        below([rate], member.rate)
-        above([factor], member.prefactor)
+        above(re.findall(rf"overshoot constant {NUMBER} of", text), cert.lyapunov.overshoot)
+    taken = re.findall(rf"(?:full|lmi|perron) {NUMBER} \(overshoot {NUMBER}\)", text)
+    assert len(taken) == len(cert.search.functions)
+    for (rate, factor), function in zip(taken, cert.search.functions, strict=True):
+        below([rate], function.rate)
+        above([factor], function.overshoot)
     effort = cert.effort
     lower = re.findall(rf"min Re lambda >= {NUMBER}", text)
     assert not lower or effort.threshold[0] is None or Fraction(lower[0]) <= effort.threshold[0]
@@ -134,7 +134,7 @@ def test_the_screen_rounds_to_the_safe_side(k: int):
         above(re.findall(rf"\|\|E\|\| <= {NUMBER}", line), entry.norm)
         assert entry.largest is None or Fraction(re.findall(rf"\|u_k\| <= {NUMBER}", line)[0]) >= entry.largest
     if cert.direct:
-        left = re.findall(rf"{NUMBER} at (?:0\.|T\()", re.findall(r"^left .*$", text, re.M)[0])
+        left = re.findall(rf"{NUMBER} at (?:0\.|T\()", re.findall(r"^error .*$", text, re.M)[0])
         for said, q in zip(left, (0.5, 0.1, 0.01, 1e-6, 1e-9), strict=True):
             assert Fraction(said) >= Fraction(cert.envelope.residual(q))
     for r, said in zip(cert.reaching or (), map(repr, cert.reaching or ()), strict=True):
@@ -150,11 +150,11 @@ def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
     data = made(k).to_dict()
     report = check(data, stdlib=stdlib)
     assert report.accepted
-    members, effort, rates = data["lyapunov"]["members"], data["effort"], data["rates"]
+    functions, effort, rates = data["lyapunov"]["functions"], data["input"], data["rates"]
     for step, told in zip(report.steps, data["proof"], strict=True):
         said, numbers = step.detail, {key: Fraction(x) for key, x in told["numbers"].items()}
-        which = re.search(r"members\[(\d+)\]", step.of)
-        member = members[int(which[1])] if which else None
+        which = re.search(r"functions\[(\d+)\]", step.of)
+        function = functions[int(which[1])] if which else None
         if "b" in numbers:
             below(re.findall(rf"^b = {NUMBER}", said), numbers["b"])
         if "m" in numbers:
@@ -164,12 +164,12 @@ def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
         if step.kind == "rho-interval":
             for name in ("printed", "exact"):
                 below(re.findall(rf"{name} end {NUMBER}", said), numbers[name])
-        if step.kind == "prefactor" and member is not None:
-            above(re.findall(NUMBER, said), Fraction(member["prefactor"]))
-        if step.kind == "distance" and member is not None:
-            above(re.findall(NUMBER, said), Fraction(member["distance"]["norm"]))
-        if step.kind in ("rate-limit", "rate-mean"):
-            above(re.findall(NUMBER, said), Fraction(rates["limit"]))
+        if step.kind == "overshoot" and function is not None:
+            above(re.findall(NUMBER, said), Fraction(function["overshoot"]))
+        if step.kind == "deviation" and function is not None:
+            above(re.findall(NUMBER, said), Fraction(function["deviation"]["norm"]))
+        if step.kind in ("rate-upper-bound", "rate-mean"):
+            above(re.findall(NUMBER, said), Fraction(rates["upper_bound"]))
         for kind, key in (("input-energy", "energy"), ("input-length", "path_length")):
             if step.kind == kind:
                 above(re.findall(NUMBER, said), Fraction(effort[key]))
@@ -185,7 +185,7 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     cert = made(k)
     cert.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
-    if saved.rate is None or saved.effort is None or saved.upper_bound is None or saved.prefactor is None:
+    if saved.rate is None or saved.effort is None or saved.upper_bound is None or saved.overshoot is None:
         return
     below(re.findall(rf"rate {NUMBER}, ", repr(saved)), saved.rate)
     page = re.sub(r" \u00d7 10<sup>(.*?)</sup>", r"e\1", report_html(saved)).replace("\u2212", "-")
@@ -196,12 +196,12 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
         return re.findall(rf"{head}[^<]*</th><td[^>]*>[^0-9]*{NUMBER}", page)
 
     below(row("Proved rate"), saved.rate)
-    above(row("No rate exceeds"), saved.upper_bound)
+    above(row("Upper bound"), saved.upper_bound)
     below(row("Optimality ratio"), saved.rate / saved.upper_bound)
-    above(row("Prefactor"), saved.prefactor)
+    above(row("Overshoot constant"), saved.overshoot)
     above(re.findall(rf"Lyapunov function exceeds \${NUMBER}\$", text), saved.upper_bound)
     below(re.findall(rf"e\}}\^\{{-{NUMBER}\\,", text), saved.rate)
-    above(re.findall(rf"\^2 \\le {NUMBER}\\,", text), saved.prefactor)
+    above(re.findall(rf"\^2 \\le {NUMBER}\\,", text), saved.overshoot)
     if saved.effort.energy is not None:
         above(re.findall(rf"dt \u2264 {NUMBER}", page)[:1], saved.effort.energy.value)
     if saved.effort.peak is not None:

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.disturbance import (
-    Adversary,
     Disturbance,
     ExpressionDisturbance,
     SampledDisturbance,
     StateDependent,
+    WorstCaseDisturbance,
     as_disturbance,
     telegraph_noise,
 )
@@ -535,17 +535,17 @@ def test_absurd_telegraph_signals_are_refused(arguments, message):
 # ---------------------------------------------------------------------- adversary and state
 
 
-def test_the_adversary_pushes_away_from_sliding():
-    adversary = Adversary("0.25")
-    np.testing.assert_array_equal(adversary.values([0, 1], [0, 1, 2], [1, 0, -1]), [[0.25] * 2, [0] * 2, [-0.25] * 2])
-    a, b = adversary.linear(0, 1, [0, 1, 2], [1, 0, -1])
+def test_the_worst_case_pushes_away_from_sliding():
+    worst_case = WorstCaseDisturbance("0.25")
+    np.testing.assert_array_equal(worst_case.values([0, 1], [0, 1, 2], [1, 0, -1]), [[0.25] * 2, [0] * 2, [-0.25] * 2])
+    a, b = worst_case.linear(0, 1, [0, 1, 2], [1, 0, -1])
     np.testing.assert_array_equal([a, b], [[0.25, 0, -0.25], [0, 0, 0]])
-    assert adversary.check(Fraction(1, 4), LABELS, 1.0) == "by definition" and adversary.breaks(1.0).size == 0
+    assert worst_case.check(Fraction(1, 4), LABELS, 1.0) == "by definition" and worst_case.breaks(1.0).size == 0
     with pytest.raises(ParameterError, match=r"= 0\.25 of agent a from t = 0 on is beyond delta = 0\.2;"):
-        adversary.check(Fraction(1, 5), LABELS, 1.0)
+        worst_case.check(Fraction(1, 5), LABELS, 1.0)
     for nonsense in (-1, "x", math.nan, None):
         with pytest.raises(ParameterError, match=r"delta|number"):
-            Adversary(nonsense)
+            WorstCaseDisturbance(nonsense)
 
 
 def test_state_dependent_disturbances_are_checked_at_each_evaluation():
@@ -576,9 +576,9 @@ def test_disturbances_are_made_of_what_is_at_hand():
     def made(value, n=2):
         return as_disturbance(value, n, "0.1", 4.0, seed=3)
 
-    own = Adversary(1)
+    own = WorstCaseDisturbance(1)
     assert made(own) is own
-    assert isinstance(made("adversary"), Adversary) and made(" adversary ").delta == Fraction(1, 10)
+    assert isinstance(made("worst-case"), WorstCaseDisturbance) and made(" worst-case ").delta == Fraction(1, 10)
     assert made("none").text == "none" and not made("none").values([0, 1], [0, 1], [1, 1]).any()
     assert made("0.1*sin(t)").text == "0.1*sin(t)" and made(["t", "k"]).texts == ("t", "k")
     assert made(Fraction(1, 20)).text == "constant 0.05" and made(np.float64(0.05)).values([1], [1], [1]) == 0.05

@@ -135,7 +135,7 @@ def test_parameters_are_exact_and_frozen():
 def test_importing_the_modules_loads_neither_casadi_nor_scipy():
     code = (
         "import sys, ptcc_certify.protocols.gain, ptcc_certify.protocols.nominal, ptcc_certify.simulation.run;"
-        "import ptcc_certify.protocols.latex;"
+        "import ptcc_certify.protocols.casadi_latex;"
         "sys.exit(bool({'casadi', 'scipy', 'networkx', 'matplotlib'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.casadi_latex import symbol_latex, to_latex
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.latex import symbol_latex, to_latex
 
 TOKEN = re.compile(r"\s*(\\begin\{cases\}|\\end\{cases\}|\\\\|\\[a-zA-Z]+|[0-9.]+|.)")
 FUNCTIONS = {

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.protocols.disturbance import Adversary, SampledDisturbance, as_disturbance, telegraph_noise
+from ptcc_certify.protocols.disturbance import SampledDisturbance, WorstCaseDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import (
     ReachingProblem,
     ReachingTime,
@@ -318,13 +318,13 @@ def test_roots_under_jumping_disturbances_satisfy_their_equation(power, seed):
 
 @settings(max_examples=40)
 @given(protocols, st.floats(-6, 6), st.integers(0, 99))
-def test_the_adversary_attains_the_certified_instant_and_all_others_reach_earlier(p, exponent, seed):
+def test_the_worst_case_attains_the_certified_instant_and_all_others_reach_earlier(p, exponent, seed):
     rng = np.random.default_rng(seed)
     sigma0 = rng.choice([-1, 1], 4) * 10**exponent * rng.uniform(0.1, 1, 4)
     certain = np.array(
         [math.inf if r.z is None else float(r.z) for r in certified_reaching_times(p, list(map(F, sigma0)))]
     )
-    worst = ReachingProblem(p, sigma0, Adversary(p.delta)).z
+    worst = ReachingProblem(p, sigma0, WorstCaseDisturbance(p.delta)).z
     close = np.isclose(worst, certain, rtol=1e-11, atol=0)
     # Where mu3 kappa < 1 leaves hardly anything to spare, a float cannot place the root.
     assert close.all() or p.mu3 * p.kappa < 1
@@ -336,7 +336,7 @@ def test_the_adversary_attains_the_certified_instant_and_all_others_reach_earlie
         as_disturbance((size * np.sign(sigma0) * 0.999).tolist(), 4, p.delta, T_r),
         as_disturbance(f"{0.999 * size!r}*sin({30 / T_r!r}*k*t)", 4, p.delta, T_r),
         telegraph_noise(size, 15 / T_r, 4, T_r, seed),
-        Adversary(p.delta / 2),
+        WorstCaseDisturbance(p.delta / 2),
     ]
     for other in others:
         assert (ReachingProblem(p, sigma0, other).z <= worst * (1 + 1e-13)).all()
@@ -389,7 +389,7 @@ def test_sliding_variables_of_equal_size_under_equal_pushes_reach_together():
     for sigma0, d in (
         ([1.0, 1.0], "0.8*sin(9*t)"),
         ([1.0, -1.0], ["0.8*sin(9*t)", "-0.8*sin(9*t)"]),
-        ([1.0, -1.0], "adversary"),
+        ([1.0, -1.0], "worst-case"),
         ([-2.0, -2.0], 0.5),
     ):
         first, second = ReachingProblem(p, np.array(sigma0), as_disturbance(d, 2, 1, 1.0)).z.tolist()
@@ -427,9 +427,9 @@ def test_what_is_left_before_the_deadline_underflows_to_zero():
     assert float(found.z) == pytest.approx(run.reaching_z[1], rel=1e-11)
 
 
-def test_below_one_the_adversary_keeps_a_large_sliding_variable_until_the_deadline():
+def test_below_one_the_worst_case_keeps_a_large_sliding_variable_until_the_deadline():
     p = protocol(F(1, 2))
-    run = ReachingProblem(p, np.array([100.0, 0.5]), Adversary(1))
+    run = ReachingProblem(p, np.array([100.0, 0.5]), WorstCaseDisturbance(1))
     assert run.z[0] == math.inf
     z = np.array([1.0, 30, 60, 200, np.inf])
     values = run.sigma(z)[0]
@@ -473,7 +473,7 @@ def test_the_bound_holds_for_every_disturbance_vanishes_in_time_and_is_below_pro
 
 @pytest.mark.parametrize("size", [F(1, 1000), F(1), F(9), F(100)])
 @pytest.mark.parametrize("power", [F(1, 2), F(1), F(9, 5)])
-def test_no_bound_is_below_what_the_adversary_leaves_however_near_the_reaching_time(power, size):
+def test_no_bound_is_below_what_the_worst_case_leaves_however_near_the_reaching_time(power, size):
     p = protocol(power, mu2=F(3, 5), T_r=F(1, 2), mu1=F(6, 5))
     (reached,) = certified_reaching_times(p, [size])
     ends = [float(reached.z)] if reached.z is not None else [20.0]
@@ -490,7 +490,7 @@ def test_no_bound_is_below_what_the_adversary_leaves_however_near_the_reaching_t
 
 def test_the_bound_holds_along_simulated_runs():
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -2), (3, 1, 1), (3, 4, 1)])
-    for power, d in ((F(1, 2), "adversary"), (F(3, 2), "sin(20*k*t)"), (F(2), lambda t, x, sigma: np.cos(x))):
+    for power, d in ((F(1, 2), "worst-case"), (F(3, 2), "sin(20*k*t)"), (F(2), lambda t, x, sigma: np.cos(x))):
         p = protocol(power)
         sigma0 = [F(1), F(-2), F(0), F(1, 3)]
         run = simulate(graph, p, [5, 2, -4, 3], sigma0=sigma0, disturbance=d)

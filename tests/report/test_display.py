@@ -14,7 +14,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.limits import SHOWN_NODES
+from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate

@@ -16,7 +16,7 @@ from ptcc_certify.certificate import certificate as certificates
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
-from ptcc_certify.graphs.limits import CHECKED_NODES, EXPLORED_NODES
+from ptcc_certify.graphs.size_limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.report import explorer as module
 from ptcc_certify.report.explorer import (
     GIVEN,
@@ -92,24 +92,26 @@ def test_it_opens_with_a_certified_view(panel: Panel):
 @pytest.mark.parametrize(("name", "value"), [("T", 0.4), ("rho1", 0.8), ("rho2", 0.9), ("kappa", 2.0)])
 def test_gains_move_the_bound_and_leave_the_rate(panel: Panel, name: str, value: float):
     """Rates are per unit of the clock and belong to the graph; only the clock depends on the gains."""
-    before = panel.text, panel.image, panel.line("rate"), panel.line("left")
+    before = panel.text, panel.image, panel.line("rate"), panel.line("error")
     panel.set(name, value)
     assert panel.text != before[0]
     assert panel.image != before[1]
     assert panel.image.startswith(PNG)
     assert panel.line("rate") == before[2]
-    assert panel.line("left") != before[3]
+    assert panel.line("error") != before[3]
     assert f"at T = {panel.controls['T'].value:g} " in panel.line("claim")
 
 
-def test_the_start_decides_the_outcome(explorer: Explorer, panel: Panel):
+def test_the_start_decides_the_final_state(explorer: Explorer, panel: Panel):
     before = panel.image
     panel.set("start seed", 7)
     assert panel.image != before
     start = np.random.default_rng(7).integers(-9, 10, size=6).tolist()
-    outcome = ptcc.outcome(ptcc.analyse(load_graph("fig3a")), start)
-    ends = ", ".join(f"{label}={value:.5g}" for label, value in zip(outcome.labels, outcome.values, strict=True))
-    assert panel.line("ends at") == f"ends at    {ends} (exact)"
+    final_state = ptcc.final_state(ptcc.analyse(load_graph("fig3a")), start)
+    ends = ", ".join(
+        f"{label}={value:.5g}" for label, value in zip(final_state.labels, final_state.values, strict=True)
+    )
+    assert panel.line("x(T)") == f"x(T)       {ends} (exact)"
 
 
 def test_every_packaged_graph_is_there(panel: Panel):
@@ -146,11 +148,11 @@ def test_what_is_shown_is_what_certify_certifies(explorer: Explorer):
         load_graph("fig3a"), settings.protocol(), start, sigma0=sigma0, disturbance="1*sin(2*k*t)", method="paper"
     )
     shown = explorer.certificate(settings)
-    for part in ("rate", "prefactor", "start", "sigma0", "reaching", "claim", "verdict"):
+    for part in ("rate", "overshoot", "start", "sigma0", "reaching", "claim", "verdict"):
         assert getattr(shown, part) == getattr(whole, part), part
-    assert shown.outcome is not None
-    assert whole.outcome is not None
-    assert shown.outcome.final_state == whole.outcome.final_state
+    assert shown.final_state is not None
+    assert whole.final_state is not None
+    assert shown.final_state.states == whole.final_state.states
     assert shown.theorem.number == whole.theorem.number
     left = [0.5, 0.1, 0.01]
     assert shown.norm_bound(left).tolist() == whole.norm_bound(left).tolist()
@@ -205,7 +207,7 @@ MOVES = (
     ("disturbance", "sin", "sin(2*k*t)"),
     ("disturbance", "telegraph", "random telegraph signals"),
     ("sigma(0) random", False, "||E(t)|| / ||E(0)||"),
-    ("start seed", 5, "ends at"),
+    ("start seed", 5, "x(T)"),
     ("bounds", "paper", "rate       7.23"),
 )
 
@@ -231,11 +233,11 @@ def test_a_larger_margin_reaches_the_manifold_earlier(explorer: Explorer):
     assert len(set(times)) == len(times)
 
 
-def test_the_outcome_is_the_same_whatever_the_disturbance(explorer: Explorer):
+def test_the_final_state_is_the_same_whatever_the_disturbance(explorer: Explorer):
     panel, ends = Panel(explorer, SLIDING), set()
-    for disturbance in ("adversary", "none", "sin", "telegraph"):
+    for disturbance in ("worst-case", "none", "sin", "telegraph"):
         panel.controls["disturbance"].value = disturbance
-        ends.add(panel.line("ends at"))
+        ends.add(panel.line("x(T)"))
         assert "bound kept" in panel.line("simulated")
     assert len(ends) == 1
 

@@ -22,9 +22,9 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.limits import Actuator
+from ptcc_certify.protocols.gain_limits import Actuator
 from ptcc_certify.protocols.nominal import NominalProtocol
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import EDGE_STYLES, HALO, plot_graph
@@ -138,7 +138,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         assert height is None or np.abs(run.input).max() <= height * (1 + 1e-9)
         steps = {line.get_drawstyle() for line in ax.lines[:6]}
         assert steps == {"steps-post" if run.held_input is not None else "default"}
-    region = certify(graph, protocol, start, starts=5, simulation=False)
+    region = certify(graph, protocol, start, initial_set=5, simulation=False)
     run = simulate(graph, protocol, start)
     assert region.effort is not None and region.effort.peak is not None
     assert "certified peak" not in labelled(plot_input(run, region.structure, region))
@@ -288,20 +288,20 @@ def test_spectra_without_a_line() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])
-def test_frontiers_hold_every_proved_member(name: str) -> None:
+def test_frontiers_hold_every_proved_function(name: str) -> None:
     cert = certified(name)
     ax = drawn(plot_frontier(cert))
-    shown, members = labelled(ax), cert.envelope.members
-    assert {m.kind for m in members} == set(shown) & set(CLASS_MARKERS)
+    shown, functions = labelled(ax), cert.envelope.functions
+    assert {m.kind for m in functions} == set(shown) & set(CLASS_MARKERS)
     found = sorted((label, *point) for label in set(shown) & set(CLASS_MARKERS) for point in shown[label].get_xydata())  # type: ignore[attr-defined]
-    assert found == sorted((m.kind, m.prefactor_above, m.rate_below) for m in members)
+    assert found == sorted((m.kind, m.overshoot_above, m.rate_below) for m in functions)
     for label, rate in (
-        ("no rate exceeds (proved)", cert.upper_bound),
+        ("upper bound (proved)", cert.upper_bound),
         ("spectral rate (numerical)", cert.spectral_rate),
     ):
         assert rate is not None and shown[label].get_ydata()[0] == float(rate)  # type: ignore[attr-defined]
         assert ax.get_ylim()[0] <= rate < ax.get_ylim()[1]
-    assert ax.get_xscale() == "log" and max(m.rate for m in members) <= ax.get_ylim()[1]
+    assert ax.get_xscale() == "log" and max(m.rate for m in functions) <= ax.get_ylim()[1]
 
 
 def test_no_frontier_without_decay() -> None:
@@ -341,13 +341,13 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
     assert np.array_equal(bound.get_xdata(), place)  # type: ignore[attr-defined]
     height, size = bound.get_ydata(), seen.get_ydata()  # type: ignore[attr-defined]
     assert size[0] == 1 and (size <= height * (1 + 1e-9) + floor).all()
-    members = [line.get_ydata() for line in ax.lines if line.get_xdata() is not None and len(line.get_ydata()) > 2]
-    members = [y for y in members if y is not height and y is not size]
-    assert len(members) == len(cert.envelope.members) > 1
-    assert np.array_equal(height, np.minimum.reduce(members))
+    functions = [line.get_ydata() for line in ax.lines if line.get_xdata() is not None and len(line.get_ydata()) > 2]
+    functions = [y for y in functions if y is not height and y is not size]
+    assert len(functions) == len(cert.envelope.functions) > 1
+    assert np.array_equal(height, np.minimum.reduce(functions))
     if axis == "clock":  # straight lines: the slope is half the rate
-        for member, y in zip(cert.envelope.members, members, strict=True):
-            assert y == pytest.approx(y[0] * np.exp(-member.rate_below * place / 2), rel=1e-9)
+        for function, y in zip(cert.envelope.functions, functions, strict=True):
+            assert y == pytest.approx(y[0] * np.exp(-function.rate_below * place / 2), rel=1e-9)
 
 
 def test_the_decay_needs_a_run_and_a_known_axis() -> None:

@@ -179,14 +179,20 @@ def forged(folder: Path, **changes: Any) -> Path:
 
 
 def undecided(folder: Path) -> Path:
-    """Take the outcome out of a certificate: the decay is proved, where it ends is not stated."""
+    """Take the final state out of a certificate: the decay is proved, where it ends is not stated."""
     certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())
-    members = [{**m, "distance": None} for m in data["lyapunov"]["members"]]
-    proof = [s for s in data["proof"] if s["kind"] not in ("outcome", "distance")]
-    unverified = {"notes": ["<i>no outcome</i>", 7]}
+    functions = [{**m, "deviation": None} for m in data["lyapunov"]["functions"]]
+    proof = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
+    unverified = {"notes": ["<i>no final state</i>", 7]}
     return forged(
-        folder, outcome=None, verdict="undecided", proof=proof, lyapunov={"members": members}, unverified=unverified
+        folder,
+        influence=None,
+        final_state=None,
+        verdict="undecided",
+        proof=proof,
+        lyapunov={"functions": functions},
+        unverified=unverified,
     )
 
 
@@ -220,7 +226,7 @@ def hostile() -> Certificate:
 MADE = {
     "nominal": nominal,
     "limits": lambda: nominal(limits=[Actuator(gain_cap=50)], noise="1/100", delta="1/3"),
-    "starts": lambda: nominal(starts=5, limits=[Actuator(sample_period="1/1000", gain_cap=20)]),
+    "initial_set": lambda: nominal(initial_set=5, limits=[Actuator(sample_period="1/1000", gain_cap=20)]),
     "not bounded": lambda: certify(load_graph("fig5b"), NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1), [1] * 16),
     "no start": lambda: certify(load_graph("fig1a"), NOMINAL),
     "sliding": sliding_mode,
@@ -285,35 +291,41 @@ def test_numbers_are_rounded_to_the_safe_side(tmp_path: Path):
         assert made.rate is not None and made.limit is not None and made.effort is not None
         said = {row[0]: row[1] for row in rows(source, "Rates")}
         assert made.rate * Fraction(99999, 100000) <= number(said["Proved rate"]) <= made.rate
-        assert made.limit.value <= number(said["No rate exceeds"]) <= made.limit.value * Fraction(100001, 100000)
+        assert (
+            made.limit.value
+            <= number(said["Upper bound on the decay rate"])
+            <= made.limit.value * Fraction(100001, 100000)
+        )
         assert number(said["Optimality ratio"].removeprefix("at least ")) <= made.rate / made.limit.value
         bounds = {row[0]: row[1] for row in rows(source, "Proved bounds")}
         assert made.effort.peak is not None and made.effort.energy is not None
-        peak = next(value for key, value in bounds.items() if key.endswith("from this start")).partition("\u2264")[2]
+        peak = next(value for key, value in bounds.items() if key.endswith("from this initial state")).partition(
+            "\u2264"
+        )[2]
         assert made.effort.peak.largest <= number(peak) <= made.effort.peak.largest * Fraction(1001, 1000)
         energy = next(value for key, value in bounds.items() if key.startswith("Energy")).partition("\u2264")[2]
         assert made.effort.energy.value <= number(energy)
-        for instant, left, distance in rows(source, "Bounds, rounded up"):
+        for instant, left, deviation in rows(source, "Bounds, rounded up"):
             if instant == "Tr":
                 continue
             q = float(1 - number(instant))
             bound = made.envelope.residual(q) if made.direct else float(made.norm_bound([q])[0])
             assert Fraction(bound) <= number(left) <= Fraction(bound) * Fraction(12, 10)
-            assert float(made.outcome_distance([q]).max()) <= float(number(distance))
+            assert float(made.deviation_bound([q]).max()) <= float(number(deviation))
 
 
 def test_final_states_are_the_proved_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     made = example("nominal")
-    assert made.outcome is not None
+    assert made.final_state is not None
     said = rows(reported(made, tmp_path, simulation=False), "Where the agents end, proved exactly")
-    assert [Fraction(row[3]) for row in said] == list(made.outcome.final_state)
+    assert [Fraction(row[3]) for row in said] == list(made.final_state.states)
     assert [row[0] for row in said] == list(made.graph.labels)
     graph = sparse_digraph(np.random.default_rng(7), 150, 2.5)
     reported(certify(graph, NOMINAL, list(range(150)), simulation=False), tmp_path, simulation=False)
     saved = read_certificate(tmp_path / "c.json")
     said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals")
     assert saved.final_state is not None and len(said) == 150
-    for row, (middle, radius) in zip(said, saved.final_state, strict=True):
+    for row, (middle, radius) in zip(said, saved.final_state.intervals, strict=True):
         shown, _, wide = row[3].partition(" \u00b1 ")
         assert abs(Fraction(shown) - middle) + radius <= (number(wide) if wide else 0)
 
@@ -354,7 +366,7 @@ def test_without_a_run_the_page_says_why(tmp_path: Path):
     assert "it was left out (--no-simulation)" in page.text
     assert {a["id"] for a in page.named("figure")} == {"figure-graph"}
     page = sound(reported(certify(load_graph("fig1a"), NOMINAL), tmp_path))
-    assert "the certificate names no start" in page.text
+    assert "the certificate names no initial state" in page.text
 
 
 def test_what_a_certificate_does_not_say_is_said(tmp_path: Path):
@@ -367,8 +379,8 @@ def test_what_a_certificate_does_not_say_is_said(tmp_path: Path):
     assert "no disturbances in the model" in nominal and "without noise" in nominal
     assert "no disturbances in the model" not in limited and "without noise" not in limited
     assert "The input is not bounded" in unbounded and "The input is not bounded" not in nominal
-    assert "sampled and held" in nominal and "Sampling is certified with the periods" in caveats("starts")
-    assert "\u03b4 must be known" in caveats("sliding") and "No start was given" in caveats("no start")
+    assert "sampled and held" in nominal and "Sampling is certified with the periods" in caveats("initial_set")
+    assert "\u03b4 must be known" in caveats("sliding") and "No initial state was given" in caveats("no start")
     assert "article leaves disconnected graphs out" in caveats("disconnected")
 
 
@@ -411,13 +423,13 @@ def test_a_rejected_certificate_is_called_rejected_and_nothing_else(tmp_path: Pa
     made = example("nominal")
     made.save(tmp_path / "c.json")
     assert made.rate is not None and made.claim is not None
-    path = forged(tmp_path, rates={"certified": str(2 * made.rate)}, producer="<script>")
+    path = forged(tmp_path, rates={"proved": str(2 * made.rate)}, producer="<script>")
     done = ptcc("report", str(path), "-o", str(tmp_path / "c.html"))
     assert done.code == 1 and done.out.split() == ["rejected", str(tmp_path / "c.html")]
     page = sound_rejection((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert page.text.index("REJECTED") < 100 and "rates" in page.text
     for word in (made.claim.behaviour, "Theorem", "certified at", "CERTIFIED", "bounded"):
-        assert word.lower() not in page.text.lower().replace("the rate certified is not the proved one", "")
+        assert word.lower() not in page.text.lower().replace("rates.proved is not what was proved", "")
     done = ptcc("report", str(path), "-o", str(tmp_path / "c.tex"))
     assert done.code == 1 and not (tmp_path / "c.tex").exists() and len(done.err.splitlines()) == 1
     with pytest.raises(RejectedCertificate):
@@ -434,7 +446,7 @@ def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
     assert done.code == 4, done.err
     page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert "UNDECIDED" in page.text and "CERTIFIED" not in page.text
-    assert "no final state was proved" in page.text and "<i>no outcome</i>" in page.text
+    assert "no final state was proved" in page.text and "<i>no final state</i>" in page.text
     assert "not certified: Interval bipartite consensus" in page.text
     assert "".join(data for tag, data in page.pieces if tag == "h1").startswith("Undecided: ")
     text = report_latex(read_certificate(tmp_path / "c.json"))
@@ -444,10 +456,10 @@ def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
 def test_without_a_proved_rate_little_is_said(tmp_path: Path):
     example("nominal").save(tmp_path / "c.json")
     data = json.loads((tmp_path / "c.json").read_text())
-    nothing = dict.fromkeys(("paper", "diagonal", "certified", "limit"))
-    proof = [s for s in data["proof"] if s["kind"] in ("structure", "claim", "outcome")]
-    less = {"paper": None, "prefactor": None, "effort": None, "verdict": "undecided", "proof": proof}
-    path = forged(tmp_path, lyapunov={"members": []}, rates=nothing, **less)
+    nothing = dict.fromkeys(("paper", "diagonal", "proved", "upper_bound"))
+    proof = [s for s in data["proof"] if s["kind"] in ("structure", "claim", "final-state")]
+    less = {"paper": None, "overshoot": None, "input": None, "verdict": "undecided", "proof": proof}
+    path = forged(tmp_path, lyapunov={"functions": []}, rates=nothing, **less)
     assert write_report(path, tmp_path / "c.html") == write_report(path, tmp_path / "c.tex") == "undecided"
     page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert "no decay was proved" in page.text and "No rate of decay was proved" in page.text
@@ -474,8 +486,8 @@ def test_a_long_deadline_is_plain_in_the_title(tmp_path: Path):
 
 def test_numbers_beyond_floats_are_shown(tmp_path: Path):
     example("single").save(tmp_path / "c.json")
-    huge, influence = {"alone": "-1e350"}, json.loads((tmp_path / "c.json").read_text())["outcome"]["influence"]
-    path = forged(tmp_path, initial_state=huge, outcome={"final_state": huge, "influence": influence})
+    huge = {"alone": "-1e350"}
+    path = forged(tmp_path, initial_state=huge, final_state=huge)
     assert write_report(path, tmp_path / "c.html") == "certified"
     page = sound((tmp_path / "c.html").read_text(encoding="utf-8"))
     assert "beyond \u221210300" in page.text and "beyond the range of float64" in page.text
@@ -617,8 +629,8 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     assert "Proposition (certified)" in text and "Interval bipartite consensus occurs at $T$, by Theorem~2.1" in text
     assert NOMINAL.latex() in text and made.graph.sha256 in text and "$\\kappa = 1$" in text
     found = re.search(r"\\le ([0-9.]+)\\, \\mathrm\{e\}\^\{-([0-9.]+)\\, s\(t\)\}", text)
-    assert found is not None and made.rate is not None and made.prefactor is not None
-    assert Fraction(found[1]) >= made.prefactor and Fraction(found[2]) <= made.rate
+    assert found is not None and made.rate is not None and made.overshoot is not None
+    assert Fraction(found[1]) >= made.overshoot and Fraction(found[2]) <= made.rate
     assert r"\includegraphics[width=0.75\linewidth]{g.pdf}" in text and "{d.pdf}" in text
     assert text.count("\\begin{") == text.count("\\end{")
     assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text

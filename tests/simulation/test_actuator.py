@@ -18,7 +18,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.limits import Actuator, LimitedGain
+from ptcc_certify.protocols.gain_limits import Actuator, LimitedGain
 from ptcc_certify.simulation.limited import as_forcing
 from ptcc_certify.simulation.run import simulate
 
@@ -449,7 +449,7 @@ CAP, SAMPLED = Actuator(gain_cap=9), Actuator(sample_period="0.1")
         ({"disturbance": "2*t", "delta": 1}, "beyond delta"),
         ({"disturbance": "t", "delta": -1}, "delta = -1"),
         ({"disturbance": "t", "delta": float("nan")}, "delta"),
-        ({"disturbance": "adversary", "delta": 1}, "sliding variables"),
+        ({"disturbance": "worst-case", "delta": 1}, "sliding variables"),
         ({"disturbance": lambda t, x, s: x, "delta": 1}, "states"),
         ({"disturbance": ["0"] * 2, "delta": 1}, "2 disturbances for 3 agents"),
         ({"noise": "t", "actuator": CAP}, "noise_bound"),

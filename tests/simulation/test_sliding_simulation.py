@@ -14,7 +14,7 @@ from generators import all_classes, random_graph
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from ptcc_certify.bounds.final_state import outcome
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
@@ -41,10 +41,10 @@ def six():
     return SignedDigraph.from_edges(edges)
 
 
-def outcome_of(graph, x0, sigma0):
+def final_state_of(graph, x0, sigma0):
     """Q (x0 - sigma0), exactly, as floats."""
     start = [F(x) - F(s) for x, s in zip(x0, sigma0, strict=True)]
-    return np.array([float(x) for x in outcome(analyse(graph), start).final_state])
+    return np.array([float(x) for x in final_state(analyse(graph), start).states])
 
 
 def gains(p, t):
@@ -86,7 +86,7 @@ def implicit_euler(graph, p, x0, sigma0, d, steps, marks):
     return np.stack(kept, axis=-1)
 
 
-KINDS = ["sine", "constant", "telegraph", "samples", "adversary", "state"]
+KINDS = ["sine", "constant", "telegraph", "samples", "worst-case", "state"]
 
 
 def disturbances(kind, rng, n, p):
@@ -99,8 +99,8 @@ def disturbances(kind, rng, n, p):
     if kind == "constant":
         levels = rng.uniform(-delta, delta, n)
         return levels.tolist(), lambda t, x, sigma: levels
-    if kind == "adversary":
-        return "adversary", lambda t, x, sigma: delta * np.sign(sigma)
+    if kind == "worst-case":
+        return "worst-case", lambda t, x, sigma: delta * np.sign(sigma)
     if kind == "state":
 
         def function(t, x, sigma):
@@ -221,7 +221,7 @@ def between_events(graph, p, x0, sigma0, d, events, z_wanted):
     return out, left_over, state[:n]
 
 
-@pytest.mark.parametrize("kind", ["sine", "constant", "adversary", "state"])
+@pytest.mark.parametrize("kind", ["sine", "constant", "worst-case", "state"])
 @pytest.mark.parametrize("power", [F(1), F(3, 2), F(3)])
 def test_an_explicit_integration_between_the_reaching_times_agrees(kind, power):
     rng = np.random.default_rng([KINDS.index(kind), int(2 * power)])
@@ -254,12 +254,12 @@ def test_an_explicit_integration_between_the_reaching_times_agrees(kind, power):
 # ---------------------------------------------------------------------- the outcome
 
 
-def test_ten_disturbances_end_in_the_same_exact_outcome():
+def test_ten_disturbances_end_in_the_same_exact_final_state():
     graph, p = six(), protocol()
     levels = np.linspace(-1, 1, 25)
     rng = np.random.default_rng(0)
     ten = {
-        "adversary": "adversary",
+        "worst-case": "worst-case",
         "telegraph 1": telegraph_noise(1, 8, 6, 2.5, seed=1),
         "telegraph 2": telegraph_noise(1, 8, 6, 2.5, seed=2),
         "constant +": 0.9,
@@ -270,18 +270,18 @@ def test_ten_disturbances_end_in_the_same_exact_outcome():
         "samples": SampledDisturbance(np.linspace(0, 2.5, 25), rng.permuted(np.tile(levels, (6, 1)), axis=1)),
         "list": [f"sin({3 * k}*t)" if k % 2 else f"cos(k*t)*exp(-{k}*t)" for k in range(6)],
     }
-    expected = outcome_of(graph, X0, SIGMA0)
+    expected = final_state_of(graph, X0, SIGMA0)
     # sigma(0) matters: without it they would end elsewhere.
-    assert np.abs(expected - outcome_of(graph, X0, [0] * 6)).max() > 0.1
+    assert np.abs(expected - final_state_of(graph, X0, [0] * 6)).max() > 0.1
     ends, early = [], []
     for d in ten.values():
         run = simulate(graph, p, X0, sigma0=SIGMA0, disturbance=d)
         assert run.deadline_resolved
         ends.append(run.final_state)
         early.append(simulate(graph, p, X0, sigma0=SIGMA0, disturbance=d, times=["0.2"]).states[:, 0])
-    spread, distance = np.ptp(ends, axis=0).max(), np.abs(np.array(ends) - expected).max()
-    print(f"\nten disturbances: spread of the end states {spread:.1e}, from the exact outcome {distance:.1e}")
-    assert max(spread, distance) < 1e-8
+    spread, deviation = np.ptp(ends, axis=0).max(), np.abs(np.array(ends) - expected).max()
+    print(f"\nten disturbances: spread of the end states {spread:.1e}, from the exact outcome {deviation:.1e}")
+    assert max(spread, deviation) < 1e-8
     assert np.ptp(early, axis=0).max() > 0.1  # on the way they are apart
 
 
@@ -290,7 +290,7 @@ def test_ten_disturbances_end_in_the_same_exact_outcome():
 
 def test_a_sliding_variable_that_starts_at_zero_stays_there():
     sigma0 = [0, 1, 0, -2, 0, 0.5]
-    for d in ("adversary", "sin(7*k*t)", lambda t, x, sigma: np.cos(x)):
+    for d in ("worst-case", "sin(7*k*t)", lambda t, x, sigma: np.cos(x)):
         run = simulate(six(), protocol(), X0, sigma0=sigma0, disturbance=d)
         np.testing.assert_array_equal(run.reaching_z[[0, 2, 4]], 0)
         np.testing.assert_array_equal(run.reaching_times[[0, 2, 4]], 0)
@@ -314,7 +314,7 @@ def test_two_agents_may_reach_at_the_same_time():
     sigma0 = [1, -1, 0.5, 1, 0, -0.5]
     run = simulate(six(), protocol(), X0, sigma0=sigma0)
     assert run.reaching_z[0] == run.reaching_z[1] == run.reaching_z[3] > run.reaching_z[2] == run.reaching_z[5]
-    assert np.abs(run.final_state - outcome_of(six(), X0, sigma0)).max() < 1e-9
+    assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-9
     together = simulate(six(), protocol(), X0, sigma0=sigma0, disturbance=lambda t, x, sigma: np.sign(sigma))
     np.testing.assert_allclose(together.reaching_z, run.reaching_z, rtol=1e-8)
 
@@ -327,11 +327,11 @@ def test_an_agent_that_reaches_closer_to_the_deadline_than_a_float_tells_ends_ri
     assert run.reaching_times[2] == 1
     np.testing.assert_array_equal(run.sigma[:, run.t >= 1], 0)
     assert (run.sigma[2, (run.reaching_remaining > 0) & (run.t < 1)] > 0).all()
-    assert np.abs(run.final_state - outcome_of(six(), X0, sigma0)).max() < 1e-8 * 1e5
+    assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-8 * 1e5
 
 
-def test_without_disturbances_and_with_a_gain_just_above_delta_the_outcome_is_the_same():
-    expected = outcome_of(six(), X0, SIGMA0)
+def test_without_disturbances_and_with_a_gain_just_above_delta_the_final_state_is_the_same():
+    expected = final_state_of(six(), X0, SIGMA0)
     for p in (protocol(delta=0), protocol(mu1=1 + F(1, 10**12))):
         run = simulate(six(), p, X0, sigma0=SIGMA0)
         assert np.abs(run.final_state - expected).max() < 1e-9
@@ -346,7 +346,7 @@ def test_a_single_leader_ends_where_it_started_less_its_sliding_variable():
     run = simulate(star, protocol(), x0, sigma0=sigma0, disturbance="sin(5*k*t)")
     lead = star.labels.index("lead")
     assert run.final_state[lead] == pytest.approx(x0[lead] - sigma0[lead], abs=1e-9)
-    assert np.abs(run.final_state - outcome_of(star, x0, sigma0)).max() < 1e-9
+    assert np.abs(run.final_state - final_state_of(star, x0, sigma0)).max() < 1e-9
     # While its sliding variable lasts nobody but the disturbance and its own input moves it.
     np.testing.assert_allclose(run.states[lead] - run.sigma[lead], x0[lead] - sigma0[lead], atol=1e-12)
 
@@ -357,12 +357,12 @@ def test_several_single_leaders_end_apart_and_their_follower_between():
     order = [graph.labels.index(label) for label in ("one", "two", "three", "f")]
     start, sliding = np.zeros(4), np.zeros(4)
     start[order], sliding[order] = x0, sigma0
-    for d in ("adversary", "cos(9*k*t)", lambda t, x, sigma: np.sin(3 * x)):
+    for d in ("worst-case", "cos(9*k*t)", lambda t, x, sigma: np.sin(3 * x)):
         run = simulate(graph, protocol(), start, sigma0=sliding, disturbance=d)
         np.testing.assert_allclose(run.final_state[order], [3, -1, 1, (3 - 3 - 4) / 8], atol=1e-9)
 
 
-@pytest.mark.parametrize("d", ["adversary", "sin(5*t)", lambda t, x, sigma: np.cos(x)])
+@pytest.mark.parametrize("d", ["worst-case", "sin(5*t)", lambda t, x, sigma: np.cos(x)])
 def test_isolated_agents_lose_their_sliding_variables_only(d):
     apart = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1), ("c", "d", 2)], ["lone"])
     order = [apart.labels.index(label) for label in ("lone", "a", "b", "c", "d")]
@@ -377,7 +377,7 @@ def test_isolated_agents_lose_their_sliding_variables_only(d):
         assert alone.reaching_z[0] == pytest.approx(run.reaching_z[order[0]], rel=1e-14)
 
 
-def test_below_one_the_adversary_is_beaten_at_the_deadline_only_and_the_end_is_still_right():
+def test_below_one_the_worst_case_is_beaten_at_the_deadline_only_and_the_end_is_still_right():
     p, sigma0 = protocol(F(1, 2)), [100.0, -0.5, 0.25, -200.0, 0.75, 1.5]
     run = simulate(six(), p, X0, sigma0=sigma0)
     np.testing.assert_array_equal(np.isinf(run.reaching_z), [True, False, False, True, False, False])
@@ -386,7 +386,7 @@ def test_below_one_the_adversary_is_beaten_at_the_deadline_only_and_the_end_is_s
     at = int(np.flatnonzero(run.t == 1)[0])
     np.testing.assert_array_equal(run.sigma[:, at:], 0)
     assert (np.abs(run.sigma[[0, 3], :at]) > 0).all()
-    assert np.abs(run.final_state - outcome_of(six(), X0, sigma0)).max() < 1e-9 * 200
+    assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-9 * 200
     # As sqrt(T_r - t) at last: so continuous, although never 0 before.
     last = np.abs(run.sigma[[0, 3], at - 1]) / np.sqrt(run.reaching_remaining[at - 1])
     earlier = np.abs(run.sigma[[0, 3], at - 30]) / np.sqrt(run.reaching_remaining[at - 30])
@@ -397,7 +397,7 @@ def test_below_one_the_adversary_is_beaten_at_the_deadline_only_and_the_end_is_s
 
 
 @pytest.mark.parametrize(
-    "d", ["adversary", "sin(40*k*t)", telegraph_noise(1, 30, 6, 3.0, seed=5), lambda t, x, sigma: np.sin(x)]
+    "d", ["worst-case", "sin(40*k*t)", telegraph_noise(1, 30, 6, 3.0, seed=5), lambda t, x, sigma: np.sin(x)]
 )
 def test_sliding_variables_keep_their_sign_until_they_are_exactly_zero_for_good(d):
     run = simulate(six(), protocol(), X0, sigma0=SIGMA0, disturbance=d)
@@ -414,7 +414,7 @@ def test_sliding_variables_keep_their_sign_until_they_are_exactly_zero_for_good(
     assert (np.abs(run.disturbance) <= 1).all()
 
 
-@pytest.mark.parametrize("d", ["adversary", "sin(9*k*t)", lambda t, x, sigma: np.sin(x)])
+@pytest.mark.parametrize("d", ["worst-case", "sin(9*k*t)", lambda t, x, sigma: np.sin(x)])
 def test_the_inputs_are_those_of_the_protocols_expression_and_the_equivalent_control(d):
     graph, p = six(), protocol()
     run = simulate(graph, p, X0, sigma0=SIGMA0, disturbance=d, remaining=1e-4)
@@ -438,7 +438,7 @@ def test_the_inputs_are_those_of_the_protocols_expression_and_the_equivalent_con
     assert checked > 150
 
 
-@pytest.mark.parametrize("d", ["adversary", "sin(9*k*t)", lambda t, x, sigma: np.sin(x + t)])
+@pytest.mark.parametrize("d", ["worst-case", "sin(9*k*t)", lambda t, x, sigma: np.sin(x + t)])
 def test_the_derivative_of_the_states_is_input_plus_disturbance(d):
     graph, p, h = six(), protocol(), F(1, 10**4)
     centres = [F(i, 50) + F(1, 97) for i in range(48)] + [1 + F(i, 10) for i in range(1, 14)]
@@ -505,11 +505,11 @@ def test_instants_given_as_rationals_are_met_exactly_around_both_deadlines():
     np.testing.assert_array_equal(run.clock[7:], math.inf)
     np.testing.assert_allclose(run.states[:, 2], run.states[:, 4], atol=1e-9)
     np.testing.assert_allclose(run.states[:, 8], run.final_state, atol=1e-9)
-    assert np.abs(run.final_state - outcome_of(six(), X0, SIGMA0)).max() < 1e-9
+    assert np.abs(run.final_state - final_state_of(six(), X0, SIGMA0)).max() < 1e-9
 
 
 def test_runs_may_start_after_either_deadline():
-    p, expected = protocol(), outcome_of(six(), X0, SIGMA0)
+    p, expected = protocol(), final_state_of(six(), X0, SIGMA0)
     whole = simulate(six(), p, X0, sigma0=SIGMA0, times=[0, 2, F(5, 2)])
     np.testing.assert_allclose(
         simulate(six(), p, X0, sigma0=SIGMA0, times=[2]).states[:, 0], whole.states[:, 1], atol=1e-9
@@ -518,7 +518,7 @@ def test_runs_may_start_after_either_deadline():
 
 
 @pytest.mark.parametrize(
-    "d", ["adversary", "sin(9*k*t)", telegraph_noise(1, 10, 6, 3.0), lambda t, x, sigma: np.sin(x)]
+    "d", ["worst-case", "sin(9*k*t)", telegraph_noise(1, 10, 6, 3.0), lambda t, x, sigma: np.sin(x)]
 )
 def test_the_solution_does_not_depend_on_where_it_is_sampled(d):
     p = protocol()
@@ -540,7 +540,7 @@ def test_the_solution_does_not_depend_on_where_it_is_sampled(d):
 def test_the_units_of_the_states_scale_the_solution(unit):
     size = abs(F(unit))
     p, scaled = protocol(), protocol(mu1=2 * size, delta=size)
-    for d, other in (("adversary", "adversary"), (0.5, 0.5 * unit)):
+    for d, other in (("worst-case", "worst-case"), (0.5, 0.5 * unit)):
         run = simulate(six(), p, X0, sigma0=SIGMA0, disturbance=d, samples=21)
         again = simulate(
             six(), scaled, np.multiply(X0, unit), sigma0=np.multiply(SIGMA0, unit), disturbance=other, samples=21
@@ -557,7 +557,7 @@ def test_however_fine_the_default_instants_both_deadlines_are_among_them(remaini
     np.testing.assert_array_equal(run.sigma[:, run.reaching_remaining == 0], 0)
     assert (run.remaining[run.t == 2.5] == 0).any()
     assert run.deadline_index is not None
-    assert run.final_state == pytest.approx(outcome_of(six(), X0, run.sigma0), abs=1e-8 * 1e5)
+    assert run.final_state == pytest.approx(final_state_of(six(), X0, run.sigma0), abs=1e-8 * 1e5)
 
 
 def test_the_unit_of_time_scales_the_solution():
@@ -572,7 +572,7 @@ def test_the_unit_of_time_scales_the_solution():
 # ---------------------------------------------------------------------- the imitation
 
 
-@pytest.mark.parametrize("d", ["adversary", "sin(9*k*t)", 0.5])
+@pytest.mark.parametrize("d", ["worst-case", "sin(9*k*t)", 0.5])
 def test_the_boundary_layer_approaches_the_true_solution_as_it_gets_thinner(d):
     p, times = protocol(), [F(i, 20) for i in range(1, 21)]
     true = simulate(six(), p, X0, sigma0=SIGMA0, disturbance=d, times=times)
@@ -629,7 +629,7 @@ def test_a_boundary_layer_without_a_width_is_refused(width):
         ({"sigma0": [0, 0, 0, 0, 0, math.inf]}, "sigma0 of agent 6 is inf"),
         ({"sigma0": ["a"] * 6}, "sigma0"),
         ({"sigma0": [[1, 2]] * 6}, "sigma0"),
-        ({"x0": [[1, 2]] * 6}, "one start at a time"),
+        ({"x0": [[1, 2]] * 6}, "one initial state at a time"),
         ({"x0": [1] * 5}, "x0 has shape 5"),
         ({"rtol": 0}, "rtol"),
         ({"samples": 1}, "samples"),

@@ -102,7 +102,7 @@ def test_every_row(name: str, kwargs: dict):
         assert proof.failed is None
         assert float(proof.rate) == pytest.approx(rate, rel=1e-8)
         assert 0 < float(proof.rate) <= spectral * (1 + 1e-9)
-        assert V.prefactor == max(V.weights) / min(V.weights) >= 1
+        assert V.overshoot == max(V.weights) / min(V.weights) >= 1
         assert min(V.weights) > 0
         last = [o for o in proof.obligations if o.kind != "rho-interval"][-1]
         if theorem.number == "1.1":

@@ -1,8 +1,8 @@
 """Control effort: how large the input gets, whether it stays finite at the deadline, what limits of the gain leave.
 
-The gain is infinite at the deadline; the input ``u = gain E`` stays bounded for every start iff
+The gain is infinite at the deadline; the input ``u = gain E`` stays bounded for every initial state iff
 ``rho2 kappa Re lambda >= 1`` for all nonzero eigenvalues of ``L``, those on that line being semisimple. Bounds are
-formed in exact arithmetic (:mod:`ptcc_certify.checker.input_bounds`) from the proved Lyapunov functions; here their
+formed in exact arithmetic (:mod:`ptcc_certify.checker.input_formulas`) from the proved Lyapunov functions; here their
 free parameters are chosen, in floating point.
 """
 
@@ -28,18 +28,18 @@ from ptcc_certify.bounds.input.effort import (
     Witness,
 )
 from ptcc_certify.bounds.input.energy import energy_integral
-from ptcc_certify.bounds.input.initial_set import box, ellipsoid, largest_deviation, starts_within
-from ptcc_certify.bounds.input.search import best_bound, kept, least_bound, usable_members
+from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
 from ptcc_certify.bounds.input.section import effort_section, energy_witness, peak_witness
-from ptcc_certify.bounds.input.under_limits import LimitedBounds, disturbed
-from ptcc_certify.bounds.input.worst_start import WorstStart, worst_start
+from ptcc_certify.bounds.input.tightest_bound import best_bound, kept, least_bound, usable_functions
+from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, disturbed
+from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.checker.input_bounds import (
+from ptcc_certify.checker.input_formulas import (
     Form,
+    InitialSet,
     InputBounds,
     Limits,
     Reaching,
-    Starts,
     energy_above,
     length_above,
     peak_above,
@@ -61,18 +61,18 @@ class InputRequest:
     structure : Structure
     protocol : Protocol
     forms : sequence of Form or None
-        The members of the envelope; None for those of large graphs.
+        The Lyapunov functions of the envelope; None for those of large graphs.
     rate, limit : Fraction or None
-        The largest proved rate, and the proved limit of rates.
+        The largest proved rate, and the proved upper bound on the decay rate.
     start, starts
-        ``X(0)``, or a set of starts instead.
+        ``X(0)``, or a set of initial states instead.
     sigma0 : sequence of Fraction or None
     reaching : sequence of (Fraction or None), optional
         Proved reaching times ``ln(T_r/(T_r - t))`` of the agents; without them, and for None, ``T_r``.
     influence : Influence, optional
         ``Q``, for the drift under disturbances.
-    distances : sequence
-        Of every member, the constants from ``V`` to the distances of agents to their outcomes, or None.
+    deviations : sequence
+        Of every Lyapunov function, the constants from ``V`` to the deviations of agents to their final states, or None.
     limits : sequence of Limits
         Nominal protocol: limits of the gain to be judged.
     delta : Fraction, optional
@@ -87,11 +87,11 @@ class InputRequest:
     rate: Fraction | None
     limit: Fraction | None
     start: Sequence[Fraction] | None = None
-    starts: Starts | None = None
+    initial_set: InitialSet | None = None
     sigma0: Sequence[Fraction] | None = None
     reaching: Sequence[Fraction | None] | None = None
     influence: Influence | None = None
-    distances: Sequence[Sequence[Fraction] | None] = ()
+    deviations: Sequence[Sequence[Fraction] | None] = ()
     limits: Sequence[Limits] = ()
     delta: Fraction | None = None
     noise: Fraction | None = None
@@ -105,14 +105,14 @@ def bound_effort(asked: InputRequest) -> Effort:
     lower, upper = (None if r is None else gain.pole * r / 2 for r in (asked.rate, asked.limit))
     sliding = _sliding_part(asked)
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(asked.forms), sliding=sliding)
-    if (asked.start is None and asked.starts is None) or still or n > INPUT_NODES:
+    if (asked.start is None and asked.initial_set is None) or still or n > INPUT_NODES:
         return effort
     constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in asked.forms)
-    region = asked.starts or Starts(tuple(asked.start or ()))
+    region = asked.initial_set or InitialSet(tuple(asked.start or ()))
     bounds = InputBounds(
         structure.graph.exact_rows(range(n)), gain.exact, asked.forms, constants, region, _reaching(asked)
     )
-    usable = usable_members(bounds)
+    usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None
     if own is not None:
@@ -120,11 +120,11 @@ def bound_effort(asked: InputRequest) -> Effort:
     ample = [k for k in usable if bounds.form(k).rate * gain.pole > 1]
     cap = None if influence is None or not influence.exact or not asked.limits else largest_deviation(region, influence)
     energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, ample))
-    limited = LimitedBounds(bounds, usable, asked.distances, cap, peak, asked.noise)
+    limited = LimitedBounds(bounds, usable, asked.deviations, cap, peak, asked.noise)
     entries = [limited.left(entry) for entry in asked.limits]
     return replace(
         effort,
-        starts=asked.starts,
+        initial_set=asked.initial_set,
         constants=constants,
         peak=peak,
         energy=min((e for e in energies if e is not None), key=lambda e: e.value, default=None),
@@ -136,7 +136,7 @@ def bound_effort(asked: InputRequest) -> Effort:
     )
 
 
-def first_input(structure: Structure, protocol: Protocol, region: Starts) -> Fraction | None:
+def first_input(structure: Structure, protocol: Protocol, region: InitialSet) -> Fraction | None:
     """Return ``sup max_k |u_k(0)|``, exactly; None in sliding mode, for an ellipsoid, for a large graph."""
     n = structure.graph.n_nodes
     if protocol.reaching or region.axes or n > INPUT_NODES or not structure.graph.n_edges:
@@ -147,11 +147,11 @@ def first_input(structure: Structure, protocol: Protocol, region: Starts) -> Fra
 def _bounded(
     structure: Structure, k: Fraction, rate: Fraction | None, limit: Fraction | None, still: bool
 ) -> tuple[bool | None, str | None]:
-    """Decide whether the input stays bounded for every start, and by what."""
+    """Decide whether the input stays bounded for every initial state, and by what."""
     if still or (rate is not None and rate * k >= 2):
         return True, "rate"
     if limit is not None and limit * k < 2:
-        return False, "limit"
+        return False, "upper_bound"
     graph = structure.graph
     if graph.n_nodes > LARGEST:
         return None, None
@@ -206,10 +206,10 @@ def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     return tuple(constants)
 
 
-def _peak(bounds: InputBounds, members: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
+def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
     """Bound the peak of every agent's input, and of the norm; ``own`` is that of the sliding parts."""
-    agents = [best_bound(bounds, peak_above, v, members) for v in range(len(bounds.rows))]
-    norm = best_bound(bounds, peak_above, None, members)
+    agents = [best_bound(bounds, peak_above, v, functions) for v in range(len(bounds.rows))]
+    norm = best_bound(bounds, peak_above, None, functions)
     how = tuple(a for a in agents if a is not None)
     if norm is None or len(how) < len(agents):
         return None

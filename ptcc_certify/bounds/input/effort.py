@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ptcc_certify.checker.input_bounds import Limits, Rows, Starts
+from ptcc_certify.checker.input_formulas import InitialSet, Limits, Rows
 from ptcc_certify.theorems.base import Obligation
 
 
 @dataclass(frozen=True)
 class Witness:
-    """A bound, and what proves it: a member of the envelope and an instant ``z = ln(T/(T - t))``."""
+    """A bound, and what proves it: a Lyapunov function of the envelope and an instant ``z = ln(T/(T - t))``."""
 
     value: Fraction
-    member: int
+    function: int
     z: Fraction
 
 
@@ -22,7 +22,7 @@ class Witness:
 class EnergyIntegral:
     """A bound of the energy from two Lyapunov equations, ``L'W + W L - c W >= m I`` with ``c = 0`` and ``c = 1/k``.
 
-    ``p`` says how the gain is split between them, see :func:`ptcc_certify.checker.input_bounds.integral_above`;
+    ``p`` says how the gain is split between them, see :func:`ptcc_certify.checker.input_formulas.integral_above`;
     ``matrices`` are the two ``W``, in integers, and ``least`` the two ``m``.
     """
 
@@ -49,7 +49,7 @@ class Peak:
 
 @dataclass(frozen=True)
 class SlidingPart:
-    """The sliding part of the input: bounded for every start iff ``mu3 kappa >= 1``, and its bound for every agent."""
+    """The sliding part of the input: bounded for all initial states iff ``mu3 kappa >= 1``, and by agent."""
 
     bounded: bool
     agents: tuple[Fraction, ...] | None
@@ -57,7 +57,7 @@ class SlidingPart:
 
 @dataclass(frozen=True)
 class Limited:
-    """What is left at the deadline under limits of the gain: ``||E||``, and each agent's distance to its outcome.
+    """What is left at the deadline under limits of the gain: ``||E||``, and the deviation of each agent.
 
     ``largest`` bounds ``max_k |u_k|``; None if the input is held. With measurement noise ``|n_k| <= noise``,
     ``u = -gain L (X + n)``, ``noisy_norm`` bounds ``||E||`` at the deadline and ``noisy_largest`` every ``|u_k|``.
@@ -65,13 +65,13 @@ class Limited:
 
     limits: Limits
     clock: Fraction
-    member: int
+    function: int
     growth: Fraction
     norm: Fraction
     agents: tuple[Fraction, ...] | None
     largest: Fraction | None
     noise: Fraction | None = None
-    noise_member: int | None = None
+    noise_function: int | None = None
     noisy_norm: Fraction | None = None
     noisy_largest: Fraction | None = None
 
@@ -81,7 +81,7 @@ class Disturbed:
     """What disturbances ``|d_k| <= delta`` of the nominal protocol add to the inputs, and to where the agents end."""
 
     delta: Fraction
-    member: int
+    function: int
     inputs: tuple[Fraction, ...]
     drift: tuple[Fraction, ...] | None
 
@@ -95,14 +95,14 @@ class Effort:
     bounded : bool or None
         Whether ``u`` (the nominal part, under the sliding-mode protocol) stays bounded up to the deadline for every
         start; None: undecided.
-    by : {"rate", "limit", "spectrum"} or None
-        What decides it: a proved rate, a proved limit of rates, or the exact location of the spectrum.
+    by : {"rate", "upper_bound", "spectrum"} or None
+        What decides it: a proved rate, a proved upper bound on the decay rate, or the exact location of the spectrum.
     threshold : pair of Fraction or None
         Proved bounds of ``rho2 kappa min Re lambda``; the input is bounded from 1 on.
-    starts : Starts or None
-        The set of starts that the bounds are for; None: the start of the certificate.
+    initial_set : InitialSet or None
+        The set of initial states that the bounds are for; None: the start of the certificate.
     constants : tuple of (tuple of Fraction or None)
-        ``c_k`` of every member with a full matrix, ``e_k^2 <= c_k V``.
+        ``c_k`` of every Lyapunov function with a full matrix, ``e_k^2 <= c_k V``.
     peak : Peak or None
         None: not bounded, or not proved.
     energy : EnergyIntegral, Witness or None
@@ -145,7 +145,7 @@ class Effort:
     bounded: bool | None
     by: str | None
     threshold: tuple[Fraction | None, Fraction | None]
-    starts: Starts | None
+    initial_set: InitialSet | None
     constants: tuple[tuple[Fraction, ...] | None, ...]
     peak: Peak | None = None
     energy: Witness | EnergyIntegral | None = None
@@ -159,26 +159,26 @@ class Effort:
     @property
     def obligations(self) -> list[Obligation]:
         """What the independent check verifies, in its order."""
-        found = [Obligation("input-threshold", "effort", witness=self.by)] if self.bounded is not None else []
+        found = [Obligation("input-threshold", "input", witness=self.by)] if self.bounded is not None else []
         found += [
-            Obligation("input-constants", f"lyapunov.members[{k}]")
+            Obligation("input-constants", f"lyapunov.functions[{k}]")
             for k, c in enumerate(self.constants)
             if c is not None
         ]
         if self.sliding is not None and self.sliding.agents is not None:
-            found.append(Obligation("input-sliding", "effort"))
+            found.append(Obligation("input-sliding", "input"))
         if self.peak is not None:
-            found.append(Obligation("input-peak", "effort", {"z": self.peak.norm_how.z}, self.peak))
+            found.append(Obligation("input-peak", "input", {"z": self.peak.norm_how.z}, self.peak))
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
             if isinstance(bound, EnergyIntegral):
                 numbers = {"p": bound.p, "m0": bound.least[0], "m1": bound.least[1]}
-                found.append(Obligation(kind, "effort", numbers, bound))
+                found.append(Obligation(kind, "input", numbers, bound))
             elif bound is not None:
-                found.append(Obligation(kind, "effort", {"z": bound.z}, bound.member))
+                found.append(Obligation(kind, "input", {"z": bound.z}, bound.function))
         for k, entry in enumerate(self.residual):
-            witness = entry.member if entry.noise_member is None else [entry.member, entry.noise_member]
-            found.append(Obligation("limited-gain", f"effort.residual[{k}]", {"growth": entry.growth}, witness))
+            witness = entry.function if entry.noise_function is None else [entry.function, entry.noise_function]
+            found.append(Obligation("limited-gain", f"input.residual[{k}]", {"growth": entry.growth}, witness))
         if self.disturbed is not None:
             numbers = {"delta": self.disturbed.delta}
-            found.append(Obligation("nominal-disturbed", "effort", numbers, self.disturbed.member))
+            found.append(Obligation("nominal-disturbed", "input", numbers, self.disturbed.function))
         return found

@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.input.effort import EnergyIntegral
-from ptcc_certify.bounds.input.search import INSTANT_BITS, kept, log
-from ptcc_certify.checker.input_bounds import InputBounds, Rows, integral_above, rounded
+from ptcc_certify.bounds.input.tightest_bound import INSTANT_BITS, kept, log
+from ptcc_certify.checker.input_formulas import InputBounds, Rows, integral_above, rounded
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem

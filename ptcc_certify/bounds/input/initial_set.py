@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.checker.input_bounds import Linear, Starts
+from ptcc_certify.checker.input_formulas import InitialSet, Linear
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label, in_node_order
@@ -15,8 +15,8 @@ from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.graphs.structure import Structure
 
 
-def starts_within(structure: Structure, bound: Any) -> Starts:
-    """Return all starts with ``||X(0)||_inf <= bound``.
+def initial_set_within(structure: Structure, bound: Any) -> InitialSet:
+    """Return all initial states with ``||X(0)||_inf <= bound``.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def starts_within(structure: Structure, bound: Any) -> Starts:
 
     Returns
     -------
-    Starts
+    InitialSet
         A box about 0.
 
     Raises
@@ -39,21 +39,23 @@ def starts_within(structure: Structure, bound: Any) -> Starts:
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> starts_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
+    >>> initial_set_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
     (Fraction(1, 2), Fraction(1, 2))
     """
     try:
-        R = as_fraction(bound, "the bound of starts")
+        R = as_fraction(bound, "the bound of initial states")
     except NumberError as error:
-        raise ParameterError(f"the bound of starts: {error}") from None
+        raise ParameterError(f"the bound of initial states: {error}") from None
     if not 0 < R <= 10**300:
-        raise ParameterError("the bound of starts is outside its domain; it must be positive, and at most 1e300")
+        raise ParameterError(
+            "the bound of initial states is outside its domain; it must be positive, and at most 1e300"
+        )
     n = structure.graph.n_nodes
-    return Starts((Fraction(0),) * n, (R,) * n)
+    return InitialSet((Fraction(0),) * n, (R,) * n)
 
 
-def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
-    """Return all starts with ``low_k <= x_k(0) <= high_k``.
+def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> InitialSet:
+    """Return all initial states with ``low_k <= x_k(0) <= high_k``.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
 
     Returns
     -------
-    Starts
+    InitialSet
 
     Raises
     ------
@@ -76,7 +78,7 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
     Examples
     --------
     >>> box([0, 1], [2, 1])
-    Starts(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
+    InitialSet(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
     >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
@@ -88,11 +90,11 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> Starts:
     ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
     if any(a > b for a, b in ends):
         raise ParameterError("a box whose lower end exceeds its upper end")
-    return Starts(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
+    return InitialSet(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
 
 
-def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> Starts:
-    """Return all starts ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
+def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> InitialSet:
+    """Return all initial states ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
 
     Parameters
     ----------
@@ -104,7 +106,7 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = No
 
     Returns
     -------
-    Starts
+    InitialSet
 
     Raises
     ------
@@ -124,7 +126,7 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = No
     vectors = tuple(tuple(as_fraction(x, "axes") for x in _unlabelled(axis, graph, "axes")) for axis in axes)
     if not vectors or any(len(axis) != len(middle) for axis in vectors):
         raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
-    return Starts(middle, axes=vectors)
+    return InitialSet(middle, axes=vectors)
 
 
 def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
@@ -135,21 +137,21 @@ def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
     return values
 
 
-def ways(starts: Starts, influence: Influence) -> list[Linear]:
+def ways(initial_set: InitialSet, influence: Influence) -> list[Linear]:
     """Return the rows of ``I - Q``: from its initial to its final state, each agent's way."""
     rows: list[Linear] = []
-    for v in range(len(starts.center)):
+    for v in range(len(initial_set.center)):
         row = {j: -Fraction(x) for j, x in influence.row(v).items()}
         rows.append(row | {v: row.get(v, Fraction(0)) + 1})
     return rows
 
 
-def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
+def largest_deviation(initial_set: InitialSet, influence: Influence) -> Fraction:
     """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
 
     Parameters
     ----------
-    starts : Starts
+    initial_set : InitialSet
     influence : Influence
         ``Q`` in rationals.
 
@@ -164,7 +166,7 @@ def largest_deviation(starts: Starts, influence: Influence) -> Fraction:
     >>> from ptcc_certify.bounds.final_state import influence
     >>> from ptcc_certify.graphs.structure import analyse
     >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
-    >>> largest_deviation(Starts([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
+    >>> largest_deviation(InitialSet([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
     Fraction(2, 1)
     """
-    return max(map(starts.largest, ways(starts, influence)))
+    return max(map(initial_set.largest, ways(initial_set, influence)))

@@ -34,17 +34,17 @@ def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[
         }
 
     region: dict[str, Any] | None = None
-    if (starts := effort.starts) is not None:
-        region = {"center": by_agent(starts.center)}
-        if starts.axes:
-            region["axes"] = [by_agent(axis) for axis in starts.axes]
+    if (initial_set := effort.initial_set) is not None:
+        region = {"center": by_agent(initial_set.center)}
+        if initial_set.axes:
+            region["axes"] = [by_agent(axis) for axis in initial_set.axes]
         else:
-            region["radius"] = by_agent(starts.radius or (Fraction(0),) * len(labels))
+            region["radius"] = by_agent(initial_set.radius or (Fraction(0),) * len(labels))
     peak, sliding, disturbed = effort.peak, effort.sliding, effort.disturbed
     return {
         "bounded": effort.bounded,
         "threshold": {"lower": maybe(effort.threshold[0]), "upper": maybe(effort.threshold[1])},
-        "starts": region,
+        "initial_set": region,
         "constants": [by_agent(c) for c in effort.constants],
         "peak": peak and {"agents": by_agent(peak.agents), "largest": text(peak.largest), "norm": text(peak.norm)},
         "energy": effort.energy and text(effort.energy.value),
@@ -61,9 +61,9 @@ def effort_section(effort: Effort | None, labels: Sequence[str], text: Callable[
 
 
 def peak_witness(peak: Peak, labels: Sequence[str], text: Callable[[Fraction], str]) -> Mapping[str, Any]:
-    """Return what proves the peaks: a member and an instant for every agent, and for the norm."""
-    agents = {label: [how.member, text(how.z)] for label, how in zip(labels, peak.how, strict=True)}
-    return {"agents": agents, "norm": peak.norm_how.member}
+    """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
+    agents = {label: [how.function, text(how.z)] for label, how in zip(labels, peak.how, strict=True)}
+    return {"agents": agents, "norm": peak.norm_how.function}
 
 
 def energy_witness(energy: EnergyIntegral, text: Callable[[Fraction], str]) -> dict[str, list[list[str]]]:

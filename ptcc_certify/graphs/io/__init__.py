@@ -1,13 +1,13 @@
 """Files in and out: signed digraphs in every common format, starts, and writing that is whole or not at all.
 
-Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.graphs.io.rows`) checks the rows and
-builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.
+Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.graphs.io.graph_from_rows`) checks the
+rows and builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.
 """
 
 from ptcc_certify.graphs.io.files import write_atomically
 from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
 from ptcc_certify.graphs.io.state import by_label, in_node_order, random_states, read_state
-from ptcc_certify.graphs.limits import MAX_BYTES, MAX_LINE, MAX_NODES
+from ptcc_certify.graphs.size_limits import MAX_BYTES, MAX_LINE, MAX_NODES
 
 __all__ = [
     "MAX_BYTES",

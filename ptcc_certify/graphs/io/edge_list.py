@@ -12,9 +12,9 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.rows import Numbers, Rows
-from ptcc_certify.graphs.limits import MAX_LINE
+from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
 from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
+from ptcc_certify.graphs.size_limits import MAX_LINE
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _SOURCE = ("source", "from", "fromnodeid", "src")

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import IO
 
 from ptcc_certify.errors import FormatError, PTCCError
-from ptcc_certify.graphs.limits import MAX_BYTES, MAX_LINE
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.size_limits import MAX_BYTES, MAX_LINE
 
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]
 

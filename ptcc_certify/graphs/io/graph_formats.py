@@ -13,9 +13,9 @@ from xml.etree import ElementTree
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
-from ptcc_certify.graphs.io.rows import Numbers, Rows
-from ptcc_certify.graphs.limits import MAX_NODES
+from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.size_limits import MAX_NODES
 
 
 def _rows(graph: Any, labels: list[str], undirected: str, name: str) -> Rows:

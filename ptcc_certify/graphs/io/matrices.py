@@ -18,9 +18,9 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io import files
-from ptcc_certify.graphs.io.rows import Rows
-from ptcc_certify.graphs.limits import MAX_NODES
+from ptcc_certify.graphs.io.graph_from_rows import Rows
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.size_limits import MAX_NODES
 
 Array = np.ndarray
 
@@ -123,8 +123,8 @@ def read_npy(data: bytes, name: str) -> Rows:
 def read_npz(data: bytes, name: str) -> Rows:
     """Read the only square matrix of an archive of ``numpy.savez`` or ``scipy.sparse.save_npz``."""
     with files.one_line_errors(name, "an .npz archive"):
-        with zipfile.ZipFile(BytesIO(data)) as members:
-            files.refuse_large(sum(member.file_size for member in members.infolist()), name)
+        with zipfile.ZipFile(BytesIO(data)) as functions:
+            files.refuse_large(sum(function.file_size for function in functions.infolist()), name)
         with np.load(BytesIO(data), allow_pickle=False) as archive:
             arrays = dict(archive)
         labels = arrays.pop("labels", None)

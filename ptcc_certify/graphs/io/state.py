@@ -105,7 +105,7 @@ def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
         wrong = [f"no value for {_some(missing)}"] * bool(missing)
         wrong += [f"{_some(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
         mend = "give each node one value, or values without labels in node order"
-        raise ParameterError(f"the start {name}: {', and '.join(wrong)}; {mend}")
+        raise ParameterError(f"the initial state {name}: {', and '.join(wrong)}; {mend}")
     return [found[label] for label in graph.labels]
 
 
@@ -131,7 +131,7 @@ def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
     found = dict(zip(labels, entries, strict=True))
     if len(found) < len(labels):
         twice = next(label for label in found if labels.count(label) > 1)
-        raise ParameterError(f"the start {name} has two values for node {shorten(twice)}; keep one")
+        raise ParameterError(f"the initial state {name} has two values for node {shorten(twice)}; keep one")
     return found
 
 
@@ -141,7 +141,7 @@ def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]
     Parameters
     ----------
     seed : int or sequence of int
-        The same seed draws the same start.
+        The same seed draws the same initial state.
     n, dimension : int
         Number of nodes, and of numbers for each.
 

@@ -58,20 +58,20 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     if axis not in _DECAY_AXES:
         raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
     run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
-    if run is None or start is None or certificate.comparison is None or not envelope.members:
+    if run is None or start is None or certificate.comparison is None or not envelope.functions:
         raise ValueError("the certificate holds no simulated run with a proved bound")
     ax, before, unit = axes_of(ax), run.remaining > 0, _unit(run)
     remaining, states = run.remaining[before], run.states[:, before] / unit
     place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
-    shown = [m for m in envelope.members if m.coordinates == envelope.coordinates]
+    shown = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
     norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
     bound = envelope.norm_bound(remaining, start) / unit
     scale = float(norm[0]) or float(bound[0])
     if scale == 0:
         raise ValueError("the agents begin where they end: nothing decays")
-    for number, member in enumerate(shown if len(shown) > 1 else ()):
-        alone = replace(envelope, members=(member,)).norm_bound(remaining, start) / unit / scale
-        if member.kind == "paper":
+    for number, function in enumerate(shown if len(shown) > 1 else ()):
+        alone = replace(envelope, functions=(function,)).norm_bound(remaining, start) / unit / scale
+        if function.kind == "paper":
             ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
         else:
             label = "each Lyapunov function" if all(m.kind == "paper" for m in shown[:number]) else None

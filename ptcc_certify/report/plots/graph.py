@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.graphs.limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import CAMP_COLOURS, SINGLE_COLUMN, axes_of, camp_groups, finished, styled
 

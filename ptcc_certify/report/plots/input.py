@@ -27,7 +27,7 @@ INPUT_DECADES = 3
 def plot_input(
     trajectory: Trajectory, structure: Structure, certificate: Certificate | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same start proves.
+    """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same initial state proves.
 
     The axis of the input is logarithmic, from three decades below its size at the start. Behind an actuator it is the
     input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn
@@ -37,11 +37,11 @@ def plot_input(
     Parameters
     ----------
     trajectory : Trajectory
-        Of one start.
+        Of one initial state.
     structure : Structure
         Of the same graph.
     certificate : Certificate, optional
-        Of the same graph, protocol and start. One of a set of starts adds nothing.
+        Of the same graph, protocol and start. One of a set of initial states adds nothing.
     ax : Axes, optional
 
     Returns
@@ -80,7 +80,7 @@ def plot_input(
 
 @styled
 def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate of the same start proves.
+    """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate proves for it.
 
     The integral is numerical: between the samples ``||u||^2`` is taken for an exponential of ``ln(T/(T - t))``, as it
     is along a single mode. No bound is drawn where none holds: as in :func:`plot_input`, and under the sliding-mode
@@ -89,7 +89,7 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     Parameters
     ----------
     trajectory : Trajectory
-        Of one start.
+        Of one initial state.
     certificate : Certificate, optional
         Of the same graph, protocol and start.
     ax : Axes, optional
@@ -214,7 +214,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
 
 
 def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effort | None:
-    """Return what is proved about the input of a run; None if that is of other starts, or the run is disturbed.
+    """Return what is proved about the input of a run; None if that is of other initial states, or the run is disturbed.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         if getattr(certificate, name) != getattr(trajectory, name):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     starts = [("start", certificate.start, trajectory.states[:, :1])]
-    rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the start
+    rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the initial state
     unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     if (slid := trajectory.sliding) is not None:
         sigma0 = slid.sigma0[:, None]
@@ -237,6 +237,6 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
-    if effort is None or effort.starts is not None or certificate.start is None or unproved:
+    if effort is None or effort.initial_set is not None or certificate.start is None or unproved:
         return None
     return effort

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lmi.exact.rounding import float_up
+from lmi.exact.directed_rounding import float_up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
@@ -23,9 +23,9 @@ CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#009E73", "^"), "lmi": (
 def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Axes | None = None) -> Axes:
     """Draw the eigenvalues of ``L`` (numerical), and the line from which on the input stays bounded.
 
-    The zeros of balanced closed components are marked apart. From every start the input (its nominal part, under the
-    sliding-mode protocol) is bounded up to the deadline if all other eigenvalues lie right of ``1/(rho2 kappa)``; one
-    to its left leaves it unbounded. One unit is as long in both directions.
+    The zeros of balanced closed components are marked apart. From every initial state the input (its nominal part,
+    under the sliding-mode protocol) is bounded up to the deadline if all other eigenvalues lie right of ``1/(rho2
+    kappa)``; one to its left leaves it unbounded. One unit is as long in both directions.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
 
 @styled
 def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
-    """Draw rate against prefactor of all proved Lyapunov functions by class, and what no rate exceeds.
+    """Draw rate against overshoot constant of all proved Lyapunov functions by class, and what no rate exceeds.
 
-    A function of rate ``b`` and prefactor ``c`` proves ``||z(t)||^2 <= c e^(-b s) ||z(0)||^2``, ``z`` being ``E``, or
-    the ``eps`` of Theorem 1.1 for the paper's own. The axis of the prefactor is logarithmic.
+    A function of rate ``b`` and overshoot constant ``c`` proves ``||z(t)||^2 <= c e^(-b s) ||z(0)||^2``, ``z`` being
+    ``E``, or the ``eps`` of Theorem 1.1 for the paper's own. The axis of the overshoot constant is logarithmic.
 
     Parameters
     ----------
@@ -95,26 +95,26 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> ax = plot_frontier(certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)))
     >>> [line.get_label() for line in ax.lines]
-    ['paper', 'perron', 'no rate exceeds (proved)', 'spectral rate (numerical)']
+    ['paper', 'perron', 'upper bound (proved)', 'spectral rate (numerical)']
     """
-    members = certificate.envelope.members
-    if not members:
+    functions = certificate.envelope.functions
+    if not functions:
         raise ValueError("the certificate holds no proved Lyapunov function")
     ax = axes_of(ax)
     ax.set_xscale("log")
     for kind, (colour, marker) in CLASS_MARKERS.items():
-        own = [m for m in members if m.kind == kind]
+        own = [m for m in functions if m.kind == kind]
         if own:
-            points = [m.prefactor_above for m in own], [m.rate_below for m in own]
+            points = [m.overshoot_above for m in own], [m.rate_below for m in own]
             ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
-    rates = [m.rate_below for m in members]
+    rates = [m.rate_below for m in functions]
     if certificate.upper_bound is not None:
         limit = float_up(certificate.upper_bound)
-        ax.axhline(limit, color=BEHIND, linewidth=2.2, alpha=0.6, label="no rate exceeds (proved)")
+        ax.axhline(limit, color=BEHIND, linewidth=2.2, alpha=0.6, label="upper bound (proved)")
         rates.append(limit)
     if certificate.spectral_rate is not None:
         rates.append(certificate.spectral_rate)
         ax.axhline(rates[-1], color="black", linewidth=0.9, linestyle=":", label="spectral rate (numerical)")
     low, high = min(0.0, *rates), max(0.0, *rates)
     ax.set_ylim(low - 0.08 * (high - low) * (low < 0), high + 0.08 * (high - low))
-    return finished(ax, "prefactor of the squared norm", "proved rate")
+    return finished(ax, "overshoot constant of the squared norm", "proved rate")

@@ -37,7 +37,7 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
     Parameters
     ----------
     trajectory : Trajectory
-        Of one start.
+        Of one initial state.
     structure : Structure
         Of the same graph.
     ax : Axes, optional
@@ -72,7 +72,7 @@ def plot_run(
     Parameters
     ----------
     trajectory : Trajectory
-        Of one start.
+        Of one initial state.
     structure : Structure
         Of the same graph.
     reaching : sequence of N ReachingTime, optional

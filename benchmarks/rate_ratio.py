@@ -1,11 +1,11 @@
 """How near the certified rates come to the best possible one, and the bounds to the true norm, class by class.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/tightness.py [--per-case 10] [--jobs 2] [--real FOLDER] [--output FILE]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/rate_ratio.py [--per-case 10] [--jobs 2] [--real FOLDER] [--output FILE]
 
 An ensemble of random signed digraphs (generator and seeds below), and the real graphs of a folder if it is given. For
-each class of Lyapunov functions: the tightness of the proved rate, and the proved bound of ``||E(t)|| / ||E(0)||`` over
-``||exp(-L s)||`` on the range of ``L``, from ball arithmetic. Every bound is compared with that norm, and the distance
-of every agent to its outcome with its own bound, from a random start.
+each class of Lyapunov functions: the ratio of the proved rate, and the proved bound of ``||E(t)|| / ||E(0)||`` over
+``||exp(-L s)||`` on the range of ``L``, from ball arithmetic. Every bound is compared with that norm, and the deviation
+of every agent to its final state with its own bound, from a random initial state.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, sharpen
+from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, search_functions
 
 CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
 DECADES = (1, 6)
@@ -155,8 +155,8 @@ def log_norm(system: ErrorSystem, clock: float) -> float:
     return float(largest.log()) + math.log(float(np.linalg.norm(np.linalg.solve(R.T, F.T), 2)))
 
 
-def distances(graph: SignedDigraph, x0: list[Fraction], final: list[Fraction], clock: float) -> np.ndarray:
-    """``|x_k - outcome_k|`` at a value of the clock, from balls."""
+def deviations(graph: SignedDigraph, x0: list[Fraction], final: list[Fraction], clock: float) -> np.ndarray:
+    """``|x_k - final_state_k|`` at a value of the clock, from balls."""
     flint.ctx.prec = 2048
     L = flint.arb_mat([[ball(x) for x in row] for row in graph.exact_laplacian()])
     X = (L * -flint.arb(clock)).exp() * flint.arb_mat([[ball(x)] for x in x0])
@@ -178,47 +178,47 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
         return {"name": name, "n": graph.n_nodes, "skipped": "nothing decays or no spectral rate"}
     system, spectral = ErrorSystem(structure), best.spectral_rate
     norms = [log_norm(system, s) for s in clocks]
-    # Early, where members of small prefactors are tight, the bounds are compared with the norm too.
+    # Early, where Lyapunov functions of small overshoot constants are tight, the bounds are compared with the norm too.
     early = [float(PROTOCOL.gain.clock_at_remaining(1 - fraction)) for fraction in EARLY]
     judged = [*zip(early, [log_norm(system, s) for s in early], strict=True), *zip(clocks, norms, strict=True)]
-    found = {kind: sharpen(system, kind, clocks) for kind in ("perron", "lmi", "full")}
-    paper = [m for m in best.envelope.members if m.kind == "paper"]
-    members = {
+    found = {kind: search_functions(system, kind, clocks) for kind in ("perron", "lmi", "full")}
+    paper = [m for m in best.envelope.functions if m.kind == "paper"]
+    functions = {
         "paper": paper,
-        **{kind: list(sharpening.members) for kind, sharpening in found.items()},
-        "best": list(best.envelope.members),
+        **{kind: list(search.functions) for kind, search in found.items()},
+        "best": list(best.envelope.functions),
     }
     result: dict[str, Any] = {"name": name, "n": graph.n_nodes, "spectral": spectral, "seconds": seconds}
     result["verdict"] = best.verdict
     result["notes"] = [note for note in best.notes if "class" in note]
     worst, agents = 0.0, 0.0
-    for kind, own in members.items():
+    for kind, own in functions.items():
         in_error = [m for m in own if m.coordinates == "E"]
         rates = [m.rate_below for m in own]
-        useful = [m.rate_below for m in own if m.prefactor <= LARGEST_PREFACTOR]
+        useful = [m.rate_below for m in own if m.overshoot <= LARGEST_PREFACTOR]
         bounds = [
-            min((math.log(m.prefactor) / 2 - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
+            min((math.log(m.overshoot) / 2 - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
         ]
         result[kind] = {
-            "tightness": max(rates, default=0.0) / spectral,
+            "ratio": max(rates, default=0.0) / spectral,
             "useful": max([0.0, *useful]) / spectral,
             "over": [math.exp(min(b - v, 700.0)) for b, v in zip(bounds, norms, strict=True)],
         }
         for m in in_error:
             for s, v in judged:
-                worst = max(worst, math.exp(v - 0.5 * math.log(m.prefactor) + m.rate_below * s / 2))
-    if best.outcome is not None:
-        bound = best.outcome_distance([1 - fraction for fraction in INSTANTS])
-        final = [Fraction(x) for x in best.outcome.final_state]
+                worst = max(worst, math.exp(v - 0.5 * math.log(m.overshoot) + m.rate_below * s / 2))
+    if best.final_state is not None:
+        bound = best.deviation_bound([1 - fraction for fraction in INSTANTS])
+        final = [Fraction(x) for x in best.final_state.states]
         for column, s in enumerate(clocks):
             if bound[:, column].min() > 1e-250:
-                agents = max(agents, float((distances(graph, x0, final, s) / bound[:, column]).max()))
+                agents = max(agents, float((deviations(graph, x0, final, s) / bound[:, column]).max()))
     result["worst"], result["agents"] = worst, agents
     limit, reached = found["lmi"].diagonal_limit, found["lmi"].tried.get("lmi")
     result["gap"] = None if limit is None or reached is None else limit / reached - 1
-    proved = [float(m.rate) for m in found["lmi"].members]
+    proved = [float(m.rate) for m in found["lmi"].functions]
     result["proved_of_limit"] = None if limit is None else max(proved, default=0.0) / limit
-    useful = [float(m.rate) for m in found["lmi"].members if m.prefactor <= LARGEST_PREFACTOR]
+    useful = [float(m.rate) for m in found["lmi"].functions if m.overshoot <= LARGEST_PREFACTOR]
     several = len(structure.closed_components) > 1 or structure.followers.size > 0
     result["composite"] = max(useful, default=0.0) / limit if several and limit else None
     result["undirected"] = structure.undirected
@@ -249,9 +249,9 @@ def quartiles(values: list[float]) -> str:
 
 def report(results: list[dict[str, Any]], title: str) -> list[str]:
     lines = [f"{title}: {len(results)} graphs, N = {min(r['n'] for r in results)}..{max(r['n'] for r in results)}", ""]
-    lines.append(f"{'quartiles':<10}{'tightness':^30}{'prefactor <= 1e6':^30}")
+    lines.append(f"{'quartiles':<10}{'ratio':^30}{'overshoot <= 1e6':^30}")
     lines += [
-        f"{kind:<10}" + " ".join(quartiles([r[kind][what] for r in results]) for what in ("tightness", "useful"))
+        f"{kind:<10}" + " ".join(quartiles([r[kind][what] for r in results]) for what in ("ratio", "useful"))
         for kind in CLASSES
     ]
     lines += ["", f"{'bound / true norm':<18}" + "".join(f"{f'at {f:g} T':^30}" for f in INSTANTS)]
@@ -268,9 +268,9 @@ def report(results: list[dict[str, Any]], title: str) -> list[str]:
         f"best diagonal rate: dual gap at most 1e-4 on {sum(g <= 1e-4 for g in gaps)} of {len(results)}, "
         f"median {np.median(gaps):.1e}, largest {max(gaps):.1e}",
         f"proved share of the dual limit: quartiles {quartiles(proved)}, least {min(proved):.4g}",
-        f"composites, class lmi at prefactor <= 1e6 over the slowest block: quartiles {quartiles(composite)}",
-        f"worst true norm over a member's bound {max(r['worst'] for r in results):.9f}",
-        f"worst distance of an agent over its bound {max(r['agents'] for r in results):.9f}",
+        f"composites, class lmi at overshoot constant <= 1e6 over the slowest block: quartiles {quartiles(composite)}",
+        f"worst true norm over a Lyapunov function's bound {max(r['worst'] for r in results):.9f}",
+        f"worst deviation of an agent over its bound {max(r['agents'] for r in results):.9f}",
         f"verdicts: {sum(r['verdict'] == 'certified' for r in results)} certified; "
         f"notes: {sum(bool(r['notes']) for r in results)}; seconds of certify: quartiles "
         f"{quartiles([r['seconds'] for r in results])}, longest {max(r['seconds'] for r in results):.1f}",
@@ -307,20 +307,20 @@ def main() -> None:
     print("\n".join(report(drawn, "ensemble")))
     for case in CASES:
         own = [r for r in drawn if r["name"].startswith(case)]
-        medians = "  ".join(f"{kind} {np.median([r[kind]['tightness'] for r in own]):.3f}" for kind in CLASSES)
-        print(f"{case:<20} median tightness  {medians}")
+        medians = "  ".join(f"{kind} {np.median([r[kind]['ratio'] for r in own]):.3f}" for kind in CLASSES)
+        print(f"{case:<20} median ratio  {medians}")
     for decades, at in zip(DECADES, range(len(DECADES)), strict=True):
         own = [r for r in drawn if int(r["name"].split()[-1]) // 10_000 % 100 == at]
         over = np.median([r["best"]["over"][1] for r in own])
         print(
-            f"{decades} decade(s): median tightness lmi {np.median([r['lmi']['tightness'] for r in own]):.3f}, "
-            f"best {np.median([r['best']['tightness'] for r in own]):.3f}, bound / true norm at 0.9 T {over:.2f}"
+            f"{decades} decade(s): median ratio lmi {np.median([r['lmi']['ratio'] for r in own]):.3f}, "
+            f"best {np.median([r['best']['ratio'] for r in own]):.3f}, bound / true norm at 0.9 T {over:.2f}"
         )
     if real := [r for r in done if r["name"].endswith(".csv")]:
         print()
         print("\n".join(report(real, "real graphs")))
         for r in real:
-            row = "  ".join(f"{kind} {r[kind]['tightness']:.4f}" for kind in CLASSES)
+            row = "  ".join(f"{kind} {r[kind]['ratio']:.4f}" for kind in CLASSES)
             print(
                 f"{r['name']:<24}N {r['n']:>3}  {row}  over at 0.9 T {r['best']['over'][1]:.2f}  {r['seconds']:.1f} s"
             )

@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from lmi.deadline import checkpoint
 from lmi.errors import MatrixError
-from lmi.exact import arithmetic, dominance, fast
+from lmi.exact import arithmetic, fast
+from lmi.exact import row_dominance as dominance
 from lmi.exact.definite import LARGEST_SHIFT, eliminate, refutes
 from lmi.exact.polynomials import characteristic
+from lmi.search_time import checkpoint
 
 Rows = Sequence[Sequence[Fraction]]
 IntegerRows = Sequence[Sequence[int]]
@@ -80,7 +81,7 @@ class ResidualWitness:
 
 @dataclass(frozen=True)
 class DefinitenessProof:
-    """Outcome of :func:`prove_positive_definite`.
+    """Final state of :func:`prove_positive_definite`.
 
     Attributes
     ----------
@@ -406,7 +407,7 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     """Check in rationals that ``Y`` proves: no diagonal ``Omega > 0`` decays faster than ``rate``.
 
     That is, ``Omega A + A' Omega >= b Omega`` needs ``b <= rate``; the proof is that of
-    :func:`lmi.exact.dominance.bounds_diagonal_rates`. With ``rate = 0``: no diagonal Lyapunov matrix exists.
+    :func:`lmi.exact.row_dominance.bounds_diagonal_rates`. With ``rate = 0``: no diagonal Lyapunov matrix exists.
 
     Parameters
     ----------

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.certificate import scaled
+from lmi.diagonal_certificate import scaled
 from lmi.errors import MatrixError, NoCertificate
-from lmi.matrices import block_columns
+from lmi.matrix_classes import block_columns
 
 
 def smallest_eigenvalue(S: np.ndarray) -> float:

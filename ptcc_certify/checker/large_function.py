@@ -11,15 +11,15 @@ from operator import mul
 from typing import Any
 
 from lmi.exact.definite import SparseFactor
+from lmi.exact.directed_rounding import down
 from lmi.exact.numbers import longest
-from lmi.exact.rounding import down
 from lmi.exact.work import fits, spend
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.matrices import Sparse, block
-from ptcc_certify.checker.paper import group_decrease
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.side_vectors import Numbers
 from ptcc_certify.checker.structure import Structure
-from ptcc_certify.checker.vectors import Numbers
+from ptcc_certify.checker.theorem_function import group_decrease
 
 #: Products of entries up to which sparse matrices are multiplied, and entries of one that are kept.
 LARGEST_PRODUCT, LARGEST_KEPT = 50_000_000, 3_000_000

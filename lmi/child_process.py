@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 from typing import Any
 
-from lmi.deadline import checkpoint, seconds_left
 from lmi.errors import LMIError
+from lmi.search_time import checkpoint, seconds_left
 
 _HEAD = 8
 _ITEM, _ERROR, _END = range(3)

@@ -6,7 +6,7 @@ the gain that acts is
     s_eff(T) = rho1 T + k (1 + ln(T (g_max - rho1)/k))
 
 A smaller cap acts from 0 on. Here everything is in floats; what proofs need of the same limits is enclosed by
-:class:`ptcc_certify.checker.input_bounds.Limits`.
+:class:`ptcc_certify.checker.input_formulas.Limits`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.checker.input_bounds import Limits
+from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.parameters import Given, Parameters, readable

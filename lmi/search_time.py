@@ -63,7 +63,7 @@ def share_of_time(share: float, name: str, cut_off: list[str]) -> Iterator[None]
 
     Examples
     --------
-    >>> from lmi.deadline import checkpoint
+    >>> from lmi.search_time import checkpoint
     >>> cut_off = []
     >>> with time_limit(0), share_of_time(0.5, "a search", cut_off):
     ...     checkpoint()

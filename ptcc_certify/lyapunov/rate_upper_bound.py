@@ -1,6 +1,6 @@
 """The upper bound on the decay rate, whatever the Lyapunov function: twice a proved bound of the smallest real part.
 
-``V <= e^(-b s) V(0)`` for all starts means ``b <= 2 Re lambda`` for every nonzero eigenvalue ``lambda`` of ``L``, and
+``V <= e^(-b s) V(0)`` for all initial states means ``b <= 2 Re lambda`` for every nonzero eigenvalue of ``L``, and
 so for their mean in a strong component, the trace of its block ``A`` over their number: exact, and sharp for a single
 follower and for two agents. Otherwise, with
 ``B = A - c I`` for a strong component's block ``A`` and a symmetric ``H`` with ``H B + B'H > 0``, ``H`` and ``B`` have
@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from lmi.definiteness_proofs import prove_positive_definite
+from lmi.exact.directed_rounding import float_down
 from lmi.exact.numbers import round_to_bits
-from lmi.exact.rounding import float_down
-from lmi.witness import prove_positive_definite
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix
@@ -34,7 +34,7 @@ _MATRIX_BITS, _VECTOR_BITS = 60, 40
 
 
 @dataclass(frozen=True)
-class RateLimit:
+class RateBound:
     """No rate exceeds ``value``, and what proves it.
 
     Attributes
@@ -56,7 +56,7 @@ class RateLimit:
     @property
     def kind(self) -> str:
         """Kind of the obligation that proves it."""
-        return "rate-limit" if self.form else "rate-mean"
+        return "rate-upper-bound" if self.form else "rate-mean"
 
     def witness(self, labels: Sequence[str]) -> dict[str, Any]:
         """Return the node, or nodes, form and vectors as JSON-ready data."""
@@ -69,7 +69,7 @@ class RateLimit:
         }
 
 
-def prove_rate_limit(structure: Structure) -> RateLimit | None:
+def prove_rate_bound(structure: Structure) -> RateBound | None:
     """Prove an upper bound on every rate, as near to the spectral rate as proves; None if no agent listens.
 
     Examples
@@ -77,14 +77,14 @@ def prove_rate_limit(structure: Structure) -> RateLimit | None:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> pair = [(1, 2, -1), (2, 1, -3)]
-    >>> float(prove_rate_limit(analyse(SignedDigraph.from_edges(pair))).value)  # one nonzero eigenvalue, 4
+    >>> float(prove_rate_bound(analyse(SignedDigraph.from_edges(pair))).value)  # one nonzero eigenvalue, 4
     8.0
     >>> three = analyse(SignedDigraph.from_edges([*pair, (1, 3, 1), (3, 1, 1)]))  # the eigenvalues 0, 1 and 5
-    >>> limit = prove_rate_limit(three)
+    >>> limit = prove_rate_bound(three)
     >>> limit.kind, float(limit.value).__round__(6)
-    ('rate-limit', 2.0)
+    ('rate-upper-bound', 2.0)
     """
-    mean = mean_limit(structure)
+    mean = mean_bound(structure)
     slowest = None if mean is None else _slowest(structure)
     if mean is None or slowest is None:
         return mean
@@ -114,7 +114,7 @@ def optimality_ratio(rate: Fraction | None, upper_bound: Fraction | None) -> flo
     return None if rate is None or upper_bound is None else float_down(rate / upper_bound)
 
 
-def mean_limit(structure: Structure) -> RateLimit | None:
+def mean_bound(structure: Structure) -> RateBound | None:
     """Return twice the mean nonzero eigenvalue of the strong component where that is least; None if no agent listens.
 
     Which one is found in floats; its trace is exact, and costs no more than a sum over its edges.
@@ -123,7 +123,7 @@ def mean_limit(structure: Structure) -> RateLimit | None:
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> mean_limit(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3), (2, 3, "1/7")]))).value
+    >>> mean_bound(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3), (2, 3, "1/7")]))).value
     Fraction(2, 7)
     """
     graph, number = structure.graph, structure.strong_component
@@ -142,7 +142,7 @@ def mean_limit(structure: Structure) -> RateLimit | None:
         trace = Fraction(sum(map(abs, table[edges].tolist())), scale)
     else:
         trace = sum((abs(graph.exact_weight(i)) for i in edges.tolist()), Fraction(0))
-    return RateLimit(2 * trace / int(count[least]), (int(np.flatnonzero(number == least)[0]),))
+    return RateBound(2 * trace / int(count[least]), (int(np.flatnonzero(number == least)[0]),))
 
 
 def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
@@ -170,7 +170,7 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     return best
 
 
-def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateLimit | None:
+def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]
@@ -196,4 +196,4 @@ def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> R
         return None
     if not prove_positive_definite(integer_rows(-(X * H * X.transpose()))):
         return None
-    return RateLimit(2 * c, nodes, form, vectors)
+    return RateBound(2 * c, nodes, form, vectors)

@@ -14,11 +14,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from lmi.definiteness_proofs import dyadic_array
 from lmi.errors import MatrixError
 from lmi.exact import arithmetic, fast
 from lmi.exact.definite import SparseFactor, scaled
-from lmi.exact.enclosure import rounded
-from lmi.witness import dyadic_array
+from lmi.exact.elementary_enclosures import rounded
 
 EPS = float(np.finfo(float).eps)
 #: Bits of a rounded factor, one after the other.

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from ptcc_certify.bounds.input.effort import Witness
-from ptcc_certify.checker.input_bounds import InputBounds, Of, rounded
+from ptcc_certify.checker.input_formulas import InputBounds, Of, rounded
 from ptcc_certify.graphs.rationals import nearest_float, writable
 
 #: Bits of the bounds that are written, and of the instants that witness them.
@@ -51,15 +51,15 @@ def least(attempts: Iterable[Callable[[], Found | None]], size: Callable[[Found]
     return min((found for found in proved if found is not None), key=size, default=None)
 
 
-def usable_members(bounds: InputBounds) -> list[int]:
+def usable_functions(bounds: InputBounds) -> list[int]:
     """Return which Lyapunov functions decay and say something of single agents."""
-    members = []
+    functions = []
     for k in range(len(bounds.forms)):
         with suppress(ValueError, OverflowError):
             bounds.constant(k)
             bounds.start(k)
-            members.append(k)
-    return members
+            functions.append(k)
+    return functions
 
 
 def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
@@ -67,10 +67,10 @@ def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
     return bounds.root_constant(k, agent) * bounds.start(k)
 
 
-def best_bound(bounds: InputBounds, of: Of, agent: int | None, members: Sequence[int]) -> Witness | None:
-    """Return the bound of the member whose decay takes over first, which is the least peak; the least while driven."""
+def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequence[int]) -> Witness | None:
+    """Return the bound of the function whose decay takes over first, the least peak; the least while driven."""
     found: Witness | None = None
-    for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in members):
+    for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in functions):
         if z <= LATEST:
             instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
             try:
@@ -84,9 +84,9 @@ def best_bound(bounds: InputBounds, of: Of, agent: int | None, members: Sequence
     return found
 
 
-def least_bound(bounds: InputBounds, of: Of, members: Sequence[int]) -> Witness | None:
-    """Return the least bound of the norm over some members."""
-    return least((partial(best_bound, bounds, of, None, [k]) for k in members), lambda w: w.value)
+def least_bound(bounds: InputBounds, of: Of, functions: Sequence[int]) -> Witness | None:
+    """Return the least bound of the norm over some Lyapunov functions."""
+    return least((partial(best_bound, bounds, of, None, [k]) for k in functions), lambda w: w.value)
 
 
 def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:

@@ -20,7 +20,7 @@ from lmi.diagonal import (
 )
 from lmi.errors import MatrixError
 from lmi.interior_point import maximise_margin
-from lmi.matrices import square
+from lmi.matrix_classes import square
 
 
 @dataclass(frozen=True)

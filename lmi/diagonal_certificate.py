@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lmi.errors import MatrixError, NoCertificate
-from lmi.matrices import square
+from lmi.matrix_classes import square
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class DiagonalCertificate:
 
     @property
     def condition(self) -> float:
-        """``max(omega) / min(omega)``, the prefactor of the squared norm; infinite where float64 ends."""
+        """``max(omega) / min(omega)``, the overshoot constant of the squared norm; infinite where float64 ends."""
         return math.exp(self.log_condition) if self.log_condition < 709 else math.inf
 
     @property

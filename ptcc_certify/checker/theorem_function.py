@@ -8,10 +8,9 @@ from fractions import Fraction
 from itertools import chain
 from typing import Any, NamedTuple
 
+from lmi.exact.directed_rounding import down
 from lmi.exact.numbers import integers, longest, sized
-from lmi.exact.rounding import down
 from lmi.exact.work import spend
-from ptcc_certify.checker.document import Document
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrices import (
     Matrix,
@@ -23,6 +22,7 @@ from ptcc_certify.checker.matrices import (
     need_rows,
     only,
 )
+from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Claim, Structure
 
@@ -61,7 +61,7 @@ def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | No
     said, graph = doc.section("paper"), structure.graph
     if said is None:
         return None
-    keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "prefactor")
+    keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "overshoot")
     need_rows(graph.n)
     fields(said, keys, "paper")
     objective, coordinates, expected = _row(structure, claim.theorem)
@@ -82,10 +82,10 @@ def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | No
     need(rate is None or rate > 0, "the rate is not positive")
     paper = Paper(structure, coordinates, blocks, rho, rate)
     if not blocks:
-        need(rate is None and said["prefactor"] is None, "a rate where nothing moves")
+        need(rate is None and said["overshoot"] is None, "a rate where nothing moves")
     else:
         weights = list(paper.weights(rho).values())
-        need(exact(said["prefactor"]) == max(weights) / min(weights), "prefactor")
+        need(exact(said["overshoot"]) == max(weights) / min(weights), "overshoot")
     if rate is None or coordinates == "eps":
         need(said["rho_interval"] is None, "an interval without a proof, or without rho")
     if rate is not None and coordinates == "eps":

@@ -13,11 +13,11 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
-from ptcc_certify.bounds.input.search import decaying, kept, least, log
-from ptcc_certify.checker.input_bounds import LAST_PERIODS, InputBounds, Limits, root_above
+from ptcc_certify.bounds.input.tightest_bound import decaying, kept, least, log
+from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.limits import GainLimits
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 #: Periods below this share of ``T`` are not tried; how often the interval of the longest one is halved, and which
 #: shares of it are proved, one after the other, until one is.
@@ -31,12 +31,13 @@ class LimitedBounds:
     Attributes
     ----------
     bounds : InputBounds
-    members : sequence of int
+    functions : sequence of int
         The Lyapunov functions that serve.
-    distances : sequence
-        Of every one, the constants from ``V`` to the distances of agents to their outcomes, or None.
+    deviations : sequence
+        Of every one, the constants from ``V`` to the deviations of agents to their final states, or None.
     cap : Fraction or None
-        No agent is farther from its outcome than this, the largest deviation at the start, unless the input is held.
+        No agent is farther from its final state than this, the largest deviation at the start, unless the input is
+        held.
     peak : Peak or None
         Of the input without limits.
     noise : Fraction or None
@@ -44,8 +45,8 @@ class LimitedBounds:
     """
 
     bounds: InputBounds
-    members: Sequence[int]
-    distances: Sequence[Sequence[Fraction] | None]
+    functions: Sequence[int]
+    deviations: Sequence[Sequence[Fraction] | None]
     cap: Fraction | None
     peak: Peak | None
     noise: Fraction | None
@@ -60,10 +61,10 @@ class LimitedBounds:
         if top is None:
             return None
         clock = limits.clock_below(self.bounds.gain)
-        found = least((partial(self._by, k, limits, clock, top) for k in self.members), lambda entry: entry.norm)
+        found = least((partial(self._by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
         if found is None or self.noise is None or limits.sample_period is not None:
             return found
-        noisy = least((partial(self._noisy, k, found, top) for k in self.members), lambda entry: entry.noisy_largest)
+        noisy = least((partial(self._noisy, k, found, top) for k in self.functions), lambda entry: entry.noisy_largest)
         return noisy or found
 
     def _by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
@@ -76,7 +77,7 @@ class LimitedBounds:
         norm = kept(bounds.root_constant(k, None) * left)
         if held and norm > bounds.first:
             return None
-        known = self.distances[k] if k < len(self.distances) else None
+        known = self.deviations[k] if k < len(self.deviations) else None
         sizes = [root_above(c) * left for c in known or ()]
         if self.cap is not None and not held:
             sizes = [min(x, self.cap) for x in sizes]
@@ -89,14 +90,14 @@ class LimitedBounds:
         noise = self.noise or Fraction(0)
         whole, each = self.bounds.noisy(k, noise)
         norm, most = kept(found.norm + whole), kept((found.largest or 0) + top * max(each))
-        return replace(found, noise=noise, noise_member=k, noisy_norm=norm, noisy_largest=most)
+        return replace(found, noise=noise, noise_function=k, noisy_norm=norm, noisy_largest=most)
 
     def longest_period(self, limits: Sequence[Limits], found: Sequence[Limited | None], gain: Gain) -> Fraction | None:
         """Return a period of four digits with which all is certified that is not, near to the longest; None if none."""
         failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
         if not failed or any(entry.sample_period is None for entry in failed) or not self.bounds.first:
             return None
-        growths = {k: m for k in self.members if (m := step_growth(self.bounds, k)) is not None}
+        growths = {k: m for k in self.functions if (m := step_growth(self.bounds, k)) is not None}
         periods = [self._longest_period(entry, gain, growths) for entry in failed]
         return None if None in periods else min(period for period in periods if period is not None)
 
@@ -138,9 +139,9 @@ def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth
     first = max(count - LAST_PERIODS, 0)
     # Before the last periods the gain changes little from one to the next: they are counted by the thousand.
     edges = np.unique(np.append(np.geomspace(1, first + 1, 1000).astype(np.int64), 1)) - 1 if first else np.array([0])
-    starts = np.append(first - edges[::-1], np.arange(first + 1, count))
-    times = np.diff(starts, append=count)
-    at = starts * period
+    initial_set = np.append(first - edges[::-1], np.arange(first + 1, count))
+    times = np.diff(initial_set, append=count)
+    at = initial_set * period
     eta = limited.value(at) * np.minimum(period, end - at)
     with np.errstate(all="ignore"):
         return float(np.sum(times * np.log(np.maximum(1 - eta * b + eta**2 * m, 1e-300))) / 2)
@@ -165,7 +166,7 @@ def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
 
 
 def disturbed(
-    bounds: InputBounds, members: Sequence[int], delta: Fraction, influence: Influence | None
+    bounds: InputBounds, functions: Sequence[int], delta: Fraction, influence: Influence | None
 ) -> Disturbed | None:
     """Bound what disturbances add under the nominal protocol."""
     drift = None
@@ -176,4 +177,4 @@ def disturbed(
     def by(k: int) -> Disturbed:
         return Disturbed(delta, k, tuple(map(kept, bounds.disturbed(k, delta))), drift)
 
-    return least((partial(by, k) for k in members), lambda found: max(found.inputs))
+    return least((partial(by, k) for k in functions), lambda found: max(found.inputs))

@@ -7,7 +7,7 @@ computing takes over from another is told where it does.
 #: Files: bytes after unpacking, characters of a line, nodes (a matrix has their number, not themselves).
 MAX_BYTES, MAX_LINE, MAX_NODES = 2**30, 65_536, 2 * 10**6
 
-#: Nodes up to which null vectors, outcomes and proofs are computed in exact rationals.
+#: Nodes up to which null vectors, final states and proofs are computed in exact rationals.
 EXACT_NODES = 120
 #: Nodes above which null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
 DENSE_NODES, FACTOR_NODES = 500, 20_000

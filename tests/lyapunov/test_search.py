@@ -15,7 +15,7 @@ from ptcc_certify import NominalProtocol, SignedDigraph, SlidingModeProtocol, an
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import root_above
-from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, Candidate, choose, prove_member, sharpen
+from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, Candidate, choose, prove_function, search_functions
 
 P = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLOCKS = [float(P.gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
@@ -63,7 +63,7 @@ def test_the_exact_basis_lies_in_the_range_of_the_laplacian(name: str):
     K = system.exact_basis
     assert K is not None and system.basis is not None
     where = {v: i for i, v in enumerate(system.nodes)}
-    for component, voice in zip(matrix.balanced, matrix.voices, strict=True):
+    for component, voice in zip(matrix.balanced, matrix.left_null_vectors, strict=True):
         if len(component.nodes) > 1:
             for column in range(len(K[0])):
                 entries = zip(component.nodes, voice, strict=True)
@@ -82,15 +82,15 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
     structure = analyse(random_graph(np.random.default_rng(8), **dict(kwargs, weights="decimals")).graph)
     system = ErrorSystem(structure)
     if system.nodes:
-        found = sharpen(system, "best", CLOCKS)
-        assert all("needs a prefactor above" in note for note in found.notes), (name, found.notes)
+        found = search_functions(system, "best", CLOCKS)
+        assert all("needs an overshoot constant above" in note for note in found.notes), (name, found.notes)
         spectral = certify(structure.graph, P, simulation=False, method="paper").spectral_rate
-        useful = [float(m.rate) for m in found.members if m.prefactor <= LARGEST_PREFACTOR]
+        useful = [float(m.rate) for m in found.functions if m.overshoot <= LARGEST_PREFACTOR]
         assert spectral is not None and max(useful) >= 0.95 * spectral, name
         assert found.diagonal_limit is not None
         assert found.tried["lmi"] >= found.diagonal_limit * (1 - 1e-4), name
         assert found.tried["perron"] <= found.diagonal_limit * (1 + 1e-9), name
-        assert max(float(m.rate) for m in found.members) <= spectral * (1 + 1e-5), name
+        assert max(float(m.rate) for m in found.functions) <= spectral * (1 + 1e-5), name
 
 
 def test_the_instant_asked_for_is_bounded_best():
@@ -101,43 +101,45 @@ def test_the_instant_asked_for_is_bounded_best():
         assert asked <= plain * (1 + 1e-9)
 
 
-def test_choice_prefers_the_smaller_prefactor_among_equal_rates():
+def test_choice_prefers_the_smaller_overshoot_among_equal_rates():
     same = [Candidate("full", 1.0, 50.0), Candidate("full", 1.0 + 1e-9, 5000.0), Candidate("lmi", 0.9, 1e9)]
     chosen = choose(same, [100.0])
     assert any(c.condition == 50.0 for c in chosen) and any(c.kind == "lmi" for c in chosen)
 
 
-def test_the_envelope_lies_below_each_member_and_above_the_motion():
+def test_the_envelope_lies_below_each_function_and_above_the_motion():
     rng = np.random.default_rng(2)
     for name in ("1.1", "1.2", "2.2", "3.1 mixed", "disconnected mixed"):
         graph = of_class(name, weights="log6")
         cert = certify(graph, P, simulation=False)
         envelope, s = cert.envelope, np.linspace(0, 20, 41)
         whole = envelope.norm_factor(s)
-        for member in envelope.members:
-            if member.coordinates == envelope.coordinates:
-                alone = np.sqrt(member.prefactor_above) * np.exp(-member.rate_below * s / 2)
+        for function in envelope.functions:
+            if function.coordinates == envelope.coordinates:
+                alone = np.sqrt(function.overshoot_above) * np.exp(-function.rate_below * s / 2)
                 assert (whole <= alone * (1 + 3e-12)).all()  # bounds are rounded up by 1e-12
         x0 = rng.normal(size=graph.n_nodes)
         assert (envelope.bound(s, x0) <= whole * envelope.bound(0.0, x0) * (1 + 1e-9)).all() or len(
-            envelope.members
+            envelope.functions
         ) > 1
-        assert (np.diff(envelope.distance(s, x0), axis=1) <= 1e-300).all() or min(m.rate for m in envelope.members) < 0
+        assert (np.diff(envelope.deviation(s, x0), axis=1) <= 1e-300).all() or min(
+            m.rate for m in envelope.functions
+        ) < 0
 
 
-def test_vector_norm_of_the_distance_is_bounded():
+def test_vector_norm_of_the_deviation_is_bounded():
     graph = of_class("3.1 mixed")
     x0 = [Fraction(k % 7 - 3) for k in range(graph.n_nodes)]
     cert = certify(graph, P, x0, simulation=False)
-    assert cert.outcome is not None
-    final = [ball(Fraction(x)) for x in cert.outcome.final_state]
+    assert cert.final_state is not None
+    final = [ball(Fraction(x)) for x in cert.final_state.states]
     for q in (Fraction(1, 2), Fraction(1, 10), Fraction(1, 1000)):
         X = states(graph, clock(P, q), x0)
         true = sum(((x - y) ** 2 for x, y in zip(X, final, strict=True)), flint.arb(0)) ** 0.5
         start = np.array([float(x) for x in x0])
-        bound = cert.envelope.distance_norm(float(P.gain.clock_at_remaining(float(q))), start)
+        bound = cert.envelope.deviation_norm(float(P.gain.clock_at_remaining(float(q))), start)
         assert not true > flint.arb(float(bound))
-        agents = cert.outcome_distance([float(q)])[:, 0]
+        agents = cert.deviation_bound([float(q)])[:, 0]
         assert bound <= np.linalg.norm(agents) * (1 + 1e-9)
 
 
@@ -153,8 +155,8 @@ def test_an_indefinite_matrix_is_refused():
     system = ErrorSystem(analyse(SignedDigraph.from_edges([(1, 2, 1), (1, 3, 2)])))  # E_2' = -E_2, E_3' = -2 E_3
     P_indefinite = np.diag([-1.0, 1.0])
     assert system.prove_rate([[Fraction(int(x)) for x in row] for row in P_indefinite], 3.0) is not None
-    assert prove_member(system, Candidate("full", 3.0, 1.0, matrix=P_indefinite)) is None
-    assert prove_member(system, Candidate("full", 1.9, 1.0, matrix=np.eye(2))) is not None
+    assert prove_function(system, Candidate("full", 3.0, 1.0, matrix=P_indefinite)) is None
+    assert prove_function(system, Candidate("full", 1.9, 1.0, matrix=np.eye(2))) is not None
 
 
 def test_a_start_that_cancels_is_taken_exactly():
@@ -164,12 +166,12 @@ def test_a_start_that_cancels_is_taken_exactly():
         half = abs(Fraction(x0[0]) - Fraction(x0[1])) / 2
         for method in ("paper", "best"):
             cert = certify(graph, P, x0, method=method, simulation=False)
-            assert Fraction(cert.outcome_distance([1.0]).max()) >= half
-            assert cert.outcome_distance([1.0]).max() <= float(half) * (1 + 1e-9)
+            assert Fraction(cert.deviation_bound([1.0]).max()) >= half
+            assert cert.deviation_bound([1.0]).max() <= float(half) * (1 + 1e-9)
             assert Fraction(cert.norm_bound([1.0])[0]) ** 2 >= (2 * half**2 if method == "paper" else 8 * half**2)
         robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
         slid = certify(graph, robust, x0, sigma0=[0, 0], simulation=False)
-        assert Fraction(slid.outcome_distance([1.0]).max()) >= half
+        assert Fraction(slid.deviation_bound([1.0]).max()) >= half
 
 
 @pytest.mark.parametrize("size", ["1e-300", "1e-162", "1e150"])
@@ -180,7 +182,7 @@ def test_weights_of_any_size_keep_their_bounds_in_sliding_mode(size: str, method
     cert = certify(graph, robust, [1, 2, 3], sigma0=[1, 0, 0], method=method)
     assert cert.comparison is None or not cert.comparison.violated
     if cert.verdict == "certified" and size == "1e-300":
-        assert (cert.outcome_distance([0.9, 0.4, 0.01]) > 0.1).all()  # nothing has moved yet
+        assert (cert.deviation_bound([0.9, 0.4, 0.01]) > 0.1).all()  # nothing has moved yet
 
 
 @pytest.mark.parametrize("far", [6, 12])
@@ -190,27 +192,27 @@ def test_stiff_graphs_give_no_nan(far: int):
     for protocol, more in ((P, {}), (robust, {"sigma0": [1, 0, 0]})):
         cert = certify(graph, protocol, [1, 2, 3], method="lmi", **more)
         assert cert.verdict == "certified"
-        assert not np.isnan(cert.outcome_distance([0.9, 0.1, 1e-9])).any()
+        assert not np.isnan(cert.deviation_bound([0.9, 0.1, 1e-9])).any()
         assert not np.isnan(cert.norm_bound([0.9, 0.1, 1e-9])).any()
         assert cert.comparison is None or not cert.comparison.violated
 
 
 def test_agents_that_keep_their_state_are_where_they_end():
     graph = SignedDigraph.from_edges([], ["a", "b"])
-    assert not certify(graph, P, [3, 4]).outcome_distance([1.0, 0.5]).any()
+    assert not certify(graph, P, [3, 4]).deviation_bound([1.0, 0.5]).any()
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    slid = certify(graph, robust, [3, 4], sigma0=[1, 0]).outcome_distance([1.0, 0.1])
+    slid = certify(graph, robust, [3, 4], sigma0=[1, 0]).deviation_bound([1.0, 0.1])
     assert slid[0, 0] >= 1 and not slid[1].any() and not slid[:, 1].any()
 
 
-def test_the_reported_prefactor_is_not_decided_by_rounding():
+def test_the_reported_overshoot_is_not_decided_by_rounding():
     """Members whose rates differ by less than 1e-6 share the smaller one, so that the smaller prefactor is reported."""
     for name, kwargs in all_classes()[1:24:3]:
         cert = certify(random_graph(np.random.default_rng(6), **kwargs).graph, P, simulation=False)
-        rates = [(m.rate, m.prefactor) for m in cert.sharpening.members]
-        for rate, prefactor in rates:
+        rates = [(m.rate, m.overshoot) for m in cert.search.functions]
+        for rate, overshoot in rates:
             if cert.rate is not None and rate >= cert.rate * (1 - Fraction(1, 10**6)):
-                assert cert.prefactor is not None and cert.prefactor <= prefactor, name
+                assert cert.overshoot is not None and cert.overshoot <= overshoot, name
 
 
 # ---------------------------------------------------------------------- where precision ends
@@ -225,22 +227,22 @@ def holds_in_balls(graph: SignedDigraph, seed: int) -> str:
     if cert.verdict == "undecided":
         assert any(character.isdigit() for note in cert.notes for character in note), cert.notes
         return cert.verdict
-    assert cert.outcome is not None
-    final = [ball(Fraction(x)) for x in cert.outcome.final_state]
+    assert cert.final_state is not None
+    final = [ball(Fraction(x)) for x in cert.final_state.states]
     instants = [Fraction(9, 10), Fraction(1, 2), Fraction(1, 100), Fraction(1, 10**8)]
-    distances = cert.outcome_distance([float(q) for q in instants])
+    deviations = cert.deviation_bound([float(q) for q in instants])
     flint.ctx.prec = 2000
     start = [ball(x) for x in x0]
     for i, q in enumerate(instants):
         s = clock(P, q)
         X = states(graph, s, x0)
-        for member in cert.sharpening.members:
-            V0 = form_value(graph, member.nodes, member.weights or None, member.matrix, start)
-            V = form_value(graph, member.nodes, member.weights or None, member.matrix, X)
-            bound = (-ball(member.rate) * s).exp() * V0
-            assert not bound < V, (member.kind, q)
+        for function in cert.search.functions:
+            V0 = form_value(graph, function.nodes, function.weights or None, function.matrix, start)
+            V = form_value(graph, function.nodes, function.weights or None, function.matrix, X)
+            bound = (-ball(function.rate) * s).exp() * V0
+            assert not bound < V, (function.kind, q)
         for k in range(graph.n_nodes):
-            assert not abs(X[k] - final[k]) > flint.arb(float(distances[k, i])), (k, q)
+            assert not abs(X[k] - final[k]) > flint.arb(float(deviations[k, i])), (k, q)
     return cert.verdict
 
 

@@ -14,13 +14,13 @@ from scipy.linalg import expm
 
 from ptcc_certify.batch import certify_many
 from ptcc_certify.bounds.final_state import (
+    final_state,
     influence,
     is_bipartite_consensus,
     is_bipartite_containment,
     is_interval_bipartite_consensus,
     is_prescribed_time_stable,
     is_stability,
-    outcome,
 )
 from ptcc_certify.bounds.input import box, ellipsoid
 from ptcc_certify.certificate.procedure import certify
@@ -68,10 +68,10 @@ def test_q_is_the_projection_onto_the_kernel_along_the_range(made: Made):
 
 
 @given(made_graphs(max_nodes=9), SEEDS)
-def test_the_outcome_is_the_limit_of_the_motion(made: Made, seed: int):
+def test_the_final_state_is_the_limit_of_the_motion(made: Made, seed: int):
     x0 = start(seed, made.graph.n_nodes)
     structure = analyse(made.graph)
-    exact, floats = outcome(structure, x0), outcome(structure, x0, exact=False)
+    exact, floats = final_state(structure, x0), final_state(structure, x0, exact=False)
     assert exact.exact and not floats.exact
     size = max(1.0, max(abs(float(x)) for x in x0))
     assert floats.values == pytest.approx(exact.values, abs=1e-8 * size)
@@ -83,39 +83,39 @@ def test_the_outcome_is_the_limit_of_the_motion(made: Made, seed: int):
 
 
 @given(made_graphs(max_nodes=9), SEEDS)
-def test_the_outcome_shows_the_claimed_behaviour(made: Made, seed: int):
+def test_the_final_state_shows_the_claimed_behaviour(made: Made, seed: int):
     x0 = start(seed, made.graph.n_nodes)
     structure = analyse(made.graph)
-    result = outcome(structure, x0)
+    result = final_state(structure, x0)
     if not result.degenerate and structure.claim is not None:
         assert PREDICATE[structure.claim.behaviour](result, structure)
         for word in structure.claim.special:
             if word in ("consensus",):
-                assert len(set(result.final_state)) == 1
+                assert len(set(result.states)) == 1
             elif word in ("signed-average consensus",):
                 g = structure.gauge
                 assert g is not None
                 mean = sum((int(s) * x for s, x in zip(g, x0, strict=True)), Fraction(0)) / len(x0)
-                assert [int(s) * x for s, x in zip(g, result.final_state, strict=True)] == [mean] * len(x0)
+                assert [int(s) * x for s, x in zip(g, result.states, strict=True)] == [mean] * len(x0)
             elif word in PREDICATE:
                 assert PREDICATE[word](result, structure)
     if not result.degenerate and structure.claim is None:
         assert is_bipartite_containment(result, structure)
-    hull = max((abs(result.final_state[v]) for v in structure.leaders.tolist()), default=Fraction(0))
-    assert all(abs(x) <= hull for x in result.final_state)
+    hull = max((abs(result.states[v]) for v in structure.leaders.tolist()), default=Fraction(0))
+    assert all(abs(x) <= hull for x in result.states)
     assert hull <= max(abs(x0[v]) for v in structure.leaders.tolist())
 
 
 def test_a_degenerate_start_is_named():
     st_ = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 3)]))
-    result = outcome(st_, [3, -1])
-    assert result.final_state == (0, 0)
+    result = final_state(st_, [3, -1])
+    assert result.states == (0, 0)
     assert result.degenerate == (1,)
     assert not is_bipartite_consensus(result, st_)  # Definition 3 asks for a positive value
-    assert outcome(st_, [3, 1]).degenerate == ()
+    assert final_state(st_, [3, 1]).degenerate == ()
     single = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
-    assert outcome(single, [0, 5]).degenerate == (1,)
-    assert outcome(single, ["0.1", 5]).final_state == (Fraction(1, 10), Fraction(1, 10))
+    assert final_state(single, [0, 5]).degenerate == (1,)
+    assert final_state(single, ["0.1", 5]).states == (Fraction(1, 10), Fraction(1, 10))
 
 
 def test_who_decides_whom():
@@ -133,15 +133,15 @@ def test_who_decides_whom():
 def test_bad_starts_are_refused(x0, message):
     st_ = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
     with pytest.raises(ParameterError, match=message):
-        outcome(st_, x0)
+        final_state(st_, x0)
 
 
 def test_a_start_by_label():
     st_ = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]))
-    assert outcome(st_, {"2": 1, 1: 5}).final_state == (3, 3)
+    assert final_state(st_, {"2": 1, 1: 5}).states == (3, 3)
     for bad in ({"1": 5}, {"1": 5, "3": 2}, "52", {5, 2}, iter([1, 2])):
-        with pytest.raises(ParameterError, match="start"):
-            outcome(st_, bad)
+        with pytest.raises(ParameterError, match="x0"):
+            final_state(st_, bad)
 
 
 def test_labels_of_a_series_count_wherever_a_state_is_taken():
@@ -152,8 +152,8 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     cert = certify(team, protocol, x0, simulation=False)
     assert [float(x) for x in cert.start] == plain
     assert cert.envelope.norm_bound([0.5], x0) == cert.norm_bound([0.5])
-    assert (cert.envelope.outcome_distance([0.5], x0) == cert.outcome_distance([0.5])).all()
-    assert cert.outcome.final_state == outcome(analyse(team), x0).final_state
+    assert (cert.envelope.deviation_bound([0.5], x0) == cert.deviation_bound([0.5])).all()
+    assert cert.final_state.states == final_state(analyse(team), x0).states
     assert simulate(team, protocol, x0).states[:, 0].tolist() == plain
     run = simulate(team, protocol, pd.DataFrame({"x": x0, "y": 2 * x0}))
     assert run.states[:, :, 0].tolist() == [[x, 2 * x] for x in plain]
@@ -166,7 +166,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     assert box(x0 - 1, x0, team) == box([2.5, 1.5, 0.5], plain, team)
     assert ellipsoid(x0, [x0], team) == ellipsoid(plain, [plain])
     whole = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (3, 1, 1)])
-    assert outcome(analyse(whole), pd.Series([7, 5, 6], index=[3, 1, 2])).final_state == (7, 7, 7)
+    assert final_state(analyse(whole), pd.Series([7, 5, 6], index=[3, 1, 2])).states == (7, 7, 7)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ def test_the_definitions_on_trajectories(made: Made, seed: int):
     structure = analyse(made.graph)
     x0 = start(seed, made.graph.n_nodes)
     run = simulate(made.graph, NominalProtocol(T=1, rho1=1, rho2=2, kappa=2), [float(x) for x in x0])
-    result = outcome(structure, x0)
+    result = final_state(structure, x0)
     assert run.deadline_resolved
     assert np.abs(run.final_state - result.values).max() <= 1e-7 * max(1.0, np.abs(run.states).max())
     assert is_prescribed_time_stable(run)

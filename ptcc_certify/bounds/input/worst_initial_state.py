@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ptcc_certify.checker.input_bounds import Starts
+from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols import Protocol
 
 
 @dataclass(frozen=True)
-class WorstStart:
+class WorstInitialState:
     """A start of the set from which the input gets largest, in floating point.
 
     Attributes
@@ -39,8 +39,8 @@ class WorstStart:
     >>> from ptcc_certify.protocols import NominalProtocol
     >>> follower = analyse(SignedDigraph.from_edges([(1, 2, -2)]))
     >>> from ptcc_certify.bounds.input import box
-    >>> worst_start(follower, NominalProtocol(1, 1, 1, 1), box([0, 0], [1, 1]))
-    WorstStart(x0=array([1., 1.]), agent=1, t=0.0, size=8.0)
+    >>> worst_initial_state(follower, NominalProtocol(1, 1, 1, 1), box([0, 0], [1, 1]))
+    WorstInitialState(x0=array([1., 1.]), agent=1, t=0.0, size=8.0)
     """
 
     x0: np.ndarray
@@ -49,12 +49,12 @@ class WorstStart:
     size: float
 
 
-def worst_start(
-    structure: Structure, protocol: Protocol, starts: Starts, *, samples: int = 120, latest: float = 14.0
-) -> WorstStart:
-    """Return the start from which some ``|u_k(t)|`` is largest under the nominal part of the protocol (numerical).
+def worst_initial_state(
+    structure: Structure, protocol: Protocol, initial_set: InitialSet, *, samples: int = 120, latest: float = 14.0
+) -> WorstInitialState:
+    """Return the initial state with the largest ``|u_k(t)|`` under the nominal part of the protocol (numerical).
 
-    ``u(t) = -gain L e^(-L s) X(0)`` is linear in the start: at each of ``samples`` instants, evenly spaced in
+    ``u(t) = -gain L e^(-L s) X(0)`` is linear in the initial state: at each of ``samples`` instants, evenly spaced in
     ``z = ln(T/(T - t))`` up to ``latest``, the maximum over the set is exact.
 
     Parameters
@@ -62,7 +62,7 @@ def worst_start(
     structure : Structure
         Of N agents.
     protocol : Protocol
-    starts : Starts
+    initial_set : InitialSet
         Of N numbers.
     samples : int
         Number of instants.
@@ -71,7 +71,7 @@ def worst_start(
 
     Returns
     -------
-    WorstStart
+    WorstInitialState
 
     References
     ----------
@@ -83,19 +83,19 @@ def worst_start(
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.protocols import NominalProtocol
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.input import starts_within
+    >>> from ptcc_certify.bounds.input import initial_set_within
     >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
-    >>> worst = worst_start(pair, NominalProtocol(1, 1, 1, 1), starts_within(pair, 3))
+    >>> worst = worst_initial_state(pair, NominalProtocol(1, 1, 1, 1), initial_set_within(pair, 3))
     >>> worst.x0, worst.t, worst.size
     (array([-3., -3.]), 0.0, 12.0)
     """
     from scipy.linalg import expm
 
     L = structure.graph.dense_laplacian()
-    center = np.array([nearest_float(x) for x in starts.center])
-    radius = np.array([nearest_float(x) for x in starts.radius]) if starts.radius else np.zeros(len(center))
-    axes = np.array([[nearest_float(x) for x in axis] for axis in starts.axes])
-    best: WorstStart | None = None
+    center = np.array([nearest_float(x) for x in initial_set.center])
+    radius = np.array([nearest_float(x) for x in initial_set.radius]) if initial_set.radius else np.zeros(len(center))
+    axes = np.array([[nearest_float(x) for x in axis] for axis in initial_set.axes])
+    best: WorstInitialState | None = None
     gain = protocol.gain
     for z in np.linspace(0.0, latest, samples):
         M = -float(gain.value_at_remaining(math.exp(-z))) * (L @ expm(-L * float(gain.clock_at_tau(z))))
@@ -110,6 +110,6 @@ def worst_start(
                 x0 = center + sign * along @ axes / (np.linalg.norm(along) or 1.0)
             else:
                 x0 = center + sign * radius * np.sign(M[k])
-            best = WorstStart(x0, k, float(gain.time_at_tau(z)), size)
+            best = WorstInitialState(x0, k, float(gain.time_at_tau(z)), size)
     assert best is not None
     return best

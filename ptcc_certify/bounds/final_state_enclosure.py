@@ -1,12 +1,12 @@
-"""The final state of a large graph in intervals: leaders from their voices, followers by one solve and its residual.
+"""The final state of a large graph in intervals: leaders by left null vectors, followers by one solve.
 
 With ``u > 0`` and ``M(L_F) u > 0``, any approximation ``y`` of the followers' end has
 
     |x_F - y|  <=  max_i((|r_i| + s_i) / (M(L_F) u)_i) u,      r = L_F y + L_FL x_L,
 
-``s`` what the radii of the leaders add. The voices of a large leader group are enclosed in the same way. Residuals are
-taken in floats with room for their rounding, or in rationals where that room is too wide; the check of the certificate
-forms them exactly.
+``s`` what the radii of the leaders add. The left null vector of a large leader group is enclosed in the same way.
+Residuals are taken in floats with room for their rounding, or in rationals where that room is too wide; the check of
+the certificate forms them exactly.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from lmi.errors import LMIError
-from lmi.iterative import SparseHMatrix, solve
-from ptcc_certify.bounds.final_state import Enclosure, Influence, Outcome, follower_state
+from lmi.sparse_h_matrix import SparseHMatrix, solve
+from ptcc_certify.bounds.final_state import Enclosure, FinalState, Influence, follower_state
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 
 #: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
@@ -37,25 +37,27 @@ class NotEnclosedError(ArithmeticError):
 
 
 def enclose(structure: Structure, influence: Influence) -> Enclosure:
-    """Enclose the voices of ``Q``, and find the witness of all intervals.
+    """Enclose the left null vector of ``Q``, and find the witness of all intervals.
 
     Raises
     ------
     NotEnclosedError
-        The equations of followers or voices are too ill-conditioned for floats.
+        The equations of followers or left null vectors are too ill-conditioned for floats.
     """
     F = structure.followers
     u = np.ones(structure.graph.n_nodes)
     if F.size:
         u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
-    voices = {}
-    for k, (component, voice) in enumerate(zip(influence.balanced, influence.voices, strict=True)):
-        if not all(isinstance(w, Fraction | int) for w in voice):
-            voices[k] = _enclosed_voices(structure, component, np.array(voice, dtype=float), u)
-    return Enclosure(voices, u)
+    left_null_vectors = {}
+    for k, (component, null_vector) in enumerate(zip(influence.balanced, influence.left_null_vectors, strict=True)):
+        if not all(isinstance(w, Fraction | int) for w in null_vector):
+            left_null_vectors[k] = _enclosed_left_null_vector(
+                structure, component, np.array(null_vector, dtype=float), u
+            )
+    return Enclosure(left_null_vectors, u)
 
 
-def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence[Fraction]) -> Outcome:
+def enclosed_final_state(structure: Structure, influence: Influence, start: Sequence[Fraction]) -> FinalState:
     """Enclose ``Q start``, what is known of ``Q`` being enclosed.
 
     Raises
@@ -71,12 +73,17 @@ def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
     >>> who = influence(st, exact=False)
-    >>> found = enclosed_outcome(st, replace(who, enclosure=enclose(st, who)), [Fraction(1), Fraction(0), Fraction(1)])
-    >>> bool(abs(Fraction(found.final_state[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
+    >>> start = [Fraction(1), Fraction(0), Fraction(1)]
+    >>> found = enclosed_final_state(st, replace(who, enclosure=enclose(st, who)), start)
+    >>> bool(abs(Fraction(found.states[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
     True
     """
     assert influence.enclosure is not None
-    n, voices, u = structure.graph.n_nodes, influence.enclosure.voices, influence.enclosure.witness
+    n, left_null_vectors, u = (
+        structure.graph.n_nodes,
+        influence.enclosure.left_null_vectors,
+        influence.enclosure.witness,
+    )
     size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
     unit = Fraction(1)
     if 0 < size < _SMALLEST:
@@ -87,15 +94,15 @@ def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence
     degenerate = []
     for k, (number, component) in enumerate(zip(numbers, influence.balanced, strict=True)):
         signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
-        if k in voices and any(start[v] for v in component.nodes):
+        if k in left_null_vectors and any(start[v] for v in component.nodes):
             own = np.array([float(start[v]) for v in component.nodes])
-            value, spread = float(voices[k][0] @ own), float(voices[k][1] @ np.abs(own))
-            spread = (spread + _ROUNDING * float(np.abs(voices[k][0]) @ np.abs(own))) * _MORE
+            value, spread = float(left_null_vectors[k][0] @ own), float(left_null_vectors[k][1] @ np.abs(own))
+            spread = (spread + _ROUNDING * float(np.abs(left_null_vectors[k][0]) @ np.abs(own))) * _MORE
             if abs(value) <= 2 * spread:
                 raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
             middle[nodes], radius[nodes] = signs * value, spread
             continue
-        shares = zip(component.nodes, influence.voices[k], strict=True)
+        shares = zip(component.nodes, influence.left_null_vectors[k], strict=True)
         known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
         degenerate += [number] if known == 0 else []
         exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
@@ -110,7 +117,7 @@ def enclosed_outcome(structure: Structure, influence: Influence, start: Sequence
     for v, x in exact.items():
         final[v], spreads[v] = x * unit, Fraction(0)
     values = [final[c.nodes[0]] * (c.gauge or (1,))[0] for c in influence.balanced]
-    return Outcome(structure.graph.labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
+    return FinalState(structure.graph.labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
 
 
 def rounding_radius(value: Fraction) -> float:
@@ -147,14 +154,14 @@ def _witness(block: Any) -> np.ndarray:
     return u
 
 
-def _enclosed_voices(
-    structure: Structure, component: ClosedComponent, voice: np.ndarray, u: np.ndarray
+def _enclosed_left_null_vector(
+    structure: Structure, component: ClosedComponent, null_vector: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
     nodes = np.array(component.nodes)
     block = structure.graph.laplacian().tocsr()[nodes][:, nodes].tocsr()
     signs = np.array(component.gauge or (), dtype=float)
-    eta = signs * voice
+    eta = signs * null_vector
     top = int(np.argmax(eta))
     rest = np.delete(np.arange(nodes.size), top)
     own = _witness(block[rest][:, rest].T.tocsr())
@@ -170,7 +177,9 @@ def _enclosed_voices(
     weights[rest] = own
     low, high = z.sum() - error * weights.sum(), z.sum() + error * weights.sum()
     if not low > 0.5 * high:
-        raise NotEnclosedError(f"the voices of a leader group of {nodes.size} nodes are too ill-conditioned for floats")
+        raise NotEnclosedError(
+            f"the left null vector of a leader group of {nodes.size} nodes is too ill-conditioned for floats"
+        )
     ends = np.abs((z - error * weights) / high - eta), np.abs((z + error * weights) / low - eta)
     return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
 

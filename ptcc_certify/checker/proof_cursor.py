@@ -8,7 +8,7 @@ from typing import Any
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, Step
 from ptcc_certify.checker.reading import exact, fields, need
-from ptcc_certify.checker.vectors import SideFiles
+from ptcc_certify.checker.side_vectors import SideFiles
 
 
 class Document:
@@ -49,7 +49,7 @@ class Document:
         """Take the next obligation of the proof, which must be this one; return its numbers and its witness."""
         self.at = f"{kind} of {of}"
         need(len(self.steps) < len(self.data["proof"]), "the proof does not list this obligation")
-        keys = ("kind", "of", "statement", "lemma", "numbers", "witness")
+        keys = ("kind", "of", "proves", "lemma", "numbers", "witness")
         step = fields(self.data["proof"][len(self.steps)], keys, "an obligation")
         told = [step[key] for key in keys[:4]]
         need(told == [kind, of, *OBLIGATIONS[kind]], "the proof lists another obligation here")

@@ -17,7 +17,7 @@ from functools import cached_property
 from itertools import islice
 from typing import Any, NamedTuple
 
-from lmi.exact.enclosure import LARGEST_EXPONENT, exp, log, rounded, sqrt
+from lmi.exact.elementary_enclosures import LARGEST_EXPONENT, exp, log, rounded, sqrt
 from lmi.exact.work import spend
 
 #: Bits to which bounds are rounded.
@@ -359,8 +359,8 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Starts:
-    """A set of starts: a point, a box, or an ellipsoid.
+class InitialSet:
+    """A set of initial states: a point, a box, or an ellipsoid.
 
     Attributes
     ----------
@@ -373,7 +373,7 @@ class Starts:
 
     Examples
     --------
-    >>> box = Starts([Fraction(1), Fraction(0)], [Fraction(1), Fraction(2)])
+    >>> box = InitialSet([Fraction(1), Fraction(0)], [Fraction(1), Fraction(2)])
     >>> box.largest({0: Fraction(1), 1: Fraction(-1)})  # |x_1 - x_2| over 0..2 and -2..2
     Fraction(4, 1)
     """
@@ -384,7 +384,7 @@ class Starts:
 
     @property
     def point(self) -> bool:
-        """Whether there is one start only."""
+        """Whether there is one initial state only."""
         return not any(self.radius) and not self.axes
 
     def largest(self, row: Linear) -> Fraction:
@@ -485,7 +485,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class InputBounds:
-    """Bounds of the input over a set of starts.
+    """Bounds of the input over a set of initial states.
 
     Attributes
     ----------
@@ -496,7 +496,7 @@ class InputBounds:
     forms : list of Form or None
     constants : list of (list of Fraction or None)
         ``c_k`` of full matrices, ``e_k^2 <= c_k V``; those of diagonal ones follow.
-    starts : Starts
+    initial_set : InitialSet
         Of ``X(0)``.
     reaching : Reaching or None
         None if no sliding variable moves.
@@ -510,7 +510,7 @@ class InputBounds:
     gain: PrescribedGain
     forms: Sequence[Form | None]
     constants: Sequence[Sequence[Fraction] | None]
-    starts: Starts
+    initial_set: InitialSet
     reaching: Reaching | None = None
     _kept: dict[Any, Any] = field(default_factory=dict)
 
@@ -524,7 +524,7 @@ class InputBounds:
         """
         form = self.forms[k]
         if form is None or form.rate <= 0:
-            raise ValueError("a member that says nothing of single agents")
+            raise ValueError("a Lyapunov function that says nothing of single agents")
         return form
 
     @property
@@ -548,8 +548,8 @@ class InputBounds:
     @cached_property
     def held(self) -> list[Fraction]:
         """What no ``|e_k|`` ever exceeds: ``e^(-L s)`` expands neither ``max |x_k|`` nor ``max |e_k|``."""
-        largest = max(map(self.starts.largest, self.rows))
-        states = max(self.starts.largest({v: Fraction(1)}) for v in range(len(self.rows)))
+        largest = max(map(self.initial_set.largest, self.rows))
+        states = max(self.initial_set.largest({v: Fraction(1)}) for v in range(len(self.rows)))
         if self.reaching is not None:
             moved = [self.reaching.pushes(row) for row in self.rows]
             largest += max(a for a, _ in moved) + self.reaching.T_r * max(b for _, b in moved)
@@ -559,8 +559,8 @@ class InputBounds:
 
     @cached_property
     def first(self) -> Fraction:
-        """A bound of ``||E(0)||``, exact but for rounding for a single start."""
-        return root_above(sum((self.starts.largest(row) ** 2 for row in self.rows), Fraction(0)))
+        """A bound of ``||E(0)||``, exact but for rounding for a single initial state."""
+        return root_above(sum((self.initial_set.largest(row) ** 2 for row in self.rows), Fraction(0)))
 
     @cached_property
     def held_norm(self) -> Fraction:
@@ -568,18 +568,18 @@ class InputBounds:
         return root_above(sum((x * x for x in self.held), Fraction(0)))
 
     def start(self, k: int) -> Fraction:
-        """Bound ``sqrt(V(0))`` for all starts; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
+        """Bound ``sqrt(V(0))`` of the set; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
         if ("start", k) not in self._kept:
             form = self.form(k)
             rows = self._coordinates(form)
             known = [self._center[v] for v in form.nodes] if form.coordinates == "E" else None
-            self._kept["start", k] = rounded(_largest_root(form, rows, self.starts, known), BITS, up=True)
+            self._kept["start", k] = rounded(_largest_root(form, rows, self.initial_set, known), BITS, up=True)
         return self._kept["start", k]
 
     @cached_property
     def _center(self) -> list[Fraction]:
         """``L`` times the center of the starts."""
-        return [_dot(row, self.starts.center) for row in self.rows]
+        return [_dot(row, self.initial_set.center) for row in self.rows]
 
     def _coordinates(self, form: Form) -> list[Linear]:
         """Return the rows of the coordinates of a form."""
@@ -698,7 +698,7 @@ class InputBounds:
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
         form = Form(one, "E", nodes, None, W, one)
         known = [self._center[v] for v in nodes]
-        return _largest_root(form, [self.rows[v] for v in nodes], self.starts, known) ** 2
+        return _largest_root(form, [self.rows[v] for v in nodes], self.initial_set, known) ** 2
 
     def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
         """Bound what disturbances ``|d_k| <= delta`` add to the inputs of the nominal protocol.
@@ -756,21 +756,21 @@ def _dot(row: Linear, x: Sequence[Fraction]) -> Fraction:
     return sum((a * x[j] for j, a in row.items()), Fraction(0))
 
 
-def _count(form: Form, rows: Sequence[Linear], starts: Starts) -> None:
+def _count(form: Form, rows: Sequence[Linear], initial_set: InitialSet) -> None:
     """Count the work of :func:`_largest_root`."""
     n, matrix = len(rows), [*([form.diagonal] if form.diagonal is not None else form.matrix or ())]
-    vectors = [starts.center, *([starts.radius] if starts.radius else []), *starts.axes]
+    vectors = [initial_set.center, *([initial_set.radius] if initial_set.radius else []), *initial_set.axes]
     bits = _bits(x for row in rows for x in row.values()) + _bits(x for vector in vectors for x in vector)
     entries = sum(map(len, rows))
     spend(
         5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts"
     )
-    if starts.radius:
-        spend((entries + n * len(matrix)) * len(starts.center), bits, bits, "starts")
+    if initial_set.radius:
+        spend((entries + n * len(matrix)) * len(initial_set.center), bits, bits, "starts")
 
 
 def _largest_root(
-    form: Form, rows: Sequence[Linear], starts: Starts, center: Sequence[Fraction] | None = None
+    form: Form, rows: Sequence[Linear], initial_set: InitialSet, center: Sequence[Fraction] | None = None
 ) -> Fraction:
     """Bound ``sqrt(z'P z)`` over the starts, ``z = A X(0)`` with the rows of ``A``; ``sqrt(V)`` is a norm.
 
@@ -778,15 +778,15 @@ def _largest_root(
     ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid. ``center`` is ``z`` of
     the center, where it is known.
     """
-    _count(form, rows, starts)
-    middle = root_above(form.value([_dot(row, starts.center) for row in rows] if center is None else center))
-    if starts.point:
+    _count(form, rows, initial_set)
+    middle = root_above(form.value([_dot(row, initial_set.center) for row in rows] if center is None else center))
+    if initial_set.point:
         return middle
-    if starts.axes:
-        spread = sum((form.value([_dot(row, axis) for row in rows]) for axis in starts.axes), Fraction(0))
+    if initial_set.axes:
+        spread = sum((form.value([_dot(row, axis) for row in rows]) for axis in initial_set.axes), Fraction(0))
     else:
-        spread = _spread(form, rows, starts.radius)
-    entries = root_above(form.largest_value([starts.largest(row) for row in rows]))
+        spread = _spread(form, rows, initial_set.radius)
+    entries = root_above(form.largest_value([initial_set.largest(row) for row in rows]))
     return min(entries, middle + root_above(spread))
 
 
