@@ -151,7 +151,7 @@ def line(result: dict[str, Any], ours: dict[str, Any], best: float) -> str:
     head += f" {result['seconds']:>9.3f} {result['cpu']:>8.3f}"
     if result["solver"] == RATE:
         gap = result["upper"] / result["rate"] - 1
-        return f"{head} {'':>8} {result['MB']:>7.0f}  rate {result['rate']:.9f}, upper bound it by more than {gap:.1e}"
+        return f"{head} {'':>8} {result['MB']:>7.0f}  rate {result['rate']:.9f}, none exceeds it by more than {gap:.1e}"
     ratio = f"{result['seconds'] / ours['seconds']:.1f}" if "seconds" in ours else ""
     short = 1 - result["objective"] / best
     proved = f"1 - {1 - result['objective'] / result['found']:.0e}" if result["proved"] else "NOT PROVED"

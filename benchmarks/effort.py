@@ -75,11 +75,11 @@ def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
     k = OVER * 2 / proved.rate.limit_denominator(10**9)
     cert = proved.changed(protocol=NominalProtocol(1, Fraction(1, 2) * k, k, 1), initial_set=None)
     rng = np.random.default_rng(graph.n_nodes)
-    initial_set = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
+    states = rng.integers(-100, 101, (graph.n_nodes, STARTS)) / 100
     boxed = cert.changed(initial_set=initial_set_within(cert.structure, 1))
     assert boxed.initial_set is not None
     worst = worst_initial_state(cert.structure, cert.protocol, boxed.initial_set)
-    points = np.column_stack([initial_set, worst.x0])
+    points = np.column_stack([states, worst.x0])
     seen = motion(graph, cert.protocol, points)  # type: ignore[arg-type]
     alone: Ratios = {kind: [] for kind in KINDS}
     for i in range(STARTS + 1):

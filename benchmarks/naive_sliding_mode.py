@@ -147,8 +147,8 @@ def measure(send: Any, graph_name: str, label: str, cap: float, most: int) -> No
     """Run a method, in its own process, and again if it is fast; send the run with the median of the seconds."""
     np.seterr(all="ignore")
     graph, (method, options) = load_graph(graph_name), METHODS[label]
-    final_state = ptcc.final_state(ptcc.analyse(graph), (X0 - SIGMA0).astype(int).tolist())
-    exact = np.array(final_state.final_state, dtype=float)
+    ends = ptcc.final_state(ptcc.analyse(graph), (X0 - SIGMA0).astype(int).tolist())
+    exact = np.array(ends.states, dtype=float)
     if method == "ours":
         first = ours(graph, exact, options)
         seconds = [first.seconds, *(ours(graph, exact, options).seconds for _ in range(4))]

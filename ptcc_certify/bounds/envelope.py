@@ -52,7 +52,7 @@ def remaining_part(remaining: Any, name: str = "remaining") -> np.ndarray:
 
 
 def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
-    """Return values of a clock as floats, or refuse those before its initial state.
+    """Return values of a clock as floats, or refuse those before its start.
 
     Raises
     ------

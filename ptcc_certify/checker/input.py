@@ -336,7 +336,7 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
     need(not known.protocol.sliding, "limits are for the nominal protocol")
     cap, stop, period = (None if said[key] is None else exact(said[key]) for key in LIMIT_KEYS[:3])
     need(all(x is None or x > 0 for x in (cap, stop, period)), "a limit is not positive")
-    need(stop is None or stop < known.gain.T, "a stop before the initial state")
+    need(stop is None or stop < known.gain.T, "a stop beyond the deadline")
     need(period is None or period <= known.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
     top = limits.top(known.gain)

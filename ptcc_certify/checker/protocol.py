@@ -78,10 +78,10 @@ def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begi
     doc.done("for every disturbance within delta")
     z = [None if x is None else exact(x) for x in told]
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
-        need(not any(z), "a reaching time of a variable that is 0 from the initial state")
+        need(not any(z), "a reaching time of a variable that is 0 at time 0")
         return
     doc.open("reaching-time", "reaching_time")
-    need(all(end is None or end >= 0 for end in z), "a reaching time before the initial state")
+    need(all(end is None or end >= 0 for end in z), "a reaching time before time 0")
     asked = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
     spend(len(asked) * EACH_INSTANT, what="the reaching times of many agents")
     known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)

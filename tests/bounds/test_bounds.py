@@ -84,7 +84,7 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
     worst = farthest = 0.0
     run = simulate(graph, protocol, x0, times=[float(protocol.T * (1 - q)) for q in INSTANTS])
     gap, size = 0.0, max(float(max(map(abs, x0))), 1e-300)
-    initial_set = [V([ball(x) for x in x0]) for _, V in forms]
+    first = [V([ball(x) for x in x0]) for _, V in forms]
     for i, q in enumerate(INSTANTS):
         flint.ctx.prec = BITS
         X = states(graph, clock(protocol, q), x0)
@@ -99,7 +99,7 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
                     ratio = abs(X[k] - final[k]) / flint.arb(float(bound))
                     assert not ratio > 1, (name, seed, q, k)
                     farthest = max(farthest, float(ratio.lower()))
-        for (rate, V), V0 in zip(forms, initial_set, strict=True):
+        for (rate, V), V0 in zip(forms, first, strict=True):
             if V0 == 0 or not V0 > 0:
                 continue
             flint.ctx.prec = BITS
@@ -156,8 +156,8 @@ def test_vector_valued_agents():
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = certify(graph, protocol)
     assert cert.lyapunov is not None and cert.proof.rate is not None
-    initial_set = [[Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)] for _ in range(3)]
-    run = simulate(graph, protocol, np.array([[float(x) for x in column] for column in zip(*initial_set, strict=True)]))
+    drawn = [[Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)] for _ in range(3)]
+    run = simulate(graph, protocol, np.array([[float(x) for x in column] for column in zip(*drawn, strict=True)]))
     seen = cert.envelope.compare(run)
     assert seen.worst_ratio <= 1 + 1e-6
     assert run.states.shape[:2] == (graph.n_nodes, 3)
@@ -166,9 +166,9 @@ def test_vector_valued_agents():
     for q in (Fraction(1, 2), Fraction(1, 100), Fraction(1, 10**8)):
         s = clock(protocol, q)
         at = int(np.argmin(np.abs(run.remaining - float(q))))
-        columns = [states(graph, s, x0) for x0 in initial_set]
+        columns = [states(graph, s, x0) for x0 in drawn]
         total = sum((value(graph, cert.lyapunov, None, X) for X in columns), flint.arb(0))
-        start = sum((value(graph, cert.lyapunov, None, [ball(x) for x in x0]) for x0 in initial_set), flint.arb(0))
+        start = sum((value(graph, cert.lyapunov, None, [ball(x) for x in x0]) for x0 in drawn), flint.arb(0))
         assert total < (-ball(cert.proof.rate) * s).exp() * start
         if abs(run.remaining[at] - float(q)) < 1e-12:
             exact = np.array([[float(x) for x in X] for X in columns]).T

@@ -337,14 +337,14 @@ def test_numbers_about_the_input_that_cost_too_much_are_refused():
     data = limited("1.1", False)
     primes = [p for p in range(10**6, 10**6 + 4000) if all(p % d for d in range(2, 1001))]
     rows = [f"1/{p**600}" for p in primes]
-    initial_set = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
-    many = changed(data, ("input", "initial_set", "center"), initial_set)
+    center = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
+    many = changed(data, ("input", "initial_set", "center"), center)
     began = time.perf_counter()
     report = check(resealed(many), stdlib=True)
     assert not report.accepted and "denominator" in (report.reason or "")
     assert time.perf_counter() - began < 20
     aside = changed(
-        data, ("input", "initial_set", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(initial_set)}
+        data, ("input", "initial_set", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(center)}
     )
     assert "side file" in (check(resealed(aside), stdlib=True).reason or "")
     grown = next(k for k, step in enumerate(data["proof"]) if step["kind"] == "limited-gain")

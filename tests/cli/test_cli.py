@@ -520,11 +520,11 @@ def test_starts_in_every_form(form: str):
 
 
 def test_a_random_start_depends_on_the_seed_alone():
-    initial_set = [
+    drawn = [
         one_object(ptcc("certify", "fig1b", "--json", "--seed", seed).out)["initial_state"] for seed in ("0", "0", "7")
     ]
-    assert initial_set[0] == initial_set[1] != initial_set[2]
-    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in initial_set[2].values())
+    assert drawn[0] == drawn[1] != drawn[2]
+    assert all(abs(Fraction(x)) <= 10 and Fraction(x) * 1000 % 1 == 0 for x in drawn[2].values())
 
 
 def test_edges_are_read_the_way_that_is_asked_and_it_is_said():

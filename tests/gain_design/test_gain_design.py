@@ -78,15 +78,15 @@ def assert_holds_in_simulations(graph, found, R):
         np.array([float(x) for x in part]) for part in (found.asked.initial_set.center, found.asked.initial_set.radius)
     )
     vertices = center[:, None] + rng.choice([-1.0, 1.0], (graph.n_nodes, 20)) * radius[:, None]
-    initial_set = np.column_stack([found.worst.x0, vertices])
+    states = np.column_stack([found.worst.x0, vertices])
     cap = None if found.limits is None else Actuator(gain_cap=found.limits.gain_cap)
-    run = simulate(graph, found.protocol, initial_set, actuator=cap, past=0)
+    run = simulate(graph, found.protocol, states, actuator=cap, past=0)
     before = np.abs(run.input[..., run.t < float(found.deadline)])
     largest = np.linalg.norm(before, axis=0).max() if found.asked.input_norm == 2 else before.max()
     assert largest <= float(found.peak) * (1 + 1e-8)
     assert found.peak <= found.asked.max_input
     assert found.worst.size <= float(found.peak) * (1 + 1e-9)
-    left = np.abs(run.final_state - influence_matrix(graph) @ initial_set).max()
+    left = np.abs(run.final_state - influence_matrix(graph) @ states).max()
     assert left <= float(found.residual) + 1e-6 * float(R)
 
 

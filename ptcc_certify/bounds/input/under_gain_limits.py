@@ -139,9 +139,9 @@ def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth
     first = max(count - LAST_PERIODS, 0)
     # Before the last periods the gain changes little from one to the next: they are counted by the thousand.
     edges = np.unique(np.append(np.geomspace(1, first + 1, 1000).astype(np.int64), 1)) - 1 if first else np.array([0])
-    initial_set = np.append(first - edges[::-1], np.arange(first + 1, count))
-    times = np.diff(initial_set, append=count)
-    at = initial_set * period
+    begins = np.append(first - edges[::-1], np.arange(first + 1, count))
+    times = np.diff(begins, append=count)
+    at = begins * period
     eta = limited.value(at) * np.minimum(period, end - at)
     with np.errstate(all="ignore"):
         return float(np.sum(times * np.log(np.maximum(1 - eta * b + eta**2 * m, 1e-300))) / 2)
