@@ -81,7 +81,7 @@ class Certificate(Content, Shown):
         The paper's; None when the search found none or was not started. All that are proved are ``functions``.
     proof : RateProof
         The proved rate of the paper's function (None if not proved) and the statements proved for it.
-    sharper : tuple of LyapunovFunction
+    searched_functions : tuple of LyapunovFunction
         Sharper ones of the classes that ``method`` names, proved.
     limit : RateBound or None
         The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.

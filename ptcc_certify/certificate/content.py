@@ -118,7 +118,7 @@ class Content:
     reaching: tuple[ReachingTime, ...] | None
     lyapunov: LyapunovFunction | None
     proof: RateProof
-    sharper: tuple[LyapunovFunction, ...]
+    searched_functions: tuple[LyapunovFunction, ...]
     limit: RateBound | None
     final_state: FinalState | None
     matrix: Influence | None
@@ -143,7 +143,7 @@ class Content:
         Fraction(1, 1)
         """
         if (found := values.pop("search", None)) is not None:
-            values |= {"sharper": found.functions, "search": replace(found, functions=())}
+            values |= {"searched_functions": found.functions, "search": replace(found, functions=())}
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
@@ -225,7 +225,7 @@ class Content:
     @property
     def search(self) -> Search:
         """Sharper Lyapunov functions than the paper's, proved, and what else was tried."""
-        return replace(self.observed.search, functions=self.sharper)
+        return replace(self.observed.search, functions=self.searched_functions)
 
     # ------------------------------------------------------------------ claims
 
@@ -260,7 +260,7 @@ class Content:
     @cached_property
     def functions(self) -> tuple[LyapunovFunction, ...]:
         """Every proved Lyapunov function, the paper's first, with its name and its constants of deviation."""
-        found = self.sharper
+        found = self.searched_functions
         if self.lyapunov is not None and self.lyapunov.blocks and self.lyapunov.rate is not None:
             found = (self.lyapunov, *found)
         if self.source is None:
@@ -284,7 +284,7 @@ class Content:
     def _rated(self) -> list[LyapunovFunction]:
         """The functions of a proved rate, the paper's first; as ``functions``, without what is not needed for rates."""
         paper = () if self.lyapunov is None or self.lyapunov.rate is None else (self.lyapunov,)
-        return [*paper, *self.sharper]
+        return [*paper, *self.searched_functions]
 
     @property
     def rate(self) -> Fraction | None:
@@ -298,8 +298,8 @@ class Content:
 
     @property
     def diagonal_rate(self) -> Fraction | None:
-        """The largest proved rate of a diagonal Lyapunov matrix of the sharper classes; None if there is none."""
-        rates = (V.proved_rate for V in self.sharper if V.kind in DIAGONAL)
+        """The largest proved rate of a diagonal Lyapunov matrix of the searched classes; None if there is none."""
+        rates = (V.proved_rate for V in self.searched_functions if V.kind in DIAGONAL)
         return max((rate for rate in rates if rate > 0), default=None)
 
     @property

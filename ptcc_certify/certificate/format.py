@@ -108,7 +108,7 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
         "proof": RateProof(
             None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), ends
         ),
-        "sharper": tuple(V for V in functions if V.kind != "paper"),
+        "searched_functions": tuple(V for V in functions if V.kind != "paper"),
         "limit": _read_limit(steps, data),
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,

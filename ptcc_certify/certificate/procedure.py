@@ -50,7 +50,7 @@ from ptcc_certify.theorems.table import theorem_for
 STEPS = (
     "simulation",
     "the paper's certificate",
-    "sharper certificates",
+    "other Lyapunov functions",
     "upper bound on the decay rate",
     "final state",
     "independent check",
@@ -177,7 +177,7 @@ ReachingTime(0, 1 before T_r)))
     with deadline.time_limit(SEARCHING * request.time_limit):
         trajectory = case.simulation(disturbance) if runs else None
         lyapunov, proof, numerical = case.paper()
-        search = case.sharper(proof)
+        search = case.search(proof)
         limit = case.upper_bound()
     matrix, result = case.final_state(trajectory)
     proved = [proof.rate, *(V.rate for V in search.functions)]
@@ -189,7 +189,7 @@ ReachingTime(0, 1 before T_r)))
         reaching=reaching,
         lyapunov=lyapunov,
         proof=proof,
-        sharper=search.functions,
+        searched_functions=search.functions,
         limit=limit,
         final_state=result,
         matrix=matrix,
@@ -281,8 +281,8 @@ class Case:
             )
         return None if V is None else replace(V, rate=proof.rate, numerical_rate=numerical), proof, numerical
 
-    def sharper(self, paper: RateProof) -> Search:
-        """Search and prove sharper Lyapunov functions."""
+    def search(self, paper: RateProof) -> Search:
+        """Search and prove Lyapunov functions beside the paper's."""
         self.progress(STEPS[2])
         found = Search()
         with share_of_time(SHARES[2], STEPS[2], self.cut_off):
@@ -365,7 +365,7 @@ def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
 
 
 def _sharpen(structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]) -> Search:
-    """Search sharper Lyapunov functions for the instants that the screen reports, and for ``at``."""
+    """Search Lyapunov functions for the instants that the screen reports, and for ``at``."""
     gain = protocol.gain
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))

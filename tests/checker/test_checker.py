@@ -410,7 +410,7 @@ def test_edges_dropped_doubled_turned_or_of_another_sign_are_rejected():
 
 
 def test_a_rate_beyond_the_slack_is_rejected():
-    """The rate of every sharper member, raised by a part in 10^9: nothing of that is left to be proved."""
+    """The rate of every searched function, raised by a part in 10^9: nothing of that is left to be proved."""
     count = 0
     for name, slides in SAMPLE:
         data = made(name, 5, slides)
