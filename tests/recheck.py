@@ -508,7 +508,7 @@ class Recheck:
         below = product(X, product(H, transposed(X)))
         assert positive_definite([[-x for x in row] for row in below])
 
-    # ------------------------------------------------------------------ the Lyapunov functions that a search proved, distances
+    # ------------------------------------------------------------------ searched Lyapunov functions, deviations
 
     @cached_property
     def kept(self) -> list[int]:

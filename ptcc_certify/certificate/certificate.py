@@ -161,10 +161,10 @@ class Certificate(Content, Shown):
 
     def _document(self, verdict: str) -> tuple[dict[str, Any], Writer]:
         """Return the JSON of a verdict and its side files, made once."""
-        kept = self.__dict__.setdefault("_documents", {})
-        if verdict not in kept:
-            kept[verdict] = certificate_document(self, verdict, files=True)
-        return kept[verdict]
+        documents = self.__dict__.setdefault("_documents", {})
+        if verdict not in documents:
+            documents[verdict] = certificate_document(self, verdict, files=True)
+        return documents[verdict]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files.
@@ -209,8 +209,8 @@ class Certificate(Content, Shown):
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
-        said = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
-        return f"Certificate({said}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
+        behaviour = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
+        return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
 
 def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 1) -> Certificate:
@@ -275,11 +275,11 @@ def _file_hash(path: Path) -> str:
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
 
 
-def _side_files(said: Any) -> Iterator[str]:
+def _side_files(value: Any) -> Iterator[str]:
     """Yield the names of the side files of a document."""
-    if isinstance(said, dict) and {"file", "sha256"} <= set(said):
-        yield said["file"]
-    for part in said.values() if isinstance(said, dict) else said if isinstance(said, list) else ():
+    if isinstance(value, dict) and {"file", "sha256"} <= set(value):
+        yield value["file"]
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         yield from _side_files(part)
 
 

@@ -142,8 +142,8 @@ class Content:
         >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
         Fraction(1, 1)
         """
-        if (found := values.pop("search", None)) is not None:
-            values |= {"searched_functions": found.functions, "search": replace(found, functions=())}
+        if (search := values.pop("search", None)) is not None:
+            values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
@@ -260,13 +260,13 @@ class Content:
     @cached_property
     def functions(self) -> tuple[LyapunovFunction, ...]:
         """Every proved Lyapunov function, the paper's first, with its name and its constants of deviation."""
-        found = self.searched_functions
+        functions = self.searched_functions
         if self.lyapunov is not None and self.lyapunov.blocks and self.lyapunov.rate is not None:
-            found = (self.lyapunov, *found)
+            functions = (self.lyapunov, *functions)
         if self.source is None:
             geometry = self._geometry
-            found = tuple(replace(V, deviation=None if geometry is None else geometry.bound(V)) for V in found)
-        return tuple(replace(V, name=f"lyapunov.functions[{k}]") for k, V in enumerate(found))
+            functions = tuple(replace(V, deviation=None if geometry is None else geometry.bound(V)) for V in functions)
+        return tuple(replace(V, name=f"lyapunov.functions[{k}]") for k, V in enumerate(functions))
 
     @cached_property
     def _geometry(self) -> DeviationGeometry | None:
@@ -329,7 +329,11 @@ class Content:
         Matrices are rounded to short rationals, and their rates lowered until they prove.
         """
         pairs = [(V.proved_rate, V.numerical_rate) for V in self._rated]
-        losses = [float(1 - rate / Fraction(found)) * math.copysign(1, found) for rate, found in pairs if found]
+        losses = [
+            float(1 - rate / Fraction(numerical)) * math.copysign(1, numerical)
+            for rate, numerical in pairs
+            if numerical
+        ]
         return max(losses, default=None)
 
     # ------------------------------------------------------------------ final state, bounds over time, input
@@ -460,32 +464,32 @@ class Content:
         """Everything that was proved, in the order of the JSON."""
         if self.source is not None:
             return self.source.obligations
-        found = [Obligation("structure", "graph"), Obligation("claim", "graph")]
+        obligations = [Obligation("structure", "graph"), Obligation("claim", "graph")]
         if self.influence.exact:
-            found.append(
+            obligations.append(
                 Obligation("final-state", "graph", witness=final_state_witness(self.structure, self.influence))
             )
         elif self.influence.enclosure is not None:
-            found.append(Obligation("final-state", "graph", witness=self.influence.enclosure.witness))
-        found += self.proof.obligations if self.proof.rate is not None else ()
+            obligations.append(Obligation("final-state", "graph", witness=self.influence.enclosure.witness))
+        obligations += self.proof.obligations if self.proof.rate is not None else ()
         for V in self.functions:
             if V.kind != "paper":
                 kind = "rate" if V.dominance is None else "dominance"
-                found.append(Obligation(kind, V.name, {"b": V.proved_rate}, V.dominance))
+                obligations.append(Obligation(kind, V.name, {"b": V.proved_rate}, V.dominance))
             if V.matrix is not None:
-                found.append(Obligation("overshoot", V.name, {"lowest": V.lowest, "highest": V.highest}))
+                obligations.append(Obligation("overshoot", V.name, {"lowest": V.lowest, "highest": V.highest}))
             if V.deviation is not None:
-                found.append(Obligation("deviation", V.name))
+                obligations.append(Obligation("deviation", V.name))
         if self.limit is not None:
             witness = self.limit.witness(self.graph.labels)
-            found.append(Obligation(self.limit.kind, "rates", {"upper_bound": self.limit.value}, witness))
+            obligations.append(Obligation(self.limit.kind, "rates", {"upper_bound": self.limit.value}, witness))
         if self.reaching is not None:
-            found.append(Obligation("sliding-bound", "protocol"))
+            obligations.append(Obligation("sliding-bound", "protocol"))
             if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
-                found.append(Obligation("reaching-time", "reaching_time"))
+                obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
-            found += self.effort.obligations
-        return tuple(found)
+            obligations += self.effort.obligations
+        return tuple(obligations)
 
     # ------------------------------------------------------------------ simulation
 
@@ -505,16 +509,16 @@ class Content:
         if self.sigma0 is None:
             return None
         run = self.trajectory
-        said = None if run is None or run.sliding is None else run.sliding.source
+        source = None if run is None or run.sliding is None else run.sliding.source
         if self.source is not None:
-            said = self.source.document["protocol"]["disturbance"]
-        if said is None or said == "none":
-            return said or WORST_CASE
+            source = self.source.document["protocol"]["disturbance"]
+        if source is None or source == "none":
+            return source or WORST_CASE
         try:
-            ExpressionDisturbance(said)
+            ExpressionDisturbance(source)
         except PTCCError:
             return WORST_CASE
-        return said
+        return source
 
     def simulate(self, **options: Any) -> Trajectory:
         """Run the protocol again from the initial state with CVODES, without whatever limits of the gain were judged.

@@ -24,7 +24,6 @@ from ptcc_certify.certificate.format_effort import read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import (
-    Interval,
     Reader,
     Writer,
     exact_or_ball,
@@ -33,6 +32,7 @@ from ptcc_certify.certificate.vectors import (
     interval_text,
     number,
     text,
+    weighted_sum,
 )
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
@@ -91,7 +91,8 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
     steps = {(step.kind, step.of): step for step in proof}
     paper, functions = document["paper"], document["lyapunov"]["functions"]
     functions = [
-        _read_function(f"lyapunov.functions[{k}]", said, structure, data, steps) for k, said in enumerate(functions)
+        _read_function(f"lyapunov.functions[{k}]", section, structure, data, steps)
+        for k, section in enumerate(functions)
     ]
     lyapunov = next((replace(V, objective=paper["objective"]) for V in functions if V.kind == "paper"), None)
     start, ends = data.state(document["initial_state"]), None
@@ -135,8 +136,8 @@ def _write_protocol(content: Content) -> dict[str, Any]:
     return {**section, "disturbance": None if run is None or run.sliding is None else run.sliding.source}
 
 
-def _read_protocol(said: Mapping[str, Any]) -> Protocol:
-    given = {key: value for key, value in said.items() if key != "disturbance"}
+def _read_protocol(section: Mapping[str, Any]) -> Protocol:
+    given = {key: value for key, value in section.items() if key != "disturbance"}
     return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in given.items()})
 
 
@@ -147,10 +148,10 @@ def _write_reaching(content: Content) -> dict[str, Any] | None:
     return {"bound": SLIDING_BOUND, "clock": SLIDING_CLOCK, "z": times}
 
 
-def _read_reaching(said: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
-    if said is None or protocol.reaching is None:
+def _read_reaching(section: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+    if section is None or protocol.reaching is None:
         return None
-    return tuple(ReachingTime(protocol.reaching.T_r, number(z)) for z in said["z"].values())
+    return tuple(ReachingTime(protocol.reaching.T_r, number(z)) for z in section["z"].values())
 
 
 # ---------------------------------------------------------------------- Lyapunov functions
@@ -192,20 +193,20 @@ def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
 
 def _read_function(
     name: str,
-    said: Mapping[str, Any],
+    section: Mapping[str, Any],
     structure: Structure,
     data: Reader,
     steps: Mapping[tuple[str, str], Obligation],
 ) -> LyapunovFunction:
-    given, full, rows = said["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
-    blocks = tuple(_read_block(block, data, rows is not None) for block in said["blocks"])
-    gauge = structure.closed_components[0].gauge if said["coordinates"] == "eps" else ()
+    given, full, rows = section["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
+    blocks = tuple(_read_block(block, data, rows is not None) for block in section["blocks"])
+    gauge = structure.closed_components[0].gauge if section["coordinates"] == "eps" else ()
     return LyapunovFunction(
-        said["class"],
-        said["coordinates"],
+        section["class"],
+        section["coordinates"],
         blocks,
-        number(said["rho"]),
-        number(said["rate"]),
+        number(section["rho"]),
+        number(section["rate"]),
         None if full is None else (full.numbers["lowest"], full.numbers["highest"]),
         gauge or (),
         dominance=None if rows is None else Dominance(data.floats(rows.witness["vector"], len(blocks[0].nodes))),
@@ -225,13 +226,13 @@ def _write_block(block: LyapunovBlock, out: Writer) -> dict[str, Any]:
     return {**section, "times_rho": block.times_rho}
 
 
-def _read_block(said: Mapping[str, Any], data: Reader, large: bool) -> LyapunovBlock:
-    nodes = data.nodes(said["nodes"])
-    if "lower_triangle" in said:
-        return LyapunovBlock(said["name"], nodes, matrix=triangle(said["lower_triangle"], len(nodes)))
+def _read_block(section: Mapping[str, Any], data: Reader, large: bool) -> LyapunovBlock:
+    nodes = data.nodes(section["nodes"])
+    if "lower_triangle" in section:
+        return LyapunovBlock(section["name"], nodes, matrix=triangle(section["lower_triangle"], len(nodes)))
     if large:
-        return LyapunovBlock(said["name"], nodes, dyadic=data.floats(said["diagonal"], len(nodes)))
-    return LyapunovBlock(said["name"], nodes, tuple(map(exact, said["diagonal"])), said["times_rho"])
+        return LyapunovBlock(section["name"], nodes, dyadic=data.floats(section["diagonal"], len(nodes)))
+    return LyapunovBlock(section["name"], nodes, tuple(map(exact, section["diagonal"])), section["times_rho"])
 
 
 def _write_overshoot(content: Content) -> dict[str, Any] | None:
@@ -245,11 +246,11 @@ def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> Ra
     step = steps.get(("rate-upper-bound", "rates")) or steps.get(("rate-mean", "rates"))
     if step is None:
         return None
-    value, said = step.numbers["upper_bound"], step.witness
-    if "node" in said:
-        return RateBound(value, data.nodes([said["node"]]))
-    form, vectors = triangle(said["lower_triangle"], len(said["nodes"])), said["vectors"]
-    return RateBound(value, data.nodes(said["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
+    value, section = step.numbers["upper_bound"], step.witness
+    if "node" in section:
+        return RateBound(value, data.nodes([section["node"]]))
+    form, vectors = triangle(section["lower_triangle"], len(section["nodes"])), section["vectors"]
+    return RateBound(value, data.nodes(section["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
 
 
 # ---------------------------------------------------------------------- final state
@@ -265,51 +266,41 @@ def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | 
 def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
     matrix, structure, labels = content.influence, content.structure, content.graph.labels
     left_null_vectors, containment_weights = influence_balls(matrix)
+    followers = structure.followers.tolist()
     ends: dict[str, Any] | None = None
-    degenerate: list[int] | None = None
     if content.final_state is not None and content.start is not None:
-        gone = content.sigma0 or [Fraction(0)] * len(labels)
-        moved = [x - s for x, s in zip(content.start, gone, strict=True)]
-        final: list[Interval] = [(Fraction(0), Fraction(0))] * len(labels)
-        values = []
-        for component, null_vector in zip(matrix.balanced, left_null_vectors, strict=True):
-            middle = sum((w * moved[v] for v, (w, _) in zip(component.nodes, null_vector, strict=True)), Fraction(0))
-            radius = sum(
-                (r * abs(moved[v]) for v, (_, r) in zip(component.nodes, null_vector, strict=True)), Fraction(0)
-            )
-            values.append((middle, radius))
-            for v, sign in zip(component.nodes, component.gauge or (), strict=True):
-                final[v] = (sign * middle, radius)
-        for v, row in zip(structure.followers.tolist(), containment_weights, strict=True):
-            pairs = list(zip(row, values, strict=True))
-            middle = sum((w * x for (w, _), (x, _) in pairs), Fraction(0))
-            final[v] = (middle, sum((abs(w) * s + r * abs(x) + r * s for (w, r), (x, s) in pairs), Fraction(0)))
-        ends = {label: interval_text(x) for label, x in zip(labels, final, strict=True)}
-        degenerate = list(content.final_state.degenerate)
+        sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
+        first = [(x - s, Fraction(0)) for x, s in zip(content.start, sigma0, strict=True)]
+        groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
+        values = [weighted_sum(null_vector, [first[v] for v in c.nodes]) for c, null_vector in groups]
+        final = dict.fromkeys(range(len(labels)), (Fraction(0), Fraction(0)))
+        for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
+            final |= {v: (g * middle, radius) for v, g in zip(component.nodes, component.gauge or (), strict=True)}
+        final |= {v: weighted_sum(row, values) for v, row in zip(followers, containment_weights, strict=True)}
+        ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
     section = {
         "components": [
             {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
             for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
         ],
         "containment_weights": {
-            labels[v]: [interval_text(w) for w in row]
-            for v, row in zip(structure.followers.tolist(), containment_weights, strict=True)
+            labels[v]: [interval_text(w) for w in row] for v, row in zip(followers, containment_weights, strict=True)
         },
-        "degenerate": degenerate,
+        "degenerate": None if ends is None else list(content.degenerate),
     }
     return section, ends
 
 
 def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """Write the final state of a large graph: left null vector of leader groups, and the final state in intervals."""
-    labels, matrix, found = content.graph.labels, content.influence, content.final_state
+    labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
     final: dict[str, Any] | None = None
-    if found is not None and found.radius is not None:
-        pairs = list(zip(found.states, found.radius, strict=True))
+    if final_state is not None and final_state.radius is not None:
+        pairs = list(zip(final_state.states, final_state.radius, strict=True))
         if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
             radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
-            final = {"mid": out.vector("mid", found.values), "radius": out.vector("radius", np.array(radius))}
+            final = {"mid": out.vector("mid", final_state.values), "radius": out.vector("radius", np.array(radius))}
         else:
             final = {label: _enclosed_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
@@ -323,7 +314,7 @@ def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any]
             left_null_vectors = [exact_or_ball(Fraction(w)) for w in null_vector]
         if len(component.nodes) > 1:
             groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vectors})
-    degenerate = None if found is None else list(found.degenerate)
+    degenerate = None if final_state is None else list(final_state.degenerate)
     return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
 
 
@@ -375,9 +366,9 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     }
 
 
-def _read_obligation(said: Mapping[str, Any]) -> Obligation:
-    numbers = {name: exact(value) for name, value in said["numbers"].items()}
-    return Obligation(said["kind"], said["of"], numbers, said["witness"])
+def _read_obligation(section: Mapping[str, Any]) -> Obligation:
+    numbers = {name: exact(value) for name, value in section["numbers"].items()}
+    return Obligation(section["kind"], section["of"], numbers, section["witness"])
 
 
 def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
@@ -388,9 +379,9 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
         rate = format_exact(group.rate)
         unit = math.frexp(float(group.weights[0]))[1]
         key = first, group.rate, np.ldexp(group.weights, -unit).tobytes()
-        told = key in out.told
-        out.told.add(key)
-        if group.factor is None or told:
+        written = key in out.written_groups
+        out.written_groups.add(key)
+        if group.factor is None or written:
             groups.append(rate)
         else:
             # The factor is that of the group's own weights, of which those of the function are a power of two.
@@ -442,33 +433,33 @@ def _write_unverified(content: Content) -> dict[str, Any]:
 
 
 def _write_run(content: Content) -> dict[str, Any] | None:
-    run, seen = content.trajectory, content.comparison
-    if seen is None:
+    run, comparison = content.trajectory, content.comparison
+    if comparison is None:
         return None
     section = {
-        "worst_ratio": finite(seen.worst_ratio),
-        "floor": finite(seen.floor),
-        "resolved_until": seen.resolved_until,
-        "judged": seen.judged,
-        "ratios": {str(k): finite(v) for k, v in seen.ratios.items()},
-        "stop": seen.stop,
-        "tolerances": {"relative": seen.tolerance},
-        "deviation_ratio": finite(seen.deviation_ratio),
-        "deadline_resolved": seen.deadline_resolved,
+        "worst_ratio": finite(comparison.worst_ratio),
+        "floor": finite(comparison.floor),
+        "resolved_until": comparison.resolved_until,
+        "judged": comparison.judged,
+        "ratios": {str(k): finite(v) for k, v in comparison.ratios.items()},
+        "stop": comparison.stop,
+        "tolerances": {"relative": comparison.tolerance},
+        "deviation_ratio": finite(comparison.deviation_ratio),
+        "deadline_resolved": comparison.deadline_resolved,
     }
     if run is None or run.sliding is None:
         return section
     return section | {
-        "sliding_ratio": finite(seen.sliding_ratio),
-        "reaching_kept": seen.reaching_kept,
+        "sliding_ratio": finite(comparison.sliding_ratio),
+        "reaching_kept": comparison.reaching_kept,
         "reached": dict(zip(content.graph.labels, map(finite, run.sliding.reaching_z.tolist()), strict=True)),
         "disturbance_bounded_by": run.sliding.bounded_by,
     }
 
 
-def _read_observations(said: Mapping[str, Any]) -> Observations:
+def _read_observations(section: Mapping[str, Any]) -> Observations:
     """Read what the file says of searches; other observations are made anew."""
-    return Observations(cut_off=_texts(said.get("cut_off")), notes=_texts(said.get("notes")))
+    return Observations(cut_off=_texts(section.get("cut_off")), notes=_texts(section.get("notes")))
 
 
 def _write_asked(request: Request) -> dict[str, Any]:
@@ -508,13 +499,13 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
     )
 
 
-def _positive(said: Any, key: str) -> Fraction | None:
+def _positive(section: Any, key: str) -> Fraction | None:
     try:
-        value = None if said.get(key) is None else exact(said[key])
+        value = None if section.get(key) is None else exact(section[key])
     except (AttributeError, RejectedError):
         return None
     return value if value is not None and value > 0 else None
 
 
-def _texts(said: Any) -> tuple[str, ...]:
-    return tuple(one for one in said if isinstance(one, str)) if isinstance(said, list) else ()
+def _texts(section: Any) -> tuple[str, ...]:
+    return tuple(one for one in section if isinstance(one, str)) if isinstance(section, list) else ()

@@ -29,7 +29,7 @@ Said = Mapping[str, Any]
 
 
 def read_effort(
-    said: Said | None,
+    section: Said | None,
     start: tuple[Fraction, ...] | None,
     structure: Structure,
     protocol: Protocol,
@@ -37,57 +37,57 @@ def read_effort(
     steps: Steps,
 ) -> Effort | None:
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
-    if said is None:
+    if section is None:
         return None
-    initial_set, sliding, threshold = _starts(said["initial_set"], data), said["sliding"], said["threshold"]
+    initial_set, sliding, threshold = _starts(section["initial_set"], data), section["sliding"], section["threshold"]
     region = initial_set or (None if start is None else InitialSet(start))
     return Effort(
-        bounded=said["bounded"],
-        by=None if said["bounded"] is None else steps["input-threshold", "input"].witness,
+        bounded=section["bounded"],
+        by=None if section["bounded"] is None else steps["input-threshold", "input"].witness,
         threshold=(number(threshold["lower"]), number(threshold["upper"])),
         initial_set=initial_set,
-        constants=tuple(map(data.state, said["constants"])),
-        peak=_peak(said["peak"], data, steps),
-        energy=_energy(said["energy"], steps),
-        path_length=_witness(said["path_length"], "input-length", steps),
+        constants=tuple(map(data.state, section["constants"])),
+        peak=_peak(section["peak"], data, steps),
+        energy=_energy(section["energy"], steps),
+        path_length=_witness(section["path_length"], "input-length", steps),
         sliding=None if sliding is None else SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
             _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
-            for k, entry in enumerate(said["residual"])
+            for k, entry in enumerate(section["residual"])
         ),
-        disturbed=_disturbed(said["disturbed"], data, steps),
+        disturbed=_disturbed(section["disturbed"], data, steps),
         first=None if region is None else first_input(structure, protocol, region),
     )
 
 
-def _starts(said: Said | None, data: Reader) -> InitialSet | None:
-    if said is None:
+def _starts(section: Said | None, data: Reader) -> InitialSet | None:
+    if section is None:
         return None
-    axes = tuple(map(data.agents, said.get("axes", ())))
-    return InitialSet(data.agents(said["center"]), () if axes else data.agents(said["radius"]), axes)
+    axes = tuple(map(data.agents, section.get("axes", ())))
+    return InitialSet(data.agents(section["center"]), () if axes else data.agents(section["radius"]), axes)
 
 
-def _witness(said: str | None, kind: str, steps: Steps) -> Witness | None:
-    if said is None:
+def _witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
+    if section is None:
         return None
     step = steps[kind, "input"]
-    return Witness(exact(said), step.witness, step.numbers["z"])
+    return Witness(exact(section), step.witness, step.numbers["z"])
 
 
-def _energy(said: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
+def _energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
     step = steps.get(("input-energy", "input"))
-    if said is None or step is None or not isinstance(step.witness, dict):
-        return _witness(said, "input-energy", steps)
+    if section is None or step is None or not isinstance(step.witness, dict):
+        return _witness(section, "input-energy", steps)
     first, second = (triangle(step.witness[key], len(step.witness[key])) for key in ("W0", "W1"))
     p, m0, m1 = (step.numbers[key] for key in ("p", "m0", "m1"))
-    return EnergyIntegral(exact(said), p, (first, second), (m0, m1))
+    return EnergyIntegral(exact(section), p, (first, second), (m0, m1))
 
 
-def _peak(said: Said | None, data: Reader, steps: Steps) -> Peak | None:
-    if said is None:
+def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
+    if section is None:
         return None
     step = steps["input-peak", "input"]
-    agents, norm = data.agents(said["agents"]), exact(said["norm"])
+    agents, norm = data.agents(section["agents"]), exact(section["norm"])
     how = step.witness["agents"].values()
     return Peak(
         agents,
@@ -97,17 +97,17 @@ def _peak(said: Said | None, data: Reader, steps: Steps) -> Peak | None:
     )
 
 
-def _limited(said: Said, step: Obligation, data: Reader) -> Limited:
-    noise = said["noise"] or {}
+def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
+    noise = section["noise"] or {}
     first, second = (*step.witness, None)[:2] if isinstance(step.witness, list) else (step.witness, None)
     return Limited(
-        limits=Limits(*(number(said[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
-        clock=exact(said["clock"]),
+        limits=Limits(*(number(section[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
+        clock=exact(section["clock"]),
         function=first,
         growth=step.numbers["growth"],
-        norm=exact(said["norm"]),
-        agents=data.state(said["agents"]),
-        largest=number(said["largest"]),
+        norm=exact(section["norm"]),
+        agents=data.state(section["agents"]),
+        largest=number(section["largest"]),
         noise=number(noise.get("bound")),
         noise_function=second,
         noisy_norm=number(noise.get("norm")),
@@ -115,8 +115,8 @@ def _limited(said: Said, step: Obligation, data: Reader) -> Limited:
     )
 
 
-def _disturbed(said: Said | None, data: Reader, steps: Steps) -> Disturbed | None:
-    if said is None:
+def _disturbed(section: Said | None, data: Reader, steps: Steps) -> Disturbed | None:
+    if section is None:
         return None
     function = steps["nominal-disturbed", "input"].witness
-    return Disturbed(exact(said["delta"]), function, data.agents(said["inputs"]), data.state(said["drift"]))
+    return Disturbed(exact(section["delta"]), function, data.agents(section["inputs"]), data.state(section["drift"]))

@@ -73,8 +73,8 @@ def certificate_graph(document: Mapping[str, Any], folder: Path) -> SignedDigrap
     >>> certificate_graph(document, Path()) == foes
     True
     """
-    said, files = document["graph"], SideFiles(folder, None)
-    labels, edges = said["nodes"], said["edges"]
+    section, files = document["graph"], SideFiles(folder, None)
+    labels, edges = section["nodes"], section["edges"]
     if isinstance(edges, dict):
         source, target, weight = (
             np.array(files.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
@@ -87,7 +87,7 @@ def certificate_graph(document: Mapping[str, Any], folder: Path) -> SignedDigrap
         source = np.array([index[s] for s, _, _ in edges], dtype=np.int64)
         target = np.array([index[t] for _, t, _ in edges], dtype=np.int64)
         weights = Weights([exact(w) for _, _, w in edges])
-    return SignedDigraph(labels, source, target, weights, said["read"])
+    return SignedDigraph(labels, source, target, weights, section["read"])
 
 
 def structure_section(structure: Structure, out: Writer) -> dict[str, Any]:

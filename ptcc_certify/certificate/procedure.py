@@ -284,13 +284,13 @@ class Case:
     def search(self, paper: RateProof) -> Search:
         """Search and prove Lyapunov functions beside the paper's."""
         self.progress(STEPS[2])
-        found = Search()
+        search = Search()
         with share_of_time(SHARES[2], STEPS[2], self.cut_off):
-            found = _sharpen(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
-            self.cut_off += found.cut_off
-        if paper.rate is None and not any(V.proved_rate > 0 for V in found.functions) and self.structure.graph.n_edges:
+            search = _search_functions(self.structure, self.protocol, self.request.method, self.request.at, self.notes)
+            self.cut_off += search.cut_off
+        if paper.rate is None and not any(V.proved_rate > 0 for V in search.functions) and self.structure.graph.n_edges:
             self.notes.insert(0, _precision_note(self.structure.graph))
-        return found
+        return search
 
     def upper_bound(self) -> RateBound | None:
         """Prove the upper bound on the decay rate."""
@@ -304,21 +304,21 @@ class Case:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
         structure, matrix, start = self.structure, influence(self.structure), self.start
-        gone = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
-        moved = None if start is None else [x - s if s else x for x, s in zip(start, gone, strict=True)]
+        sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
+        first = None if start is None else [x - s if s else x for x, s in zip(start, sigma0, strict=True)]
         result = None
         if not matrix.exact:
             try:
                 enclosed = replace(matrix, enclosure=enclose(structure, matrix))
-                result = None if moved is None else enclosed_final_state(structure, enclosed, moved)
+                result = None if first is None else enclosed_final_state(structure, enclosed, first)
                 matrix = enclosed
             except NotEnclosedError as error:
                 self.notes.append(f"the final state is floating point only: {error}")
-        if result is None and moved is not None:
-            result = final_state(structure, moved, matrix=matrix)
+        if result is None and first is not None:
+            result = final_state(structure, first, matrix=matrix)
         if run is not None and result is not None:
             gap = float(np.abs(run.final_state - result.values).max())
-            if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *gone)))), 1e-300):
+            if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *sigma0)))), 1e-300):
                 self.notes.append(
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
@@ -364,17 +364,19 @@ def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
     return [theorem.lyapunov(structure)]
 
 
-def _sharpen(structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]) -> Search:
+def _search_functions(
+    structure: Structure, protocol: Protocol, method: str, at: Fraction | None, notes: list[str]
+) -> Search:
     """Search Lyapunov functions for the instants that the screen reports, and for ``at``."""
     gain = protocol.gain
     clocks = [float(gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
     own = None if at is None else float(gain.clock_at_remaining(float(1 - at / protocol.T)))
     if structure.graph.n_nodes <= EXACT_NODES:
-        found = search_functions(ErrorSystem(structure), method, clocks, own)
+        search = search_functions(ErrorSystem(structure), method, clocks, own)
     else:
-        found = search_large(structure, method, clocks if own is None else [*clocks, own])
-    notes.extend(found.notes)
-    return found
+        search = search_large(structure, method, clocks if own is None else [*clocks, own])
+    notes.extend(search.notes)
+    return search
 
 
 def _precision_note(graph: SignedDigraph) -> str:

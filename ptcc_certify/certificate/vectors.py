@@ -40,14 +40,14 @@ class Writer:
     ----------
     files : dict of str to bytes
         Names and contents of the side files, ``.npy`` vectors of 64-bit numbers.
-    told : set of tuple
+    written_groups : set of tuple
         The proofs of leader groups that are written already: first row, rate, weights.
     """
 
     def __init__(self, labels: Sequence[str], files: bool = False):
         self.labels, self._aside = labels, files
         self.files: dict[str, bytes] = {}
-        self.told: set[tuple[int, Fraction, bytes]] = set()
+        self.written_groups: set[tuple[int, Fraction, bytes]] = set()
 
     def aside(self, length: int) -> bool:
         """Tell whether a vector of this length goes to a side file."""
@@ -110,28 +110,28 @@ class Reader:
         self.files, self._count = SideFiles(folder, None), len(labels)
         self._index = {label: i for i, label in enumerate(labels)}
 
-    def nodes(self, said: Any) -> tuple[int, ...]:
+    def nodes(self, section: Any) -> tuple[int, ...]:
         """Read node indices."""
-        if beside(said):
-            return tuple(self.files.integers(said, "nodes", said["count"]))
-        return tuple(self._index[label] for label in said)
+        if beside(section):
+            return tuple(self.files.integers(section, "nodes", section["count"]))
+        return tuple(self._index[label] for label in section)
 
-    def floats(self, said: Any, length: int) -> np.ndarray:
+    def floats(self, section: Any, length: int) -> np.ndarray:
         """Read a vector as the floats nearest to its numbers, each rounded once."""
-        numbers = self.files.numbers(said, "a vector", length)
+        numbers = self.files.numbers(section, "a vector", length)
         return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
 
-    def state(self, said: Any) -> tuple[Fraction, ...] | None:
+    def state(self, section: Any) -> tuple[Fraction, ...] | None:
         """Read one number of each agent: by label, or from a side file."""
-        if said is None:
+        if section is None:
             return None
-        if beside(said):
-            return tuple(self.files.numbers(said, "a vector", self._count))
-        return tuple(map(exact, said.values()))
+        if beside(section):
+            return tuple(self.files.numbers(section, "a vector", self._count))
+        return tuple(map(exact, section.values()))
 
-    def agents(self, said: Any) -> tuple[Fraction, ...]:
+    def agents(self, section: Any) -> tuple[Fraction, ...]:
         """Read one number of each agent, which is there."""
-        return self.state(said) or ()
+        return self.state(section) or ()
 
 
 def text(value: Fraction | None) -> str | None:
@@ -139,9 +139,9 @@ def text(value: Fraction | None) -> str | None:
     return None if value is None else format_exact(value)
 
 
-def number(said: str | None) -> Fraction | None:
+def number(digits: str | None) -> Fraction | None:
     """Read what :func:`text` wrote."""
-    return None if said is None else exact(said)
+    return None if digits is None else exact(digits)
 
 
 def finite(value: float | None) -> float | None:
@@ -177,6 +177,20 @@ def _ball_text(interval: Interval) -> dict[str, str]:
     mid = round(middle * unit)
     wide = math.ceil((radius + abs(middle - Fraction(mid, unit))) * unit)
     return {"mid": f"{mid}e-{_DECIMALS}", "radius": f"{wide}e-{_DECIMALS}"}
+
+
+def weighted_sum(weights: Sequence[Interval], values: Sequence[Interval]) -> Interval:
+    """Return an interval that contains the sum of the products; of radius 0 where all of them are.
+
+    Examples
+    --------
+    >>> middle, radius = weighted_sum([(Fraction(2), Fraction(1))], [(Fraction(3), Fraction(0))])
+    >>> str(middle), str(radius)
+    ('6', '3')
+    """
+    pairs = [(*weight, *value) for weight, value in zip(weights, values, strict=True)]
+    middle = sum((w * x for w, _, x, _ in pairs), Fraction(0))
+    return middle, sum((abs(w) * s + r * (abs(x) + s) for w, r, x, s in pairs), Fraction(0))
 
 
 def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:

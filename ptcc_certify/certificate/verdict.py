@@ -72,7 +72,7 @@ class Assessment:
         Whether the simulated run exceeds a proved bound.
     useful : bool or None
         Whether the bound says something by the deadline with these gains; None if nothing is certified.
-    said : str
+    remark : str
         What it says, or does not, or what to try next.
     advice : str
         Gains with which the bound would be useful; empty if it is, or if none are known.
@@ -89,15 +89,15 @@ class Assessment:
     >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> found = certify(pair, protocol, simulation=False).assessment
-    >>> found.verdict, found.useful, int(found.exit_code)
+    >>> assessment = certify(pair, protocol, simulation=False).assessment
+    >>> assessment.verdict, assessment.useful, int(assessment.exit_code)
     ('certified', True, 0)
     """
 
     verdict: str
     violated: bool
     useful: bool | None
-    said: str
+    remark: str
     advice: str
     answers: tuple[Answer, ...]
 
@@ -133,10 +133,10 @@ class Assessment:
         if self.useful is False:
             little = f"{self.verdict}, but with these gains the bound says little by T"
             advice = f"; {self.advice}" if self.advice else ""
-            parts.append(f"{little}{advice}" if crowded else f"{little}: {self.said}{advice}")
+            parts.append(f"{little}{advice}" if crowded else f"{little}: {self.remark}{advice}")
         else:
             colon = ": " if self.verdict != "certified" else "; "
-            parts.append(f"{self.verdict}{colon}{self.said}" if self.said and not crowded else self.verdict)
+            parts.append(f"{self.verdict}{colon}{self.remark}" if self.remark and not crowded else self.verdict)
         met = [str(answer) for answer in self.answers if answer.status == MET]
         parts += [f"{MET}: {', '.join(met)}"] if met else []
         return "; ".join(parts)
@@ -161,8 +161,8 @@ def exit_code(violated: bool, refuted: bool, left_open: bool) -> int:
     >>> int(exit_code(False, True, True)), int(exit_code(False, False, False))
     (3, 0)
     """
-    found = ((violated, ExitCode.VIOLATED), (refuted, ExitCode.REFUTED), (left_open, ExitCode.UNDECIDED))
-    return next((code for holds, code in found if holds), ExitCode.OK)
+    codes = ((violated, ExitCode.VIOLATED), (refuted, ExitCode.REFUTED), (left_open, ExitCode.UNDECIDED))
+    return next((code for holds, code in codes if holds), ExitCode.OK)
 
 
 def worst_code(codes: Iterable[int]) -> int:
@@ -173,8 +173,8 @@ def worst_code(codes: Iterable[int]) -> int:
     >>> int(worst_code([0, 4, 3])), int(worst_code([]))
     (3, 0)
     """
-    found = set(codes)
-    return exit_code(ExitCode.VIOLATED in found, ExitCode.REFUTED in found, ExitCode.UNDECIDED in found)
+    present = set(codes)
+    return exit_code(ExitCode.VIOLATED in present, ExitCode.REFUTED in present, ExitCode.UNDECIDED in present)
 
 
 def assess(certificate: Content, report: CheckReport | None) -> Assessment:
@@ -198,27 +198,27 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
     >>> print(certify(pair, weak, [3, 1], simulation=False).assessment.text)
     certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
 --rho2 0.286 (rho2 kappa 0.286) leaves 1 %
-    >>> found = certify(pair, strong, [3, 1], simulation=False).assessment
-    >>> found.useful, int(found.exit_code)
+    >>> assessment = certify(pair, strong, [3, 1], simulation=False).assessment
+    >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
     """
-    asked, seen = certificate.expectations, certificate.comparison
+    asked, comparison = certificate.expectations, certificate.comparison
     answers = [] if asked.behaviour is None else [judge_behaviour(certificate.structure, asked.behaviour)]
     answers += [] if asked.min_rate is None else [judge_rate(certificate, asked.min_rate)]
     answers += [] if asked.max_input is None else [judge_input(certificate, asked.max_input)]
     answers += judge_limits(certificate)
-    useful, said, advice = None, "", ""
+    useful, remark, advice = None, "", ""
     verdict = verdict_of(report)
     if verdict != CERTIFIED:
-        said = _next_step(certificate, report)
+        remark = _next_step(certificate, report)
     elif certificate.constant:
-        useful, said = True, "nothing to decay"
+        useful, remark = True, "nothing to decay"
     else:
         limited = certificate.effort is not None and certificate.effort.residual
-        useful, said, advice = (_limited_usefulness if limited else _usefulness)(certificate)
-        said += "" if certificate.delta is None else ", without disturbances"
-    violated = seen is not None and seen.violated
-    return Assessment(verdict, violated, useful, said, advice, tuple(answers))
+        useful, remark, advice = (_limited_usefulness if limited else _usefulness)(certificate)
+        remark += "" if certificate.delta is None else ", without disturbances"
+    violated = comparison is not None and comparison.violated
+    return Assessment(verdict, violated, useful, remark, advice, tuple(answers))
 
 
 # ---------------------------------------------------------------------- expectations
@@ -279,8 +279,8 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     least: Fraction | float = (effort.first or Fraction(0)) * share
     if certificate.noise is not None:
         rows = graph.exact_rows(range(graph.n_nodes))
-        heard = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
-        least = max(least, 2 * heard * certificate.noise * min(tops)) if tops else math.inf
+        degree = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
+        least = max(least, 2 * degree * certificate.noise * min(tops)) if tops else math.inf
     if certificate.limits:
         known = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
         most = None if len(known) < len(certificate.limits) or None in known else max(x for x in known if x is not None)
@@ -293,18 +293,18 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
 
 def judge_limits(certificate: Content) -> list[Answer]:
     """Tell which of the limits, noise and disturbances that were asked for are not certified."""
-    effort, found = certificate.effort, []
+    effort, answers = certificate.effort, []
     residual = () if effort is None else effort.residual
     if len(residual) < len(certificate.limits) and not certificate.constant:
         period = None if effort is None else effort.longest_period
         why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
-        found.append(Answer(OPEN, "limits", why))
+        answers.append(Answer(OPEN, "limits", why))
     silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
     if certificate.noise is not None and silent and not certificate.constant:
-        found.append(Answer(OPEN, "noise", "not certified"))
+        answers.append(Answer(OPEN, "noise", "not certified"))
     if certificate.delta is not None and (effort is None or effort.disturbed is None):
-        found.append(Answer(OPEN, "delta", "not certified"))
-    return found
+        answers.append(Answer(OPEN, "delta", "not certified"))
+    return answers
 
 
 # ---------------------------------------------------------------------- use
@@ -319,10 +319,10 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     if not direct:
         begin, instant = f"{z}(T_r)", "T_r + 0.99 T_s"
     fixed, pole = float(p.rho1 * span * (1 - LAST)), float(p.rho2 * p.kappa)
-    left = _share(envelope, fixed + pole * math.log(1 / LAST))
-    said = f"||{z}|| <= {up(left, 2)} ||{begin}|| at {instant}"
-    if left <= USEFUL:
-        return True, said, ""
+    share = _share(envelope, fixed + pole * math.log(1 / LAST))
+    remark = f"||{z}|| <= {up(share, 2)} ||{begin}|| at {instant}"
+    if share <= USEFUL:
+        return True, remark, ""
     of_set = certificate.effort is not None and certificate.effort.initial_set is not None
     if direct and not of_set and (way := certificate.longest_way) is not None:
         worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
@@ -330,8 +330,8 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
     rho2 = _useful_rho2(envelope, fixed, p.kappa)
     if rho2 is None:
-        return False, said, ""
-    return False, said, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
+        return False, remark, ""
+    return False, remark, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
 
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
@@ -345,16 +345,16 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
         if worst <= Fraction(USEFUL) * Fraction(way):
             return True, f"under the limits every agent within {up(worst, 2)} of its final state at T", ""
     norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
-    said = f"under the limits ||E|| <= {up(norm, 2)} at T"
+    remark = f"under the limits ||E|| <= {up(norm, 2)} at T"
     rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
-        return norm <= Fraction(USEFUL) * largest, f"{said} from all these initial states", ""
+        return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states", ""
     first = Fraction(0) if start is None else sum((InitialSet(start).largest(row) ** 2 for row in rows), Fraction(0))
     if not first:
-        return norm == 0, said, ""
-    left = root_above(norm**2 / first)
-    return left <= USEFUL, f"under the limits ||E|| <= {up(left, 2)} ||E(0)|| at T", ""
+        return norm == 0, remark, ""
+    share = root_above(norm**2 / first)
+    return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T", ""
 
 
 def _share(envelope: Envelope, clock: float) -> float:

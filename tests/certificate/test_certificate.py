@@ -726,7 +726,7 @@ def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Mad
         assert sizes[0] == sizes[1]
 
 
-#: Classes of graphs on which the searched functions are compared under a change that should not matter, or as it should.
+#: Classes of graphs on which the searched functions are compared under changes that should not matter.
 SOME = [
     "1.1",
     "1.2",

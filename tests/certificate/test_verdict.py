@@ -249,13 +249,13 @@ def test_what_is_left_of_states_beyond_the_squares_of_floats_is_right():
     shares = [
         limited(x0, limits=[Actuator(gain_cap="0.01")]) for x0 in ([1, 3], ["1e-200", "3e-200"], ["1e200", "3e200"])
     ]
-    assert len({found.said for found in shares}) == 1
-    assert shares[0].useful is False and "||E|| <= 0.99 ||E(0)|| at T" in shares[0].said
+    assert len({found.remark for found in shares}) == 1
+    assert shares[0].useful is False and "||E|| <= 0.99 ||E(0)|| at T" in shares[0].remark
 
 
 def test_noise_from_the_final_state_is_not_a_share_of_nothing():
     found = limited([1, 1], limits=[Actuator(gain_cap=10)], noise="0.1")
-    assert found.useful is False and "||E|| <= 0.29 at T" in found.said
+    assert found.useful is False and "||E|| <= 0.29 at T" in found.remark
 
 
 def test_of_a_set_no_share_is_stated_that_single_states_exceed():
@@ -264,7 +264,7 @@ def test_of_a_set_no_share_is_stated_that_single_states_exceed():
     found = limited(
         None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[Actuator(gain_cap="4.5")]
     )
-    assert "||E(0)||" not in found.said and "from all these initial states" in found.said
+    assert "||E(0)||" not in found.remark and "from all these initial states" in found.remark
 
 
 @pytest.mark.parametrize("size", ["0.01", "1000", "1e200"])
@@ -286,7 +286,7 @@ def test_an_unbounded_input_from_a_thin_set_is_not_called_proved(region: Any):
 
 def test_disturbances_are_not_counted_and_it_says_so():
     for limits in ([], [Actuator(gain_cap=20)]):
-        assert limited([1, 3], limits=limits, delta=1).said.endswith(", without disturbances")
+        assert limited([1, 3], limits=limits, delta=1).remark.endswith(", without disturbances")
 
 
 def test_noise_that_nobody_hears_is_no_open_question():

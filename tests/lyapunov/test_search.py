@@ -1,4 +1,4 @@
-"""Facts about the searched Lyapunov functions: what they reach, where precision ends, and that nothing wrong is said."""
+"""Searched Lyapunov functions: what they reach, where precision ends, and that nothing wrong is said."""
 
 from __future__ import annotations
 
