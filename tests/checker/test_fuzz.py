@@ -2,7 +2,7 @@
 
 Every case is drawn from a seed and its number. To repeat one that failed:
 
-    PTCC_FUZZ_SEED=0 PTCC_FUZZ_ONLY=123 python -m pytest -m "" tests/checker/test_fuzz.py -k mutants
+    PTCC_FUZZ_SEED=0 PTCC_FUZZ_ONLY=123 python -m pytest -m "" tests/checker/test_fuzz.py -k mutant
 
 ``PTCC_FUZZ_COUNT`` sets how many are drawn. Mutations know nothing of the fields of a certificate: a new field is
 changed like any other; its truth is judged once :mod:`oracle` has a method for it.
