@@ -22,7 +22,7 @@ from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.theorems.lemmas import EXACT_NODES
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 
 #: GB that the check of a large graph may take while it is certified.
 LARGE_MEMORY = 16

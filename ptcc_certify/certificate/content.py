@@ -34,6 +34,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
@@ -45,7 +46,6 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.base import Obligation, RateProof, Theorem
 from ptcc_certify.theorems.claims import Claim, sliding_claim
-from ptcc_certify.theorems.lemmas import EXACT_NODES
 from ptcc_certify.theorems.table import theorem_for
 
 #: What a simulated run meets under the sliding-mode protocol unless a file states an expression.

@@ -31,6 +31,7 @@ from ptcc_certify.certificate.request import Expectations, Request, initial_stat
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -43,7 +44,7 @@ from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.base import RateProof, Theorem
-from ptcc_certify.theorems.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
+from ptcc_certify.theorems.lemmas import laplacian_spectrum
 from ptcc_certify.theorems.table import theorem_for
 
 #: What :func:`certify` does, in this order.
@@ -60,10 +61,8 @@ SHORT_LIMIT = 10
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
-#: Largest graph for which the search of the paper's certificate (dense semidefinite cones) is started.
-SEARCH_NODES = 150
-#: Largest graph that is simulated unasked, and the instants of a larger one where it is asked for.
-SIMULATED_NODES, FEW_SAMPLES = 10_000, 51
+#: Instants of a simulated run where the graph is large.
+FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
 SETTLED = 1e-6
 

@@ -18,13 +18,13 @@ from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.gain import parameter
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
-from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
 LARGEST_STATE = Fraction(10**300)

@@ -28,9 +28,9 @@ from ptcc_certify.certificate.content import Content
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
-from ptcc_certify.theorems.lemmas import EXACT_NODES
 
 #: What became of an expectation.
 MET, REFUTED, OPEN = "met", "refuted", "left open"

@@ -11,6 +11,10 @@ MAX_BYTES, MAX_LINE, MAX_NODES = 2**30, 65_536, 2 * 10**6
 EXACT_NODES = 120
 #: Nodes above which null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
 DENSE_NODES, FACTOR_NODES = 500, 20_000
+#: Nodes up to which the paper's certificate (dense semidefinite cones) is searched.
+SEARCH_NODES = 150
+#: Nodes up to which a certificate comes with a simulated run unasked.
+SIMULATED_NODES = 10_000
 
 #: Agents up to which a report repeats the run unasked, and of every one of which it shows the input.
 REPEATED_NODES, INPUT_NODES = 1000, 100

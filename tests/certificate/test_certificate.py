@@ -27,7 +27,7 @@ from ptcc_certify.batch import certify_many
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.format_graph import structure_document
-from ptcc_certify.certificate.procedure import SEARCH_NODES, certify
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.vectors import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
@@ -36,6 +36,7 @@ from ptcc_certify.examples import GRAPHS, load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.rationals import parse_exact
+from ptcc_certify.graphs.size_limits import SEARCH_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.search import METHODS
