@@ -21,13 +21,13 @@ from typing import Any
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.journal import Journal, journal_path
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import Settings, whole_number
+from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.batch.table import refuse_table, table_bytes
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.protocols import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
@@ -107,7 +107,7 @@ def certify_many(
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
     """
-    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1)
+    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1, LARGEST_SETTING)
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')

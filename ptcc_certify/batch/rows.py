@@ -167,7 +167,7 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
         method=settings.method,
         simulation=settings.simulation,
         initial_set=settings.initial_bound,
-        time_limit=settings.time_limit,
+        time_limit=None if settings.time_limit is None else float(settings.time_limit),
         expectations=Expectations(settings.expect, settings.min_rate),
         **more,
     )

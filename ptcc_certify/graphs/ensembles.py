@@ -22,7 +22,8 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
+from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
 LARGEST_COUNT, LARGEST_SEED, LARGEST_ORDER = 10**6, 2**32 - 1, 10**6
@@ -99,38 +100,26 @@ class Ensemble:
     undirected: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "count", _integer(self.count, "count", 1, LARGEST_COUNT))
-        object.__setattr__(self, "seed", _integer(self.seed, "seed", 0, LARGEST_SEED))
-        if not isinstance(self.nodes, range):
-            orders = tuple(_integer(n, "nodes", 1, LARGEST_ORDER) for n in _several(self.nodes, "nodes"))
-            object.__setattr__(self, "nodes", orders)
-        for n in (self.nodes[0], self.nodes[-1]) if self.nodes else ():
-            _integer(n, "nodes", 1, LARGEST_ORDER)
-        for name, allowed in (("connectivity", CONNECTIVITIES), ("balanced", (True, False))):
-            chosen = _several(getattr(self, name), name)
-            for value in chosen:
-                if type(value) is not type(allowed[0]) or value not in allowed:
-                    listed = ", ".join(map(_text, allowed))
-                    raise ParameterError(f"{name} = {_text(value)} is unknown; choose of {listed}")
-            if len(set(chosen)) < len(chosen):
-                raise ParameterError(f"{name} names a class twice; name it once")
-            object.__setattr__(self, name, chosen)
         _require(isinstance(self.undirected, bool), "undirected", self.undirected, "true or false")
-        object.__setattr__(self, "mean_degree", _real(self.mean_degree, "mean_degree", 0, 1000))
-        object.__setattr__(self, "negative", _real(self.negative, "negative", 0, 1))
-        ends = self.weight_range
+        ends, decades = self.weight_range, self.weight_decades
         _require(isinstance(ends, list | tuple) and len(ends) == 2, "weight_range", ends, "[least, largest]")
         low, high = (_exact(x, "weight_range") for x in ends)
         _require(0 < low <= high <= 10**300 and low >= Fraction(1, 10**300), "weight_range", ends, "0 < least, largest")
-        object.__setattr__(self, "weight_range", (low, high))
-        if self.weight_decades is not None:
-            object.__setattr__(self, "weight_decades", _real(self.weight_decades, "weight_decades", 0, LARGEST_DECADES))
+        vars(self).update(
+            count=whole_number(self.count, "count", 1, LARGEST_COUNT),
+            nodes=_orders(self.nodes),
+            seed=whole_number(self.seed, "seed", 0, LARGEST_SEED),
+            connectivity=_classes(self.connectivity, "connectivity", CONNECTIVITIES),
+            balanced=_classes(self.balanced, "balanced", (True, False)),
+            mean_degree=_real(self.mean_degree, "mean_degree", 1000),
+            negative=_real(self.negative, "negative", 1),
+            weight_range=(low, high),
+            weight_decades=None if decades is None else _real(decades, "weight_decades", LARGEST_DECADES),
+        )
         self._refuse_impossible()
 
     def _refuse_impossible(self) -> None:
-        if not self.nodes:
-            raise ParameterError("nodes is empty; give at least one number of nodes")
-        few = min(self.nodes[0], self.nodes[-1]) if isinstance(self.nodes, range) else min(self.nodes)
+        few = min(self.nodes)
         for connectivity in self.connectivity:
             if self.undirected and connectivity in ("quasi-strong", "weak"):
                 raise ParameterError(
@@ -170,12 +159,7 @@ class Ensemble:
         (range(5, 41), ('weak', False))
         """
         name = shorten(os.fspath(path), 200)
-        try:
-            data = Path(path).read_bytes()
-        except FileNotFoundError:
-            raise FormatError(f"{name}: no such file; check the path") from None
-        except OSError as error:
-            raise FormatError(f"{name}: cannot be read ({error.strerror}); name a file") from None
+        data = read_bytes(Path(path), name)
         try:
             # Decimals are read exactly, as in every other input.
             spec = tomllib.loads(data.decode("utf-8"), parse_float=parse_exact)
@@ -264,22 +248,9 @@ class Ensemble:
 # ---------------------------------------------------------------------- parameters
 
 
-def _text(value: Any) -> str:
-    try:
-        return str(value).lower() if isinstance(value, bool) else shorten(str(value))
-    except ValueError:  # Python writes no integer of more than 4,300 digits
-        return "a number of thousands of digits"
-
-
 def _require(holds: bool, name: str, value: Any, domain: str) -> None:
     if not holds:
-        raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
-
-
-def _integer(value: Any, name: str, least: int, most: int) -> int:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    _require(whole and least <= value <= most, name, value, f"an integer from {least} to {most}")
-    return int(value)
+        raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
 
 
 def _exact(value: Any, name: str) -> Fraction:
@@ -291,24 +262,45 @@ def _exact(value: Any, name: str) -> Fraction:
         raise ParameterError(f"{name}: {error}") from None
 
 
-def _real(value: Any, name: str, least: int, most: int) -> float:
+def _real(value: Any, name: str, most: int) -> float:
     number = _exact(value, name)
-    _require(least <= number <= most, name, value, f"from {least} to {most}")
+    _require(0 <= number <= most, name, value, f"from 0 to {most}")
     return float(number)
 
 
-def _several(value: Any, name: str) -> tuple[Any, ...]:
-    """Return one or several values as a tuple."""
-    chosen = tuple(value) if isinstance(value, list | tuple | np.ndarray) else (value,)
+def _several(value: Any, name: str) -> Sequence[Any]:
+    """Return one or several values as a tuple or a range."""
+    if isinstance(value, range):
+        chosen: Sequence[Any] = value
+    else:
+        chosen = tuple(value) if isinstance(value, list | tuple | np.ndarray) else (value,)
     if not chosen:
         raise ParameterError(f"{name} is empty; give at least one value")
+    return chosen
+
+
+def _orders(nodes: Any) -> Sequence[int]:
+    """Return the numbers of nodes to choose from; a range stays one."""
+    chosen = _several(nodes, "nodes")
+    numbers = [whole_number(n, "nodes", 1, LARGEST_ORDER) for n in chosen]
+    return chosen if isinstance(chosen, range) else tuple(numbers)
+
+
+def _classes(value: Any, name: str, allowed: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return the classes that take turns, each one of those that there are, and once."""
+    chosen = tuple(_several(value, name))
+    for one in chosen:
+        if type(one) is not type(allowed[0]) or one not in allowed:
+            raise ParameterError(f"{name} = {given(one)} is unknown; choose of {', '.join(map(given, allowed))}")
+    if len(set(chosen)) < len(chosen):
+        raise ParameterError(f"{name} names a class twice; name it once")
     return chosen
 
 
 def _range(table: dict[str, Any]) -> range:
     if set(table) != {"from", "to"}:
         raise ParameterError("nodes: a range is written { from = 5, to = 40 }")
-    least, most = (_integer(table[key], f"nodes.{key}", 1, LARGEST_ORDER) for key in ("from", "to"))
+    least, most = (whole_number(table[key], f"nodes.{key}", 1, LARGEST_ORDER) for key in ("from", "to"))
     _require(least <= most, "nodes.to", most, f"{least} or more")
     return range(least, most + 1)
 
