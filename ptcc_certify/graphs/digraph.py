@@ -11,6 +11,7 @@ import json
 import math
 import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from copy import copy
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -37,33 +38,24 @@ class Weights:
     """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
 
     def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
-        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None)."""
-        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None); an array is one of floats."""
+        self.kind, self.scale = "float64", 1
+        if isinstance(values, np.ndarray):
             table: np.ndarray = values.astype(np.float64)
-            self.kind, self.scale = "float64", 1
+        elif (scale := _common_scale(values)) is not None:
+            table = np.array([int(v * scale) for v in values], dtype=np.int64)
+            self.kind, self.scale = "int64", scale
+        elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in values):
+            table = np.array([float(v) for v in values])
         else:
-            fractions = [v if isinstance(v, Fraction) else Fraction(v) for v in values]
-            scale = 1
-            for value in fractions:
-                scale = math.lcm(scale, value.denominator)
-                if scale > _INT64_LIMIT:
-                    break
-            if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
-                table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
-                self.kind, self.scale = "int64", scale
-            elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in fractions):
-                table = np.array([float(v) for v in fractions])
-                self.kind, self.scale = "float64", 1
-            else:
-                table = np.empty(len(fractions), dtype=object)
-                table[:] = fractions
-                self.kind, self.scale = "fraction", 1
+            table = np.array(values, dtype=object)
+            self.kind = "fraction"
         self.table = table if codes is None else table[codes]
 
     def take(self, index: np.ndarray) -> Weights:
         """Return the weights at ``index``, in that order."""
-        new = object.__new__(Weights)
-        new.kind, new.scale, new.table = self.kind, self.scale, self.table[index]
+        new = copy(self)
+        new.table = self.table[index]
         return new
 
     def as_float(self) -> np.ndarray:
@@ -73,9 +65,7 @@ class Weights:
             if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
                 return self.table / float(self.scale)
             return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
-        if self.kind == "float64":
-            return self.table.copy()
-        return np.array([nearest_float(v) for v in self.table], dtype=np.float64)
+        return self.table if self.kind == "float64" else np.array([nearest_float(v) for v in self.table])
 
     def fraction(self, i: int) -> Fraction:
         """Return weight ``i`` exactly."""
@@ -85,6 +75,16 @@ class Weights:
     def signs(self) -> np.ndarray:
         """Return +1 or -1 for each weight."""
         return np.where(self.table > 0, 1, -1).astype(np.int8)
+
+
+def _common_scale(values: Sequence[Fraction]) -> int | None:
+    """Return the common denominator of rationals that are int64 numerators over it; None if they are not."""
+    scale = 1
+    for value in values:
+        scale = math.lcm(scale, value.denominator)
+        if scale > _INT64_LIMIT:
+            return None
+    return scale if all(abs(v * scale) <= _INT64_LIMIT for v in values) else None
 
 
 #: Edges whose lines are hashed at a time.
@@ -169,21 +169,17 @@ class SignedDigraph(Shown):
         twice = np.flatnonzero((source[1:] == source[:-1]) & (target[1:] == target[:-1]))
         if twice.size:
             raise GraphError(f"two edges {self._edge_text(int(twice[0]))}; keep one, or merge with --duplicates")
-        table = self._weights.table
-        if self._weights.kind == "float64" and not np.isfinite(table).all():
-            where = int(np.flatnonzero(~np.isfinite(table))[0])
-            raise GraphError(f"weight {table[where]} of edge {self._edge_text(where)} is not a finite number")
-        if (zero := np.flatnonzero(table == 0)).size:
+        if (zero := np.flatnonzero(self._weights.table == 0)).size:
             raise GraphError(
                 f"weight 0 of edge {self._edge_text(int(zero[0]))}: an unknown sign is not an edge; "
                 "remove it or give a weight"
             )
         size = np.abs(self.weights)
         if self._weights.kind == "fraction":
-            for edge, weight in enumerate(table.tolist()):
+            for edge, weight in enumerate(self._weights.table.tolist()):
                 if not writable(weight):
                     raise GraphError(f"weight of edge {self._edge_text(edge)} has too many digits to keep; round it")
-        if (odd := np.flatnonzero((size < SMALLEST_WEIGHT) | (size > LARGEST_WEIGHT))).size:
+        if (odd := np.flatnonzero(~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT)))).size:
             raise GraphError(
                 f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
             )
@@ -521,8 +517,7 @@ class SignedDigraph(Shown):
         digest = hashlib.sha256()
         quoted = [json.dumps(label, ensure_ascii=False) for label in self.labels]
         order = sorted(range(self.n_nodes), key=self.labels.__getitem__)
-        rank = np.empty(self.n_nodes, dtype=np.int64)
-        rank[order] = np.arange(self.n_nodes)
+        rank = np.argsort(order)
         digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
         names, texts = np.array(quoted, dtype=object), np.array(self.weight_texts, dtype=object)
         edges = np.lexsort((rank[self.target], rank[self.source]))
@@ -595,11 +590,7 @@ def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
     >>> ordered_labels(["10", "2"])
     (['2', '10'], array([1, 0]))
     """
-    n = len(labels)
+    order: Sequence[int] = range(len(labels))
     if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
-        order = sorted(range(n), key=lambda i: (int(labels[i]), labels[i]))
-    else:
-        order = list(range(n))
-    rank = np.empty(n, dtype=np.int64)
-    rank[order] = np.arange(n)
-    return [labels[i] for i in order], rank
+        order = sorted(order, key=lambda i: (int(labels[i]), labels[i]))
+    return [labels[i] for i in order], np.argsort(order)

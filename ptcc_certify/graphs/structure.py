@@ -250,11 +250,9 @@ class Structure(Shown):
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
-        claim = (
-            f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
-            if self.claim
-            else (f"{len(self.components)} components")
-        )
+        claim = f"{len(self.components)} components"
+        if self.claim:
+            claim = f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
         return (
             f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {len(self.closed_components)} closed "
             f"component(s), {balanced} balanced, {self.leaders.size} leaders; {claim})"
@@ -289,29 +287,21 @@ consensus)
 
     n, source, target, sign = graph.n_nodes, graph.source, graph.target, graph.sign
     pattern = sparse.csr_array((np.ones(source.size, dtype=np.int8), (source, target)), shape=(n, n))
-    n_strong, strong = connected_components(pattern, directed=True, connection="strong")
-    n_weak, weak = connected_components(pattern, directed=True, connection="weak")
-    strong, n_strong = _by_first_node(strong), int(n_strong)
-    weak, n_weak = _by_first_node(weak), int(n_weak)
-
+    strong, weak = (_by_first_node(connected_components(pattern, connection=kind)[1]) for kind in ("strong", "weak"))
     inside = strong[source] == strong[target]
-    is_closed = np.ones(n_strong, dtype=bool)
+    is_closed = np.ones(strong.max() + 1, dtype=bool)
     is_closed[strong[target[~inside]]] = False
     leader = is_closed[strong]
 
     closed = _closed_components(graph, strong, is_closed, inside & leader[target])
     camps = _camps(n, source, target, sign)
     opposed, one_way = _mutual_edges(graph)
-    flags = _WeakFlags(
-        balanced=_none_of(weak, source[camps.violated], n_weak),
-        all_positive=_none_of(weak, source[sign < 0], n_weak),
-        undirected=_none_of(weak, source[one_way], n_weak),
-    )
-    components = _weak_components(weak, n_weak, strong, closed, flags)
-    connectivity = components[0].connectivity if n_weak == 1 else "disconnected"
+    # Which weak components are balanced, all positive, undirected.
+    flags = [_none_of(weak, source[edges]) for edges in (camps.violated, sign < 0, one_way)]
+    components = _weak_components(weak, strong, closed, np.column_stack(flags))
     return Structure(
         graph=graph,
-        connectivity=connectivity,
+        connectivity=components[0].connectivity if len(components) == 1 else "disconnected",
         strong_component=strong,
         weak_component=weak,
         closed_components=closed,
@@ -389,48 +379,31 @@ def _closed_components(
 ) -> tuple[ClosedComponent, ...]:
     edge = np.flatnonzero(edges)
     camps = _camps(graph.n_nodes, graph.source[edge], graph.target[edge], graph.sign[edge])
-    violating: dict[int, int] = {}
-    for position in camps.violated[::-1].tolist():
-        violating[int(strong[camps.source[position]])] = position
-    functions = _groups(strong, is_closed.size)
+    violating = {int(strong[camps.source[i]]): i for i in camps.violated[::-1].tolist()}  # the first of each
+    groups = _groups(strong)
     result = []
     for number in np.flatnonzero(is_closed).tolist():
-        nodes = functions[number].tolist()
+        nodes, cycle = groups[number].tolist(), None
         if number in violating:
-            result.append(ClosedComponent(tuple(nodes), False, None, camps.negative_cycle(violating[number])))
-        else:
-            result.append(ClosedComponent(tuple(nodes), True, tuple(camps.gauge[nodes].tolist()), None))
+            cycle = camps.negative_cycle(violating[number])
+        gauge = None if cycle else tuple(camps.gauge[nodes].tolist())
+        result.append(ClosedComponent(tuple(nodes), not cycle, gauge, cycle))
     return tuple(result)
 
 
-class _WeakFlags(NamedTuple):
-    balanced: np.ndarray
-    all_positive: np.ndarray
-    undirected: np.ndarray
-
-
 def _weak_components(
-    weak: np.ndarray, n_weak: int, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: _WeakFlags
+    weak: np.ndarray, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: np.ndarray
 ) -> tuple[WeakComponent, ...]:
-    held: list[list[int]] = [[] for _ in range(n_weak)]
+    groups = _groups(weak)
+    held: list[list[int]] = [[] for _ in groups]
     for i, component in enumerate(closed):
         held[weak[component.nodes[0]]].append(i)
-    _, representative = np.unique(strong, return_index=True)
-    n_strong = np.bincount(weak[representative], minlength=n_weak).tolist()
     result = []
-    for number, functions in enumerate(_groups(weak, n_weak)):
-        connectivity = "strong" if n_strong[number] == 1 else "quasi-strong" if len(held[number]) == 1 else "weak"
-        result.append(
-            WeakComponent(
-                tuple(functions.tolist()),
-                connectivity,
-                tuple(held[number]),
-                any(closed[i].balanced for i in held[number]),
-                bool(flags.balanced[number]),
-                bool(flags.all_positive[number]),
-                bool(flags.undirected[number]),
-            )
-        )
+    for nodes, closed_in, told in zip(groups, held, flags.tolist(), strict=True):
+        one = (strong[nodes] == strong[nodes[0]]).all()
+        connectivity = "strong" if one else "quasi-strong" if len(closed_in) == 1 else "weak"
+        balanced = any(closed[i].balanced for i in closed_in)
+        result.append(WeakComponent(tuple(nodes.tolist()), connectivity, tuple(closed_in), balanced, *told))
     return tuple(result)
 
 
@@ -445,20 +418,17 @@ def _mutual_edges(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray]:
     return opposed, one_way
 
 
-def _none_of(component: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
+def _none_of(component: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Tell for each component whether none of ``nodes`` lies in it."""
-    return np.bincount(component[nodes], minlength=count) == 0
+    return np.bincount(component[nodes], minlength=component.max() + 1) == 0
 
 
-def _groups(component: np.ndarray, count: int) -> list[np.ndarray]:
+def _groups(component: np.ndarray) -> list[np.ndarray]:
     """Return the nodes of each component, ascending."""
-    order = np.argsort(component, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(component, minlength=count))[:-1])
+    return np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
 
 
 def _by_first_node(component: np.ndarray) -> np.ndarray:
     """Renumber components by their smallest node."""
     _, first, inverse = np.unique(component, return_index=True, return_inverse=True)
-    rank = np.empty(first.size, dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(first.size)
-    return rank[inverse]
+    return np.argsort(np.argsort(first))[inverse]
