@@ -161,31 +161,19 @@ class SignedDigraph(Shown):
         self._refuse_bad_edges()
 
     def _refuse_bad_edges(self) -> None:
-        source, target = self.source, self.target
-        loops = np.flatnonzero(source == target)
-        if loops.size:
-            label = self.labels[source[loops[0]]]
-            raise GraphError(f"self-loop at node {shorten(label)}; remove it, or drop all with --drop-self-loops")
-        twice = np.flatnonzero((source[1:] == source[:-1]) & (target[1:] == target[:-1]))
-        if twice.size:
-            raise GraphError(f"two edges {self._edge_text(int(twice[0]))}; keep one, or merge with --duplicates")
-        if (zero := np.flatnonzero(self._weights.table == 0)).size:
-            raise GraphError(
-                f"weight 0 of edge {self._edge_text(int(zero[0]))}: an unknown sign is not an edge; "
-                "remove it or give a weight"
-            )
-        size = np.abs(self.weights)
-        if self._weights.kind == "fraction":
-            for edge, weight in enumerate(self._weights.table.tolist()):
-                if not writable(weight):
-                    raise GraphError(f"weight of edge {self._edge_text(edge)} has too many digits to keep; round it")
-        if (odd := np.flatnonzero(~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT)))).size:
-            raise GraphError(
-                f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
-            )
-
-    def _edge_text(self, edge: int) -> str:
-        return f"{shorten(self.labels[self.source[edge]])} -> {shorten(self.labels[self.target[edge]])}"
+        source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
+        again = (source[1:] == source[:-1]) & (target[1:] == target[:-1])
+        long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
+        odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
+        for bad, message in (
+            (source == target, "self-loop at node {0}; remove it, or drop all with --drop-self-loops"),
+            (again, "two edges {0} -> {1}; keep one, or merge with --duplicates"),
+            (table == 0, "weight 0 of edge {0} -> {1}: an unknown sign is not an edge; remove it or give a weight"),
+            (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),
+            (odd, "weight of edge {0} -> {1} is outside the range of float64; rescale the weights"),
+        ):
+            if bad.any():
+                raise GraphError(message.format(*(shorten(self.labels[p[np.argmax(bad)]]) for p in (source, target))))
 
     # ------------------------------------------------------------------ constructors
 
