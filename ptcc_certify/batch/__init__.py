@@ -176,15 +176,12 @@ def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool 
     ...     write_graphs(Ensemble(count=2, nodes=5), folder), sorted(path.name for path in Path(folder).iterdir())
     (2, ['ensemble-0.csv', 'ensemble-1.csv'])
     """
-    chosen = chosen_sources(sources)
-    for source in chosen:
-        if not isinstance(source.origin, tuple):
-            raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
     if not os.fspath(folder):
         raise ParameterError("the name of the folder is empty; name a folder")
     targets: dict[Path, tuple[Ensemble, int]] = {}
-    for source in chosen:
-        assert isinstance(source.origin, tuple)
+    for source in chosen_sources(sources):
+        if not isinstance(source.origin, tuple):
+            raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
         ensemble, i = source.origin
         stem, digits = Path(source.name.rpartition("#")[0]).stem, len(str(len(ensemble) - 1))
         target = Path(folder, f"{stem}-{i:0{digits}d}.csv")

@@ -9,9 +9,9 @@ import json
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Any
 
 from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
 from ptcc_certify.batch.settings import Settings
@@ -21,8 +21,13 @@ from ptcc_certify.graphs.rationals import shorten
 
 #: What the first line of a journal begins with.
 SCHEMA = "ptcc-batch/2"
-#: No integer of a table is that large.
-LARGEST_INTEGER = 2**63 - 1
+#: Which values of a type can stand in a column of it.
+_FITTING: dict[type, Callable[[Any], bool]] = {
+    str: str.isprintable,
+    float: math.isfinite,
+    int: lambda x: abs(x) < 2**63,
+    bool: lambda x: True,
+}
 
 
 def journal_path(path: Path) -> Path:
@@ -49,7 +54,6 @@ class Journal:
         except BaseException:
             self._file.close()
             raise
-        self._empty = not self._rows
 
     def _read(self, header: dict[str, Any], restart: bool) -> None:
         data = self._file.read()
@@ -89,7 +93,7 @@ class Journal:
 
     def append(self, mark: str, row: Row) -> None:
         """Keep a row of the graph of this mark."""
-        self._empty = False
+        self._rows[mark] = row
         self._write({"of": mark, "row": row})
 
     def _write(self, entry: dict[str, Any]) -> None:
@@ -104,22 +108,18 @@ class Journal:
 
     def close(self) -> None:
         """Release the journal, and delete it if it keeps no row."""
-        if self._empty:
+        if not self._rows:
             self.remove()
         self._file.close()
 
 
 def _entry(line: bytes) -> dict[str, Any]:
-    """Return the object of a line; an empty one of a line that is none, or holds what is no finite number."""
+    """Return the object of a line; an empty one of a line that is none."""
     try:
-        entry = json.loads(line, parse_constant=_refuse_constant)
+        entry = json.loads(line)
     except (ValueError, RecursionError):
         return {}
     return entry if isinstance(entry, dict) else {}
-
-
-def _refuse_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a finite number")
 
 
 def _intact(entry: dict[str, Any]) -> bool:
@@ -130,20 +130,14 @@ def _intact(entry: dict[str, Any]) -> bool:
         and type(entry["of"]) is str
         and type(row) is dict
         and list(row) == list(COLUMNS)
-        and type(row["graph"]) is str
+        and row["graph"] is not None
         and all(value is None or _fits(value, COLUMNS[name]) for name, value in row.items())
     )
 
 
 def _fits(value: Any, kind: type) -> bool:
-    """Tell whether an entry can stand in a column."""
-    if type(value) is not kind:  # a truth value is no integer
-        return False
-    if isinstance(value, str):
-        return not any("\ud800" <= c <= "\udfff" for c in value)
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, int) and abs(value) <= LARGEST_INTEGER
+    """Tell whether an entry can stand in a column; a truth value is no integer."""
+    return type(value) is kind and _FITTING[kind](value)
 
 
 def _opened_alone(path: Path, name: str) -> IO[bytes]:
@@ -152,9 +146,7 @@ def _opened_alone(path: Path, name: str) -> IO[bytes]:
         try:
             if path.exists() and not path.is_file():
                 raise ParameterError(f"{name}: is no regular file; remove what is there, or name another -o")
-            file = path.open("r+b") if path.exists() else path.open("x+b")
-        except (FileExistsError, FileNotFoundError):
-            continue  # another process was faster
+            file = path.open("a+b")
         except OSError as error:
             raise ParameterError(f"{name}: cannot be written ({error.strerror})") from None
         try:
@@ -163,6 +155,7 @@ def _opened_alone(path: Path, name: str) -> IO[bytes]:
             file.close()
             raise ParameterError(f"{name}: another process is at work on it; wait for it, or name another -o") from None
         if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+            file.seek(0)
             return file
         file.close()  # the other process finished in between
     raise ParameterError(f"{name}: cannot be opened; remove what is there, or name another -o")
@@ -177,13 +170,11 @@ def _lock(file: IO[bytes]) -> None:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         except OSError:
             raise BlockingIOError from None
-        file.seek(0)
         return
     import fcntl
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise
-    except OSError:
-        pass  # some network file systems know no locks
+    except OSError as error:  # some network file systems know no locks
+        if isinstance(error, BlockingIOError):
+            raise

@@ -13,22 +13,8 @@ from numbers import Integral, Rational, Real
 from typing import Any
 
 from lmi.exact import numbers
-from lmi.exact.numbers import MAX_CHARACTERS, MAX_EXPONENT, shorten
+from lmi.exact.numbers import MAX_CHARACTERS, shorten
 from ptcc_certify.errors import NumberError, ParameterError
-
-__all__ = [
-    "MAX_CHARACTERS",
-    "MAX_EXPONENT",
-    "as_fraction",
-    "format_exact",
-    "given",
-    "nearest_float",
-    "parse_exact",
-    "short_exact",
-    "shorten",
-    "whole_number",
-    "writable",
-]
 
 
 def parse_exact(text: str) -> Fraction:
