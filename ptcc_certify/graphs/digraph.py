@@ -557,17 +557,16 @@ def labels_beside(values: Any) -> list[str] | None:
 
 def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
     """Return the entries of a DataFrame with its columns in the order of its rows."""
-    place = {str(label): i for i, label in enumerate(frame.columns)}
-    for what, labels in (("rows", rows), ("columns", [str(label) for label in frame.columns])):
-        if len(set(labels)) < len(labels):
-            twice = next(label for label in labels if labels.count(label) > 1)
+    frame = frame.set_axis(rows, axis=0).set_axis([str(label) for label in frame.columns], axis=1)
+    for what, labels in (("rows", frame.index), ("columns", frame.columns)):
+        if labels.has_duplicates:
+            twice = labels[labels.duplicated()][0]
             raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
-    if odd := sorted(place.keys() ^ set(rows)):
+    if odd := frame.index.symmetric_difference(frame.columns).tolist():
         named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
         raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
     # One type for all columns would round the integers of one beside the floats of another.
-    entries = frame.to_numpy(dtype=object) if len(set(frame.dtypes)) > 1 else frame.to_numpy()
-    return entries[:, [place[label] for label in rows]]
+    return frame[rows].to_numpy(dtype=object if len(set(frame.dtypes)) > 1 else None)
 
 
 def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
