@@ -6,8 +6,8 @@ sent; workers neither read nor write.
 
 :mod:`~ptcc_certify.batch.sources` tells which graphs there are, :mod:`~ptcc_certify.batch.settings` is everything else
 that a row depends on, and :mod:`~ptcc_certify.batch.rows` makes one row; its columns are listed there. Rows are
-computed by one of the :mod:`~ptcc_certify.batch.backends`, kept as they come by :mod:`~ptcc_certify.batch.journal`, and
-written by :mod:`~ptcc_certify.batch.table` when all are there, or when a batch ends before.
+computed by one of the :mod:`~ptcc_certify.batch.backends`; :mod:`~ptcc_certify.batch.output` keeps them as they come,
+and writes the table when all are there, or when a batch ends before.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.batch.backends import compute_rows, default_workers
-from ptcc_certify.batch.journal import Journal, journal_path
+from ptcc_certify.batch.output import Journal, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
 from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
-from ptcc_certify.batch.table import refuse_table, table_bytes
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph

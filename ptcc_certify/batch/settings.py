@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
+from ptcc_certify.certificate.request import refuse
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import behaviour_name
-from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.parameters import parameter
@@ -113,16 +113,9 @@ class Settings:
     def __post_init__(self) -> None:
         if not isinstance(self.protocol, Protocol):
             raise ParameterError(f"protocol = {shorten(repr(self.protocol))} is none; give a NominalProtocol, say")
-        if not self.protocol.prescribed:
-            raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-        if self.method not in METHODS:
-            raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
-        sliding = self.protocol.reaching is not None
-        for name in ("sigma0", "disturbance"):
-            if getattr(self, name) is not None and not sliding:
-                raise ParameterError(
-                    f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol"
-                )
+        one_node = SignedDigraph.from_edges([], nodes=["1"])  # what certify refuses of it, it refuses of every graph
+        sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
+        refuse(one_node, self.protocol, self.method, sliding, ())
         if self.disturbance is not None:
             self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
         checked: dict[str, Any] = {
