@@ -116,8 +116,7 @@ class Settings:
         one_node = SignedDigraph.from_edges([], nodes=["1"])  # what certify refuses of it, it refuses of every graph
         sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
         refuse(one_node, self.protocol, self.method, sliding, ())
-        if self.disturbance is not None:
-            self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
+        self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
         checked: dict[str, Any] = {
             "seed": whole_number(self.seed, "seed", 0, LARGEST_SETTING),
             "x0": _start(self.x0, "x0"),
@@ -143,10 +142,11 @@ class Settings:
         return int.from_bytes(hashlib.sha256(f"{self.seed} {graph.sha256}".encode()).digest()[:4], "big")
 
     def disturbance_of(self, n: int, seed: int = 0) -> Any:
-        """Return the disturbance of ``n`` agents, which a simulated run meets."""
+        """Return the disturbance of ``n`` agents, which a simulated run meets; None in the nominal protocol."""
+        if self.protocol.reaching is None:
+            return None
         text = "worst-case" if self.disturbance is None else self.disturbance
-        delta = getattr(self.protocol, "delta", 0)
-        return as_disturbance(text, n, delta, 2 * float(self.protocol.T), seed)
+        return as_disturbance(text, n, self.protocol.reaching.delta, 2 * float(self.protocol.T), seed)
 
 
 def _start(start: Start, name: str) -> Start:

@@ -39,17 +39,15 @@ class Weights:
 
     def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
         """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None); an array is one of floats."""
-        self.kind, self.scale = "float64", 1
+        self.scale = 1
         if isinstance(values, np.ndarray):
             table: np.ndarray = values.astype(np.float64)
         elif (scale := _common_scale(values)) is not None:
-            table = np.array([int(v * scale) for v in values], dtype=np.int64)
-            self.kind, self.scale = "int64", scale
+            table, self.scale = np.array([int(v * scale) for v in values], dtype=np.int64), scale
         elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in values):
             table = np.array([float(v) for v in values])
         else:
             table = np.array(values, dtype=object)
-            self.kind = "fraction"
         self.table = table if codes is None else table[codes]
 
     def take(self, index: np.ndarray) -> Weights:
@@ -60,17 +58,17 @@ class Weights:
 
     def as_float(self) -> np.ndarray:
         """Return the weights rounded to float64."""
-        if self.kind == "int64":
+        if self.table.dtype == np.int64:
             # One rounding only: int64 / scale in float64 would round the numerator first.
             if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
                 return self.table / float(self.scale)
-            return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
-        return self.table if self.kind == "float64" else np.array([nearest_float(v) for v in self.table])
+            return np.array([float(Fraction(v, self.scale)) for v in self.table.tolist()])
+        return np.array([nearest_float(v) for v in self.table]) if self.table.dtype == object else self.table
 
     def fraction(self, i: int) -> Fraction:
         """Return weight ``i`` exactly."""
-        value = self.table[i]
-        return Fraction(int(value), self.scale) if self.kind == "int64" else Fraction(value)
+        value = self.table.item(i)
+        return Fraction(value, self.scale) if isinstance(value, int) else Fraction(value)
 
     def signs(self) -> np.ndarray:
         """Return +1 or -1 for each weight."""
@@ -412,7 +410,8 @@ class SignedDigraph(Shown):
 
         None where neither holds the weights exactly.
         """
-        return (None if self._weights.kind == "fraction" else self._weights.table), self._weights.scale
+        table = self._weights.table
+        return (None if table.dtype == object else table), self._weights.scale
 
     @cached_property
     def weight_texts(self) -> list[str]:
