@@ -205,14 +205,16 @@ def _computed(client: Any, gone: str, tasks: Iterator[Task], settings: Settings)
                 return
             with client.as_current():
                 done = wait(list(under_way), timeout=1, return_when="FIRST_COMPLETED").done
-            for future in done:
-                task = under_way.pop(future)
-                yield task, _row_from(future, task.name)
+            rows = [(under_way[future], _row_from(future, under_way[future].name)) for future in done]
         except TimeoutError:
             if now > alive + PATIENCE:
                 raise ParameterError(gone) from None
+            continue
         except (CancelledError, OSError):
             raise ParameterError("the scheduler was lost; start it again, and the same command") from None
+        for future in done:
+            del under_way[future]
+        yield from rows
 
 
 def _row_of(name: str, data: bytes, settings: Settings) -> Row:
