@@ -205,15 +205,14 @@ class SignedDigraph(Shown):
         ('b', 'a', Fraction(1, 1))
         """
         _refuse_unknown_orientation(orientation)
-        index: dict[str, int] = {}
-        original: dict[str, Hashable] = {}
+        known: dict[str, tuple[int, Hashable]] = {}
 
         def number(node: Hashable) -> int:
             label = str(node)
-            if label in original and original[label] != node:
+            place, first = known.setdefault(label, (len(known), node))
+            if first is not node and first != node:
                 raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
-            original.setdefault(label, node)
-            return index.setdefault(label, len(index))
+            return place
 
         for node in nodes:
             number(node)
@@ -231,7 +230,7 @@ class SignedDigraph(Shown):
                 raise GraphError(f"edge {shorten(str(first))} -> {shorten(str(second))}: {error}") from None
         if orientation == "listens":
             heads, tails = tails, heads
-        labels, rank = ordered_labels(list(index))
+        labels, rank = ordered_labels(list(known))
         source = rank[np.array(heads, dtype=np.int64)]
         target = rank[np.array(tails, dtype=np.int64)]
         return cls(labels, source, target, Weights(values), {"orientation": orientation})

@@ -10,11 +10,12 @@ A graph is *structurally balanced* iff a *gauge* ``g`` in {-1, +1}^N exists with
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -294,10 +295,10 @@ consensus)
     leader = is_closed[strong]
 
     closed = _closed_components(graph, strong, is_closed, inside & leader[target])
-    camps = _camps(n, source, target, sign)
+    gauge, violated, negative_cycle = _camps(n, source, target, sign)
     opposed, one_way = _mutual_edges(graph)
     # Which weak components are balanced, all positive, undirected.
-    flags = [_none_of(weak, source[edges]) for edges in (camps.violated, sign < 0, one_way)]
+    flags = [_none_of(weak, source[edges]) for edges in (violated, sign < 0, one_way)]
     components = _weak_components(weak, strong, closed, np.column_stack(flags))
     return Structure(
         graph=graph,
@@ -308,44 +309,28 @@ consensus)
         components=components,
         leaders=np.array([v for c in closed for v in c.nodes], dtype=np.int64),
         followers=np.flatnonzero(~leader),
-        gauge=camps.gauge if camps.violated.size == 0 else None,
-        negative_cycle=camps.negative_cycle(int(camps.violated[0])) if camps.violated.size else None,
+        gauge=None if violated.size else gauge,
+        negative_cycle=negative_cycle(int(violated[0])) if violated.size else None,
         sign_symmetric=opposed.size == 0,
         undirected=one_way.size == 0,
         all_positive=bool((sign > 0).all()),
     )
 
 
-class _Camps(NamedTuple):
-    """A gauge along a breadth-first forest, and the edges that violate it."""
+def _camps(
+    n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Callable[[int], tuple[Edge, ...]]]:
+    """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1).
 
-    gauge: np.ndarray  # (N,) int8, +1 at the smallest node of each component
-    violated: np.ndarray  # edge numbers, ascending
-    parent: np.ndarray  # (N,) predecessor in the forest; N at a root
-    parent_edge: np.ndarray  # (N,) edge number to the predecessor; -1 at a root
-    source: np.ndarray
-    target: np.ndarray
-
-    def negative_cycle(self, edge: int) -> tuple[Edge, ...]:
-        """Return the closed walk that a violating edge makes with the forest."""
-        start, end = int(self.source[edge]), int(self.target[edge])
-        left, right = self._path_to_root(start), self._path_to_root(end)
-        while left and right and left[-1] == right[-1]:
-            left.pop()
-            right.pop()
-        walk = [edge, *right, *reversed(left)]
-        return tuple((int(self.source[e]), int(self.target[e])) for e in walk)
-
-    def _path_to_root(self, node: int) -> list[int]:
-        path = []
-        while (edge := int(self.parent_edge[node])) >= 0:
-            path.append(edge)
-            node = int(self.parent[node])
-        return path
-
-
-def _camps(n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> _Camps:
-    """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1)."""
+    Returns
+    -------
+    gauge : (N,) int8 array
+        +1 at the smallest node of each component.
+    violated : int array
+        Numbers of the edges that violate it, ascending.
+    negative_cycle : function
+        Of such a number: the closed walk that the edge makes with the forest.
+    """
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -371,23 +356,39 @@ def _camps(n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> 
         gauge, jump = gauge * gauge[jump], jump[jump]
     gauge = gauge[:n]
     violated = np.flatnonzero(sign * gauge[source] * gauge[target] < 0)
-    return _Camps(gauge, violated, parent, parent_edge, source, target)
+
+    def path_to_root(node: int) -> list[int]:
+        path = []
+        while (edge := int(parent_edge[node])) >= 0:
+            path.append(edge)
+            node = int(parent[node])
+        return path
+
+    def negative_cycle(edge: int) -> tuple[Edge, ...]:
+        left, right = path_to_root(int(source[edge])), path_to_root(int(target[edge]))
+        while left and right and left[-1] == right[-1]:
+            left.pop()
+            right.pop()
+        walk = [edge, *right, *reversed(left)]
+        return tuple((int(source[e]), int(target[e])) for e in walk)
+
+    return gauge, violated, negative_cycle
 
 
 def _closed_components(
     graph: SignedDigraph, strong: np.ndarray, is_closed: np.ndarray, edges: np.ndarray
 ) -> tuple[ClosedComponent, ...]:
-    edge = np.flatnonzero(edges)
-    camps = _camps(graph.n_nodes, graph.source[edge], graph.target[edge], graph.sign[edge])
-    violating = {int(strong[camps.source[i]]): i for i in camps.violated[::-1].tolist()}  # the first of each
+    source, target, sign = graph.source[edges], graph.target[edges], graph.sign[edges]
+    gauge, violated, negative_cycle = _camps(graph.n_nodes, source, target, sign)
+    violating = {int(strong[source[i]]): i for i in violated[::-1].tolist()}  # the first of each
     groups = _groups(strong)
     result = []
     for number in np.flatnonzero(is_closed).tolist():
-        nodes, cycle = groups[number].tolist(), None
+        nodes = tuple(groups[number].tolist())
         if number in violating:
-            cycle = camps.negative_cycle(violating[number])
-        gauge = None if cycle else tuple(camps.gauge[nodes].tolist())
-        result.append(ClosedComponent(tuple(nodes), not cycle, gauge, cycle))
+            result.append(ClosedComponent(nodes, False, None, negative_cycle(violating[number])))
+        else:
+            result.append(ClosedComponent(nodes, True, tuple(gauge[groups[number]].tolist()), None))
     return tuple(result)
 
 
