@@ -37,7 +37,7 @@ bound of the input is compared with ``U`` exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -78,6 +78,7 @@ _NUDGES = 20
 #: How often gains are sought with the functions that certify finds for those before, until it proves its own.
 _ROUNDS = 4
 _KEPT_BITS = 40
+_NONE_LEFT = "none, every agent is at its final state"
 
 
 class TradeOff(NamedTuple):
@@ -298,18 +299,15 @@ class Design(Shown):
         if self.protocol is not None:
             gains = (f"{name} = {short_exact(value)}" for name, value in self.protocol.parameters.items())
             found.append(("gains", ", ".join(gains)))
-        if self.gain_cap is not None:
-            found.append(("", f"gain capped at {short_exact(self.gain_cap)}, which acts from 0 on"))
-        if self.peak is not None:
-            found.append(("peak input", f"{up(self.peak)} at most"))
-        if self.residual is not None:
-            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its final state"
-            found.append(("left at the deadline", left))
-        if self.shortest_certified is not None:
-            found.append(("shortest deadline", f"{up(self.shortest_certified, DIGITS)} certified"))
-        if self.shortest_possible is not None:
-            times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
-            found.append(("", f"{down(self.shortest_possible)} at least, whatever the gains{times}"))
+        times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
+        numbers: tuple[tuple[str, Fraction | None, Callable[[Fraction], str]], ...] = (
+            ("", self.gain_cap, lambda x: f"gain capped at {short_exact(x)}, which acts from 0 on"),
+            ("peak input", self.peak, lambda x: f"{up(x)} at most"),
+            ("left at the deadline", self.residual, lambda x: f"{up(x)} at most" if x else _NONE_LEFT),
+            ("shortest deadline", self.shortest_certified, lambda x: f"{up(x, DIGITS)} certified"),
+            ("", self.shortest_possible, lambda x: f"{down(x)} at least, whatever the gains{times}"),
+        )
+        found += [(name, text(value)) for name, value, text in numbers if value is not None]
         width = max(len(name) for name, _ in found)
         return [f"{name:<{width}}  {text}" for name, text in found]
 

@@ -399,9 +399,10 @@ def _weak_components(
     held: list[list[int]] = [[] for _ in groups]
     for i, component in enumerate(closed):
         held[weak[component.nodes[0]]].append(i)
+    _, first = np.unique(weak, return_index=True)
+    whole = _none_of(weak, strong != strong[first[weak]])
     result = []
-    for nodes, closed_in, told in zip(groups, held, flags.tolist(), strict=True):
-        one = (strong[nodes] == strong[nodes[0]]).all()
+    for nodes, closed_in, one, told in zip(groups, held, whole.tolist(), flags.tolist(), strict=True):
         connectivity = "strong" if one else "quasi-strong" if len(closed_in) == 1 else "weak"
         balanced = any(closed[i].balanced for i in closed_in)
         result.append(WeakComponent(tuple(nodes.tolist()), connectivity, tuple(closed_in), balanced, *told))
