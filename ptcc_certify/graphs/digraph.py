@@ -284,13 +284,11 @@ class SignedDigraph(Shown):
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
             labels, matrix = rows, _aligned_frame(matrix, rows)
-        if hasattr(matrix, "tocoo"):
-            entries = matrix.tocoo()
-        else:
-            try:
-                entries = np.asarray(matrix)
-            except ValueError:
-                raise GraphError("the adjacency matrix has rows of different lengths") from None
+        dense = not hasattr(matrix, "tocoo")
+        try:
+            entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
+        except ValueError:
+            raise GraphError("the adjacency matrix has rows of different lengths") from None
         shape = entries.shape
         if len(shape) != 2:
             raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
@@ -298,17 +296,11 @@ class SignedDigraph(Shown):
             raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
         if shape[0] != shape[1]:
             raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
-        if isinstance(entries, np.ndarray):
-            try:
-                row, column = np.nonzero(entries)
-            except (TypeError, ValueError):  # pandas' NA is neither zero nor not
-                raise GraphError(
-                    "an entry of the adjacency matrix is missing; write 0 where there is no edge"
-                ) from None
-            values = entries[row, column]
-        else:
-            keep = entries.data != 0
-            row, column, values = entries.row[keep], entries.col[keep], entries.data[keep]
+        try:
+            row, column = entries.nonzero()
+        except (TypeError, ValueError):  # pandas' NA is neither zero nor not
+            raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
+        values = entries[row, column] if dense else entries.data[entries.data != 0]
         names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
