@@ -37,7 +37,7 @@ bound of the input is compared with ``U`` exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -78,6 +78,7 @@ _NUDGES = 20
 #: How often gains are sought with the functions that certify finds for those before, until it proves its own.
 _ROUNDS = 4
 _KEPT_BITS = 40
+_NONE_LEFT = "none, every agent is at its final state"
 
 
 class TradeOff(NamedTuple):
@@ -184,6 +185,11 @@ class Design(Shown):
         return None if self.certificate is None or not self.certificate.limits else self.certificate.limits[0]
 
     @property
+    def gain_cap(self) -> Fraction | None:
+        """Where the gain is capped; None if it is not."""
+        return None if self.limits is None else self.limits.gain_cap
+
+    @property
     def certify_options(self) -> list[str] | None:
         """Options of ``ptcc certify GRAPH`` that prove the same again, with exit code 0; None where none do.
 
@@ -195,13 +201,11 @@ class Design(Shown):
         about_zero = not any(initial_set.center) and R > 0 and min(initial_set.radius) == R
         if not (self.repeatable and about_zero and self.protocol is not None and self.certificate is not None):
             return None
-        p, effort = self.protocol, self.certificate.effort
+        p = self.protocol
         options = {"T": p.T, "rho1": p.rho1, "rho2": p.rho2, "kappa": p.kappa, "initial-bound": R}
-        if self.limits is not None and self.limits.gain_cap is not None:
-            options["gain-cap"] = self.limits.gain_cap
-            agents = None if effort is None else effort.residual[0].largest
-        else:
-            agents = Fraction(0) if effort is None or effort.peak is None else effort.peak.largest
+        if self.gain_cap is not None:
+            options["gain-cap"] = self.gain_cap
+        agents = _fit_of(self.certificate, replace(self.asked, input_norm=None)).peak
         if agents is not None and agents <= self.asked.max_input:  # of the norm too, but for what is lost in the bounds
             options["max-input"] = self.asked.max_input
         return [text for name, value in options.items() for text in (f"--{name}", short_exact(value))]
@@ -228,12 +232,12 @@ class Design(Shown):
         """The start from which the input gets largest under these gains (numerical); None without gains."""
         if self.certificate is None:
             return None
-        structure, protocol, initial_set = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
-        if self.limits is None or self.limits.gain_cap is None:
-            return worst_initial_state(structure, protocol, initial_set)
+        case = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
+        if self.gain_cap is None:
+            return worst_initial_state(*case)
         # The gain is constant, and max |e_k| never grows.
-        first = worst_initial_state(structure, protocol, initial_set, samples=1)
-        return replace(first, size=first.size * float(self.limits.gain_cap / protocol.gain.first))
+        first = worst_initial_state(*case, samples=1)
+        return replace(first, size=first.size * float(self.gain_cap / self.certificate.protocol.gain.first))
 
     def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
         """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
@@ -295,50 +299,40 @@ class Design(Shown):
         if self.protocol is not None:
             gains = (f"{name} = {short_exact(value)}" for name, value in self.protocol.parameters.items())
             found.append(("gains", ", ".join(gains)))
-        if self.limits is not None and self.limits.gain_cap is not None:
-            found.append(("", f"gain capped at {short_exact(self.limits.gain_cap)}, which acts from 0 on"))
-        if self.peak is not None:
-            found.append(("peak input", f"{up(self.peak)} at most"))
-        if self.residual is not None:
-            left = f"{up(self.residual)} at most" if self.residual else "none, every agent is at its final state"
-            found.append(("left at the deadline", left))
-        if self.shortest_certified is not None:
-            found.append(("shortest deadline", f"{up(self.shortest_certified, DIGITS)} certified"))
-        if self.shortest_possible is not None:
-            times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
-            found.append(("", f"{down(self.shortest_possible)} at least, whatever the gains{times}"))
+        times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
+        numbers: tuple[tuple[str, Fraction | None, Callable[[Fraction], str]], ...] = (
+            ("", self.gain_cap, lambda x: f"gain capped at {short_exact(x)}, which acts from 0 on"),
+            ("peak input", self.peak, lambda x: f"{up(x)} at most"),
+            ("left at the deadline", self.residual, lambda x: f"{up(x)} at most" if x else _NONE_LEFT),
+            ("shortest deadline", self.shortest_certified, lambda x: f"{up(x, DIGITS)} certified"),
+            ("", self.shortest_possible, lambda x: f"{down(x)} at least, whatever the gains{times}"),
+        )
+        found += [(name, text(value)) for name, value, text in numbers if value is not None]
         width = max(len(name) for name, _ in found)
         return [f"{name:<{width}}  {text}" for name, text in found]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
 
-        def text(x: Fraction | None) -> str | None:
-            return None if x is None else format_exact(x)
+        def texts(source: Any, *names: str) -> dict[str, str | None]:
+            values = ((name, getattr(source, name)) for name in names)
+            return {name: None if x is None else format_exact(x) for name, x in values}
 
-        cap = None if self.limits is None else self.limits.gain_cap
         return {
             "verdict": self.verdict,
             "binding": self.binding,
-            "max_input": text(self.asked.max_input),
+            **texts(self.asked, "max_input"),
             "input_norm": self.asked.input_norm,
-            "asked": {"deadline": text(self.asked.deadline), "residual": text(self.asked.residual)},
+            "asked": texts(self.asked, "deadline", "residual"),
             "protocol": None if self.protocol is None else self.protocol.to_dict(),
-            "gain_cap": text(cap),
-            "deadline": text(self.deadline),
-            "peak": text(self.peak),
-            "residual": text(self.residual),
-            "shortest_certified": text(self.shortest_certified),
-            "shortest_possible": text(self.shortest_possible),
+            **texts(self, "gain_cap", "deadline", "peak", "residual", "shortest_certified", "shortest_possible"),
             "ratio": self.ratio,
         }
 
     def __repr__(self) -> str:
         if self.protocol is None or self.peak is None:
             return f"Design({self.verdict}: {self.binding})"
-        p, cap = self.protocol, ""
-        if self.limits is not None and self.limits.gain_cap is not None:
-            cap = f", gain_cap={short_exact(self.limits.gain_cap)}"
+        p, cap = self.protocol, "" if self.gain_cap is None else f", gain_cap={short_exact(self.gain_cap)}"
         gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
         return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"
 
@@ -431,16 +425,17 @@ one asked for)
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
     lower, why = _lower_product(base, asked)
     blank = Design(UNPROVED, "", asked, T, lower_product=lower, lower_by=why)
-    first = offered = None
+    first: list[Fit] = []
+    offered = None
     for _ in range(_ROUNDS):
         if (reason := _unusable(base)) is not None:
             break
-        fit, other = _search(base, asked)
-        first = first or other
-        if fit is None:
+        fits = _search(base, asked)
+        first = first or fits
+        if not fits or not asked.met_by(fits[-1]):
             break
-        offered = offered or fit
-        own = fit.certificate
+        offered = offered or fits[-1]
+        own = fits[-1].certificate
         base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
         again = _fit_of(base, asked)
         if asked.met_by(again) and base.verdict == "certified":
@@ -451,24 +446,20 @@ one asked for)
             why = "" if checked is None else f" {checked.rejected}: {checked.reason}"
             return replace(blank, binding=f"the independent check does not accept{why}")
         return _met(replace(blank, verdict=MET), offered)
-    if reason is not None:
-        return _missed(replace(blank, binding=reason))
-    if first is None or first.peak is None:
-        return _missed(replace(blank, binding="this certificate bounds no input"))
-    return _missed(replace(blank, peak=first.peak, product=first.peak * first.deadline))
+    if reason is None and first and (peak := first[0].peak) is not None:
+        return _missed(replace(blank, peak=peak, product=peak * first[0].deadline))
+    return _missed(replace(blank, binding=reason or "this certificate bounds no input"))
 
 
-def _search(base: Certificate, asked: Asked) -> tuple[Fit | None, Fit | None]:
-    """Return the first gains of which the functions of ``base`` prove what is asked, and the first of all."""
-    first = None
+def _search(base: Certificate, asked: Asked) -> list[Fit]:
+    """Return gains until the first of which the functions of ``base`` prove what is asked."""
+    tried = []
     for option in _options(base, asked):
-        fit = _fit(base, option, asked)
-        first = first or fit
-        if asked.met_by(fit):
-            return fit, first
-        if asked.deadline is not None and option.product > asked.max_input * asked.deadline * _HOPELESS:
+        tried.append(_fit(base, option, asked))
+        hopeless = asked.deadline and option.product > asked.max_input * asked.deadline * _HOPELESS
+        if asked.met_by(tried[-1]) or hopeless:
             break
-    return None, first
+    return tried
 
 
 # ---------------------------------------------------------------------- what is known
@@ -508,19 +499,17 @@ def _bounds(base: Certificate, initial_set: InitialSet) -> InputBounds:
 
 def _lower_product(base: Certificate, asked: Asked) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
-    best, why, initial_set, graph = Fraction(0), "", asked.initial_set, base.graph
+    known, initial_set, graph = [(Fraction(0), "")], asked.initial_set, base.graph
     agents = [shorten(label) for label in graph.labels]
     if base.influence.exact and graph.n_nodes <= INPUT_NODES:
         for agent, row in zip(agents, ways(initial_set, base.influence), strict=True):
             way = _largest_below(initial_set, row) - (asked.residual or 0)
-            if way > best:
-                best, why = way, f"the way of agent {agent} to its final state"
+            known.append((way, f"the way of agent {agent} to its final state"))
     limit = base.upper_bound
     if asked.residual is None and limit and _has_inner_points(initial_set):
         for agent, heard in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
-            first = 2 / limit * _largest_below(initial_set, heard)
-            if first > best:
-                best, why = first, f"the input of agent {agent} at the start"
+            known.append((2 / limit * _largest_below(initial_set, heard), f"the input of agent {agent} at the start"))
+    best, why = max(known, key=lambda entry: entry[0])
     return (rounded(best, _KEPT_BITS) if best > 0 else None), why
 
 
@@ -641,13 +630,11 @@ def _fit(base: Certificate, option: Option, asked: Asked) -> Fit:
     """Return the gains at a deadline, or at the shortest one that is proved, and what is proved of them."""
     U, deadline = asked.max_input, asked.deadline
     T = deadline if deadline is not None else _decimal(option.product / U, up=True) or Fraction(1)
-    fit = _at(base, option, T, asked)
-    if deadline is None:
-        for nudge in range(_NUDGES):
-            if fit.peak is None or fit.peak <= U:
-                break
-            T = _decimal(T * fit.peak / U * (1 + nudge * Fraction(1, 10**9)), up=True)
-            fit = _at(base, option, T, asked)
+    for nudge in range(_NUDGES + 1):
+        fit = _at(base, option, T, asked)
+        if deadline is not None or fit.peak is None or fit.peak <= U:
+            break
+        T = _decimal(T * fit.peak / U * (1 + nudge * Fraction(1, 10**9)), up=True)
     return fit
 
 
@@ -688,15 +675,7 @@ def _met(asked: Design, fit: Fit) -> Design:
         whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph.labels[v])}"
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
         binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
-    return replace(
-        asked,
-        binding=binding,
-        deadline=fit.deadline,
-        certificate=cert,
-        peak=fit.peak,
-        residual=fit.residual,
-        product=fit.peak * fit.deadline,
-    )
+    return replace(asked, binding=binding, product=fit.peak * fit.deadline, **fit._asdict())
 
 
 def _missed(asked: Design) -> Design:

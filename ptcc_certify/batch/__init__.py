@@ -6,8 +6,8 @@ sent; workers neither read nor write.
 
 :mod:`~ptcc_certify.batch.sources` tells which graphs there are, :mod:`~ptcc_certify.batch.settings` is everything else
 that a row depends on, and :mod:`~ptcc_certify.batch.rows` makes one row; its columns are listed there. Rows are
-computed by one of the :mod:`~ptcc_certify.batch.backends`, kept as they come by :mod:`~ptcc_certify.batch.journal`, and
-written by :mod:`~ptcc_certify.batch.table` when all are there, or when a batch ends before.
+computed by one of the :mod:`~ptcc_certify.batch.backends`; :mod:`~ptcc_certify.batch.output` keeps them as they come,
+and writes the table when all are there, or when a batch ends before.
 """
 
 from __future__ import annotations
@@ -19,15 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.batch.backends import compute_rows, default_workers
-from ptcc_certify.batch.journal import Journal, journal_path
+from ptcc_certify.batch.output import Journal, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import Settings, whole_number
+from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
-from ptcc_certify.batch.table import refuse_table, table_bytes
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.protocols import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
@@ -107,7 +106,7 @@ def certify_many(
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
     """
-    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1)
+    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1, LARGEST_SETTING)
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
@@ -176,15 +175,12 @@ def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool 
     ...     write_graphs(Ensemble(count=2, nodes=5), folder), sorted(path.name for path in Path(folder).iterdir())
     (2, ['ensemble-0.csv', 'ensemble-1.csv'])
     """
-    chosen = chosen_sources(sources)
-    for source in chosen:
-        if not isinstance(source.origin, tuple):
-            raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
     if not os.fspath(folder):
         raise ParameterError("the name of the folder is empty; name a folder")
     targets: dict[Path, tuple[Ensemble, int]] = {}
-    for source in chosen:
-        assert isinstance(source.origin, tuple)
+    for source in chosen_sources(sources):
+        if not isinstance(source.origin, tuple):
+            raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
         ensemble, i = source.origin
         stem, digits = Path(source.name.rpartition("#")[0]).stem, len(str(len(ensemble) - 1))
         target = Path(folder, f"{stem}-{i:0{digits}d}.csv")

@@ -155,11 +155,6 @@ def _graph(name: str, payload: Any, settings: Settings) -> SignedDigraph:
 
 
 def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certificate:
-    more: dict[str, Any] = {}
-    if settings.protocol.reaching:
-        # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
-        more["sigma0"] = _start(settings.sigma0, [seed, 1], graph)
-        more["disturbance"] = settings.disturbance_of(graph.n_nodes, seed)
     return certify(
         graph,
         settings.protocol,
@@ -167,9 +162,11 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
         method=settings.method,
         simulation=settings.simulation,
         initial_set=settings.initial_bound,
-        time_limit=settings.time_limit,
+        time_limit=None if settings.time_limit is None else float(settings.time_limit),
         expectations=Expectations(settings.expect, settings.min_rate),
-        **more,
+        # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
+        sigma0=_start(settings.sigma0, [seed, 1], graph),
+        disturbance=settings.disturbance_of(graph.n_nodes, seed),
     )
 
 

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import math
-import operator
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
+from ptcc_certify.certificate.request import refuse
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import behaviour_name
-from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.parameters import parameter
 
 #: What a start may be given as.
 Start = str | Sequence[Any] | Mapping[Any, Any] | None
@@ -75,7 +74,7 @@ class Settings:
         A behaviour that every graph should show.
     min_rate : positive number, optional
         A rate that should be proved for every graph, per unit of the stretched clock.
-    time_limit : float, optional
+    time_limit : positive number, optional
         Seconds for each graph, as in :func:`ptcc_certify.certify`; the column ``cut_off`` names what they ended.
     reading : Reading
         How files are read.
@@ -102,7 +101,7 @@ class Settings:
     initial_bound: Fraction | None = None
     expect: str | None = None
     min_rate: Fraction | None = None
-    time_limit: float | None = None
+    time_limit: Fraction | None = None
     reading: Reading = Reading()
 
     @classmethod
@@ -114,33 +113,24 @@ class Settings:
     def __post_init__(self) -> None:
         if not isinstance(self.protocol, Protocol):
             raise ParameterError(f"protocol = {shorten(repr(self.protocol))} is none; give a NominalProtocol, say")
-        if not self.protocol.prescribed:
-            raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-        if self.method not in METHODS:
-            raise ParameterError(f'method "{self.method}" is unknown; one of {", ".join(METHODS)}')
-        sliding = self.protocol.reaching is not None
-        for name in ("sigma0", "disturbance"):
-            if getattr(self, name) is not None and not sliding:
-                raise ParameterError(
-                    f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol"
-                )
-        if self.disturbance is not None:
-            self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
-        checked = {
-            "seed": whole_number(self.seed, "seed", 0),
+        one_node = SignedDigraph.from_edges([], nodes=["1"])  # what certify refuses of it, it refuses of every graph
+        sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
+        refuse(one_node, self.protocol, self.method, sliding, ())
+        self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
+        checked: dict[str, Any] = {
+            "seed": whole_number(self.seed, "seed", 0, LARGEST_SETTING),
             "x0": _start(self.x0, "x0"),
             "sigma0": _start(self.sigma0, "sigma0"),
-            "initial_bound": _positive(self.initial_bound, "initial_bound"),
-            "min_rate": _positive(self.min_rate, "min_rate"),
-            "time_limit": _seconds(self.time_limit),
         }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        for name in ("initial_bound", "min_rate", "time_limit"):
+            if getattr(self, name) is not None:
+                checked[name] = parameter(name, getattr(self, name))
         if self.expect is not None:
             try:
-                object.__setattr__(self, "expect", behaviour_name(self.expect))
+                checked["expect"] = behaviour_name(self.expect)
             except ValueError as error:
                 raise ParameterError(f"expect: {error}") from None
+        vars(self).update(checked)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as JSON takes them."""
@@ -152,22 +142,11 @@ class Settings:
         return int.from_bytes(hashlib.sha256(f"{self.seed} {graph.sha256}".encode()).digest()[:4], "big")
 
     def disturbance_of(self, n: int, seed: int = 0) -> Any:
-        """Return the disturbance of ``n`` agents, which a simulated run meets."""
+        """Return the disturbance of ``n`` agents, which a simulated run meets; None in the nominal protocol."""
+        if self.protocol.reaching is None:
+            return None
         text = "worst-case" if self.disturbance is None else self.disturbance
-        delta = getattr(self.protocol, "delta", 0)
-        return as_disturbance(text, n, delta, 2 * float(self.protocol.T), seed)
-
-
-def whole_number(value: Any, name: str, least: int) -> int:
-    """Return a setting that is an integer, NumPy's included, of at least ``least``; refuse anything else."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = least - 1
-    if not least <= number <= LARGEST_SETTING:
-        domain = f"an integer from {least} to {LARGEST_SETTING}"
-        raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
-    return number
+        return as_disturbance(text, n, self.protocol.reaching.delta, 2 * float(self.protocol.T), seed)
 
 
 def _start(start: Start, name: str) -> Start:
@@ -181,33 +160,6 @@ def _start(start: Start, name: str) -> Start:
     except NumberError as error:
         raise ParameterError(f"{name}: {error}") from None
     return start
-
-
-def _positive(value: Any, name: str, unit: str = "") -> Fraction | None:
-    if value is None:
-        return None
-    try:
-        number = as_fraction(value)
-    except NumberError as error:
-        raise ParameterError(f"{name}: {error}") from None
-    if number <= 0:
-        raise ParameterError(f"{name} is outside its domain; it must be > 0{unit}")
-    return number
-
-
-def _seconds(time_limit: Any) -> float | None:
-    number = _positive(time_limit, "time_limit", ", in seconds")
-    seconds = None if number is None else nearest_float(number)
-    if seconds is not None and not 0 < seconds < math.inf:
-        raise ParameterError("time_limit is outside its domain; it must be > 0, in seconds")
-    return seconds
-
-
-def _text(value: Any) -> str:
-    try:
-        return shorten(str(value))
-    except ValueError:  # Python writes no integer of more than 4,300 digits
-        return "a number of thousands of digits"
 
 
 def _plain(value: Any) -> Any:

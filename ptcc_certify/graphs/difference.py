@@ -95,8 +95,8 @@ def _both(pair: tuple[str, str], meant: Edges, found: Edges) -> str:
 
 
 def _number(value: Fraction) -> str:
-    text = str(value) if value.numerator.bit_length() + value.denominator.bit_length() <= 120 else None
-    return text or f"{nearest_float(value):.17g}"
+    short = value.numerator.bit_length() + value.denominator.bit_length() <= 120
+    return str(value) if short else f"{nearest_float(value):.17g}"
 
 
 def _arrow(pair: tuple[str, str]) -> str:

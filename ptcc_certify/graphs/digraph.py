@@ -11,6 +11,7 @@ import json
 import math
 import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from copy import copy
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -37,54 +38,51 @@ class Weights:
     """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
 
     def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
-        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None)."""
-        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None); an array is one of floats."""
+        self.scale = 1
+        if isinstance(values, np.ndarray):
             table: np.ndarray = values.astype(np.float64)
-            self.kind, self.scale = "float64", 1
+        elif (scale := _common_scale(values)) is not None:
+            table, self.scale = np.array([int(v * scale) for v in values], dtype=np.int64), scale
+        elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in values):
+            table = np.array([float(v) for v in values])
         else:
-            fractions = [v if isinstance(v, Fraction) else Fraction(v) for v in values]
-            scale = 1
-            for value in fractions:
-                scale = math.lcm(scale, value.denominator)
-                if scale > _INT64_LIMIT:
-                    break
-            if scale <= _INT64_LIMIT and all(abs(v * scale) <= _INT64_LIMIT for v in fractions):
-                table = np.array([int(v * scale) for v in fractions], dtype=np.int64)
-                self.kind, self.scale = "int64", scale
-            elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in fractions):
-                table = np.array([float(v) for v in fractions])
-                self.kind, self.scale = "float64", 1
-            else:
-                table = np.empty(len(fractions), dtype=object)
-                table[:] = fractions
-                self.kind, self.scale = "fraction", 1
+            table = np.array(values, dtype=object)
         self.table = table if codes is None else table[codes]
 
     def take(self, index: np.ndarray) -> Weights:
         """Return the weights at ``index``, in that order."""
-        new = object.__new__(Weights)
-        new.kind, new.scale, new.table = self.kind, self.scale, self.table[index]
+        new = copy(self)
+        new.table = self.table[index]
         return new
 
     def as_float(self) -> np.ndarray:
         """Return the weights rounded to float64."""
-        if self.kind == "int64":
+        if self.table.dtype == np.int64:
             # One rounding only: int64 / scale in float64 would round the numerator first.
             if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
                 return self.table / float(self.scale)
-            return np.array([float(Fraction(int(v), self.scale)) for v in self.table])
-        if self.kind == "float64":
-            return self.table.copy()
-        return np.array([nearest_float(v) for v in self.table], dtype=np.float64)
+            return np.array([float(Fraction(v, self.scale)) for v in self.table.tolist()])
+        return np.array([nearest_float(v) for v in self.table]) if self.table.dtype == object else self.table
 
     def fraction(self, i: int) -> Fraction:
         """Return weight ``i`` exactly."""
-        value = self.table[i]
-        return Fraction(int(value), self.scale) if self.kind == "int64" else Fraction(value)
+        value = self.table.item(i)
+        return Fraction(value, self.scale) if isinstance(value, int) else Fraction(value)
 
     def signs(self) -> np.ndarray:
         """Return +1 or -1 for each weight."""
         return np.where(self.table > 0, 1, -1).astype(np.int8)
+
+
+def _common_scale(values: Sequence[Fraction]) -> int | None:
+    """Return the common denominator of rationals that are int64 numerators over it; None if they are not."""
+    scale = 1
+    for value in values:
+        scale = math.lcm(scale, value.denominator)
+        if scale > _INT64_LIMIT:
+            return None
+    return scale if all(abs(v * scale) <= _INT64_LIMIT for v in values) else None
 
 
 #: Edges whose lines are hashed at a time.
@@ -161,35 +159,19 @@ class SignedDigraph(Shown):
         self._refuse_bad_edges()
 
     def _refuse_bad_edges(self) -> None:
-        source, target = self.source, self.target
-        loops = np.flatnonzero(source == target)
-        if loops.size:
-            label = self.labels[source[loops[0]]]
-            raise GraphError(f"self-loop at node {shorten(label)}; remove it, or drop all with --drop-self-loops")
-        twice = np.flatnonzero((source[1:] == source[:-1]) & (target[1:] == target[:-1]))
-        if twice.size:
-            raise GraphError(f"two edges {self._edge_text(int(twice[0]))}; keep one, or merge with --duplicates")
-        table = self._weights.table
-        if self._weights.kind == "float64" and not np.isfinite(table).all():
-            where = int(np.flatnonzero(~np.isfinite(table))[0])
-            raise GraphError(f"weight {table[where]} of edge {self._edge_text(where)} is not a finite number")
-        if (zero := np.flatnonzero(table == 0)).size:
-            raise GraphError(
-                f"weight 0 of edge {self._edge_text(int(zero[0]))}: an unknown sign is not an edge; "
-                "remove it or give a weight"
-            )
-        size = np.abs(self.weights)
-        if self._weights.kind == "fraction":
-            for edge, weight in enumerate(table.tolist()):
-                if not writable(weight):
-                    raise GraphError(f"weight of edge {self._edge_text(edge)} has too many digits to keep; round it")
-        if (odd := np.flatnonzero((size < SMALLEST_WEIGHT) | (size > LARGEST_WEIGHT))).size:
-            raise GraphError(
-                f"weight of edge {self._edge_text(int(odd[0]))} is outside the range of float64; rescale the weights"
-            )
-
-    def _edge_text(self, edge: int) -> str:
-        return f"{shorten(self.labels[self.source[edge]])} -> {shorten(self.labels[self.target[edge]])}"
+        source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
+        again = (source[1:] == source[:-1]) & (target[1:] == target[:-1])
+        long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
+        odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
+        for bad, message in (
+            (source == target, "self-loop at node {0}; remove it, or drop all with --drop-self-loops"),
+            (again, "two edges {0} -> {1}; keep one, or merge with --duplicates"),
+            (table == 0, "weight 0 of edge {0} -> {1}: an unknown sign is not an edge; remove it or give a weight"),
+            (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),
+            (odd, "weight of edge {0} -> {1} is outside the range of float64; rescale the weights"),
+        ):
+            if bad.any():
+                raise GraphError(message.format(*(shorten(self.labels[p[np.argmax(bad)]]) for p in (source, target))))
 
     # ------------------------------------------------------------------ constructors
 
@@ -223,15 +205,14 @@ class SignedDigraph(Shown):
         ('b', 'a', Fraction(1, 1))
         """
         _refuse_unknown_orientation(orientation)
-        index: dict[str, int] = {}
-        original: dict[str, Hashable] = {}
+        known: dict[str, tuple[int, Hashable]] = {}
 
         def number(node: Hashable) -> int:
             label = str(node)
-            if label in original and original[label] != node:
+            place, first = known.setdefault(label, (len(known), node))
+            if first is not node and first != node:
                 raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
-            original.setdefault(label, node)
-            return index.setdefault(label, len(index))
+            return place
 
         for node in nodes:
             number(node)
@@ -249,7 +230,7 @@ class SignedDigraph(Shown):
                 raise GraphError(f"edge {shorten(str(first))} -> {shorten(str(second))}: {error}") from None
         if orientation == "listens":
             heads, tails = tails, heads
-        labels, rank = ordered_labels(list(index))
+        labels, rank = ordered_labels(list(known))
         source = rank[np.array(heads, dtype=np.int64)]
         target = rank[np.array(tails, dtype=np.int64)]
         return cls(labels, source, target, Weights(values), {"orientation": orientation})
@@ -303,13 +284,11 @@ class SignedDigraph(Shown):
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
             labels, matrix = rows, _aligned_frame(matrix, rows)
-        if hasattr(matrix, "tocoo"):
-            entries = matrix.tocoo()
-        else:
-            try:
-                entries = np.asarray(matrix)
-            except ValueError:
-                raise GraphError("the adjacency matrix has rows of different lengths") from None
+        dense = not hasattr(matrix, "tocoo")
+        try:
+            entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
+        except ValueError:
+            raise GraphError("the adjacency matrix has rows of different lengths") from None
         shape = entries.shape
         if len(shape) != 2:
             raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
@@ -317,17 +296,11 @@ class SignedDigraph(Shown):
             raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
         if shape[0] != shape[1]:
             raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
-        if isinstance(entries, np.ndarray):
-            try:
-                row, column = np.nonzero(entries)
-            except (TypeError, ValueError):  # pandas' NA is neither zero nor not
-                raise GraphError(
-                    "an entry of the adjacency matrix is missing; write 0 where there is no edge"
-                ) from None
-            values = entries[row, column]
-        else:
-            keep = entries.data != 0
-            row, column, values = entries.row[keep], entries.col[keep], entries.data[keep]
+        try:
+            row, column = entries.nonzero()
+        except (TypeError, ValueError):  # pandas' NA is neither zero nor not
+            raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
+        values = entries[row, column] if dense else entries.data[entries.data != 0]
         names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
@@ -428,7 +401,8 @@ class SignedDigraph(Shown):
 
         None where neither holds the weights exactly.
         """
-        return (None if self._weights.kind == "fraction" else self._weights.table), self._weights.scale
+        table = self._weights.table
+        return (None if table.dtype == object else table), self._weights.scale
 
     @cached_property
     def weight_texts(self) -> list[str]:
@@ -521,8 +495,7 @@ class SignedDigraph(Shown):
         digest = hashlib.sha256()
         quoted = [json.dumps(label, ensure_ascii=False) for label in self.labels]
         order = sorted(range(self.n_nodes), key=self.labels.__getitem__)
-        rank = np.empty(self.n_nodes, dtype=np.int64)
-        rank[order] = np.arange(self.n_nodes)
+        rank = np.argsort(order)
         digest.update("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
         names, texts = np.array(quoted, dtype=object), np.array(self.weight_texts, dtype=object)
         edges = np.lexsort((rank[self.target], rank[self.source]))
@@ -574,17 +547,16 @@ def labels_beside(values: Any) -> list[str] | None:
 
 def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
     """Return the entries of a DataFrame with its columns in the order of its rows."""
-    place = {str(label): i for i, label in enumerate(frame.columns)}
-    for what, labels in (("rows", rows), ("columns", [str(label) for label in frame.columns])):
-        if len(set(labels)) < len(labels):
-            twice = next(label for label in labels if labels.count(label) > 1)
+    frame = frame.set_axis(rows, axis=0).set_axis([str(label) for label in frame.columns], axis=1)
+    for what, labels in (("rows", frame.index), ("columns", frame.columns)):
+        if labels.has_duplicates:
+            twice = labels[labels.duplicated()][0]
             raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
-    if odd := sorted(place.keys() ^ set(rows)):
+    if odd := frame.index.symmetric_difference(frame.columns).tolist():
         named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
         raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
     # One type for all columns would round the integers of one beside the floats of another.
-    entries = frame.to_numpy(dtype=object) if len(set(frame.dtypes)) > 1 else frame.to_numpy()
-    return entries[:, [place[label] for label in rows]]
+    return frame[rows].to_numpy(dtype=object if len(set(frame.dtypes)) > 1 else None)
 
 
 def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
@@ -595,11 +567,7 @@ def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
     >>> ordered_labels(["10", "2"])
     (['2', '10'], array([1, 0]))
     """
-    n = len(labels)
+    order: Sequence[int] = range(len(labels))
     if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
-        order = sorted(range(n), key=lambda i: (int(labels[i]), labels[i]))
-    else:
-        order = list(range(n))
-    rank = np.empty(n, dtype=np.int64)
-    rank[order] = np.arange(n)
-    return [labels[i] for i in order], rank
+        order = sorted(order, key=lambda i: (int(labels[i]), labels[i]))
+    return [labels[i] for i in order], np.argsort(order)

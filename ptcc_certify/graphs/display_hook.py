@@ -1,33 +1,18 @@
-"""What notebooks show of an object: classes say that they can be shown, and who draws them registers here."""
+"""What notebooks show of an object: classes say that they can be shown, and who draws them registers here.
 
-from collections.abc import Callable
+A function that draws a class is decorated with ``@shows(TheClass)``; it takes the object and returns HTML.
+"""
+
+from functools import singledispatch
 from importlib import import_module
-from typing import Any, TypeVar
+from typing import Any
 
 #: The module that registers, loaded when a notebook first asks.
 _DRAWN_BY = "ptcc_certify.report.notebook"
-_KINDS: dict[type, Callable[[Any], str]] = {}
-
-Show = TypeVar("Show", bound=Callable[[Any], str])
 
 
 class Shown:
     """A class that notebooks show as HTML.
-
-    Examples
-    --------
-    >>> from ptcc_certify import SignedDigraph
-    >>> SignedDigraph.from_edges([("a", "b", 1)])._repr_html_().startswith("<div")
-    True
-    """
-
-    def _repr_html_(self) -> str | None:
-        import_module(_DRAWN_BY)
-        return next((_KINDS[kind](self) for kind in type(self).__mro__ if kind in _KINDS), None)
-
-
-def shows(kind: type) -> Callable[[Show], Show]:
-    """Register the decorated function for a class.
 
     Examples
     --------
@@ -39,8 +24,16 @@ def shows(kind: type) -> Callable[[Show], Show]:
     '<p>thing</p>'
     """
 
-    def register(function: Show) -> Show:
-        _KINDS[kind] = function
-        return function
+    def _repr_html_(self) -> str | None:
+        import_module(_DRAWN_BY)
+        return _html_of(self)
 
-    return register
+
+@singledispatch
+def _html_of(shown: Any) -> str | None:
+    """Return nothing of a class that nobody draws; a notebook then takes the plain text."""
+    return None
+
+
+#: Register the decorated function for a class.
+shows = _html_of.register

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from itertools import pairwise
@@ -22,7 +22,8 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
+from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
 LARGEST_COUNT, LARGEST_SEED, LARGEST_ORDER = 10**6, 2**32 - 1, 10**6
@@ -99,38 +100,26 @@ class Ensemble:
     undirected: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "count", _integer(self.count, "count", 1, LARGEST_COUNT))
-        object.__setattr__(self, "seed", _integer(self.seed, "seed", 0, LARGEST_SEED))
-        if not isinstance(self.nodes, range):
-            orders = tuple(_integer(n, "nodes", 1, LARGEST_ORDER) for n in _several(self.nodes, "nodes"))
-            object.__setattr__(self, "nodes", orders)
-        for n in (self.nodes[0], self.nodes[-1]) if self.nodes else ():
-            _integer(n, "nodes", 1, LARGEST_ORDER)
-        for name, allowed in (("connectivity", CONNECTIVITIES), ("balanced", (True, False))):
-            chosen = _several(getattr(self, name), name)
-            for value in chosen:
-                if type(value) is not type(allowed[0]) or value not in allowed:
-                    listed = ", ".join(map(_text, allowed))
-                    raise ParameterError(f"{name} = {_text(value)} is unknown; choose of {listed}")
-            if len(set(chosen)) < len(chosen):
-                raise ParameterError(f"{name} names a class twice; name it once")
-            object.__setattr__(self, name, chosen)
         _require(isinstance(self.undirected, bool), "undirected", self.undirected, "true or false")
-        object.__setattr__(self, "mean_degree", _real(self.mean_degree, "mean_degree", 0, 1000))
-        object.__setattr__(self, "negative", _real(self.negative, "negative", 0, 1))
-        ends = self.weight_range
+        ends, decades = self.weight_range, self.weight_decades
         _require(isinstance(ends, list | tuple) and len(ends) == 2, "weight_range", ends, "[least, largest]")
         low, high = (_exact(x, "weight_range") for x in ends)
         _require(0 < low <= high <= 10**300 and low >= Fraction(1, 10**300), "weight_range", ends, "0 < least, largest")
-        object.__setattr__(self, "weight_range", (low, high))
-        if self.weight_decades is not None:
-            object.__setattr__(self, "weight_decades", _real(self.weight_decades, "weight_decades", 0, LARGEST_DECADES))
+        vars(self).update(
+            count=whole_number(self.count, "count", 1, LARGEST_COUNT),
+            nodes=_orders(self.nodes),
+            seed=whole_number(self.seed, "seed", 0, LARGEST_SEED),
+            connectivity=_classes(self.connectivity, "connectivity", CONNECTIVITIES),
+            balanced=_classes(self.balanced, "balanced", (True, False)),
+            mean_degree=_real(self.mean_degree, "mean_degree", 1000),
+            negative=_real(self.negative, "negative", 1),
+            weight_range=(low, high),
+            weight_decades=None if decades is None else _real(decades, "weight_decades", LARGEST_DECADES),
+        )
         self._refuse_impossible()
 
     def _refuse_impossible(self) -> None:
-        if not self.nodes:
-            raise ParameterError("nodes is empty; give at least one number of nodes")
-        few = min(self.nodes[0], self.nodes[-1]) if isinstance(self.nodes, range) else min(self.nodes)
+        few = min(self.nodes)
         for connectivity in self.connectivity:
             if self.undirected and connectivity in ("quasi-strong", "weak"):
                 raise ParameterError(
@@ -170,12 +159,7 @@ class Ensemble:
         (range(5, 41), ('weak', False))
         """
         name = shorten(os.fspath(path), 200)
-        try:
-            data = Path(path).read_bytes()
-        except FileNotFoundError:
-            raise FormatError(f"{name}: no such file; check the path") from None
-        except OSError as error:
-            raise FormatError(f"{name}: cannot be read ({error.strerror}); name a file") from None
+        data = read_bytes(Path(path), name)
         try:
             # Decimals are read exactly, as in every other input.
             spec = tomllib.loads(data.decode("utf-8"), parse_float=parse_exact)
@@ -235,51 +219,15 @@ class Ensemble:
         ParameterError
             There is no such graph.
         """
-        connectivity, balanced = self.kind(i)
-        rng = np.random.default_rng([self.seed, i])
-        n = self.nodes[int(rng.integers(len(self.nodes)))]
-        blocks = _blocks(rng, n, connectivity, balanced, self.undirected)
-        source, target, cycles = _edges(rng, n, blocks, balanced, self.mean_degree, self.undirected)
-        sign = _signs(rng, n, blocks, (source, target), balanced, cycles, self.negative)
-        sizes = self._sizes(rng, source.size)
-        weights = [size * s for size, s in zip(sizes, sign.tolist(), strict=True)]
-        if self.undirected:
-            source, target, weights = np.append(source, target), np.append(target, source), weights * 2
-        number = rng.permutation(n)  # no number tells who leads
-        return SignedDigraph(map(str, range(1, n + 1)), number[source], number[target], Weights(weights))
-
-    def _sizes(self, rng: np.random.Generator, m: int) -> list[Fraction]:
-        low, high = self.weight_range
-        if self.weight_decades is not None:
-            half = self.weight_decades / 2
-            return [Fraction(f"{x:.2e}") for x in (10.0 ** rng.uniform(-half, half, m)).tolist()]
-        if low == high:
-            return [low] * m
-        if high - low < 10 * Fraction(10) ** (int(f"{float(high):e}".partition("e")[2]) - 2):
-            return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in rng.uniform(size=m).tolist()]
-        drawn = rng.uniform(float(low), float(high), m).tolist()
-        return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
+        return _Drawing(self, i).graph()
 
 
 # ---------------------------------------------------------------------- parameters
 
 
-def _text(value: Any) -> str:
-    try:
-        return str(value).lower() if isinstance(value, bool) else shorten(str(value))
-    except ValueError:  # Python writes no integer of more than 4,300 digits
-        return "a number of thousands of digits"
-
-
 def _require(holds: bool, name: str, value: Any, domain: str) -> None:
     if not holds:
-        raise ParameterError(f"{name} = {_text(value)} is outside its domain; it must be {domain}")
-
-
-def _integer(value: Any, name: str, least: int, most: int) -> int:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    _require(whole and least <= value <= most, name, value, f"an integer from {least} to {most}")
-    return int(value)
+        raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
 
 
 def _exact(value: Any, name: str) -> Fraction:
@@ -291,29 +239,50 @@ def _exact(value: Any, name: str) -> Fraction:
         raise ParameterError(f"{name}: {error}") from None
 
 
-def _real(value: Any, name: str, least: int, most: int) -> float:
+def _real(value: Any, name: str, most: int) -> float:
     number = _exact(value, name)
-    _require(least <= number <= most, name, value, f"from {least} to {most}")
+    _require(0 <= number <= most, name, value, f"from 0 to {most}")
     return float(number)
 
 
-def _several(value: Any, name: str) -> tuple[Any, ...]:
-    """Return one or several values as a tuple."""
-    chosen = tuple(value) if isinstance(value, list | tuple | np.ndarray) else (value,)
+def _several(value: Any, name: str) -> Sequence[Any]:
+    """Return one or several values as a tuple or a range."""
+    if isinstance(value, range):
+        chosen: Sequence[Any] = value
+    else:
+        chosen = tuple(value) if isinstance(value, list | tuple | np.ndarray) else (value,)
     if not chosen:
         raise ParameterError(f"{name} is empty; give at least one value")
+    return chosen
+
+
+def _orders(nodes: Any) -> Sequence[int]:
+    """Return the numbers of nodes to choose from; a range stays one."""
+    chosen = _several(nodes, "nodes")
+    numbers = [whole_number(n, "nodes", 1, LARGEST_ORDER) for n in chosen]
+    return chosen if isinstance(chosen, range) else tuple(numbers)
+
+
+def _classes(value: Any, name: str, allowed: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return the classes that take turns, each one of those that there are, and once."""
+    chosen = tuple(_several(value, name))
+    for one in chosen:
+        if type(one) is not type(allowed[0]) or one not in allowed:
+            raise ParameterError(f"{name} = {given(one)} is unknown; choose of {', '.join(map(given, allowed))}")
+    if len(set(chosen)) < len(chosen):
+        raise ParameterError(f"{name} names a class twice; name it once")
     return chosen
 
 
 def _range(table: dict[str, Any]) -> range:
     if set(table) != {"from", "to"}:
         raise ParameterError("nodes: a range is written { from = 5, to = 40 }")
-    least, most = (_integer(table[key], f"nodes.{key}", 1, LARGEST_ORDER) for key in ("from", "to"))
+    least, most = (whole_number(table[key], f"nodes.{key}", 1, LARGEST_ORDER) for key in ("from", "to"))
     _require(least <= most, "nodes.to", most, f"{least} or more")
     return range(least, most + 1)
 
 
-# ---------------------------------------------------------------------- layout
+# ---------------------------------------------------------------------- drawing
 
 
 def _least(connectivity: str, balanced: bool, undirected: bool) -> int:
@@ -325,155 +294,150 @@ def _least(connectivity: str, balanced: bool, undirected: bool) -> int:
     return {"strong": group, "quasi-strong": group + 1, "weak": 2 * group + 1, "disconnected": 2 * group}[connectivity]
 
 
-def _shares(rng: np.random.Generator, extra: int, boxes: int) -> list[int]:
-    """Share ``extra`` among ``boxes``, unevenly."""
-    return [int(x) for x in rng.multinomial(extra, rng.dirichlet(np.ones(boxes)))]
+class _Drawing:
+    """One graph of an ensemble as it is drawn, in positions ``0 .. n - 1``."""
 
+    def __init__(self, ensemble: Ensemble, i: int):
+        self.connectivity, self.balanced = ensemble.kind(i)
+        self.ensemble, self.undirected = ensemble, ensemble.undirected
+        self.rng = np.random.default_rng([ensemble.seed, i])
+        self.n = n = ensemble.nodes[self.draw(0, len(ensemble.nodes))]
+        self.group = _least("strong", self.balanced, self.undirected)  # nodes of a leading block, at least
+        self.leading = np.full(n, -1)  # number of the leading block that a node is in
+        self.cycles: list[range] = []  # for each leading block the numbers of the edges along one cycle
 
-def _blocks(
-    rng: np.random.Generator, n: int, connectivity: str, balanced: bool, undirected: bool
-) -> list[list[_Block]]:
-    """Lay out the weakly connected parts of a graph in blocks that cover ``0 .. n - 1``."""
-    if connectivity != "disconnected":
-        return [_part(rng, 0, n, connectivity, balanced, undirected)]
-    least = _least("strong", balanced, undirected)
-    count = int(rng.integers(2, min(MOST_PARTS, n // least) + 1))
-    parts, first = [], 0
-    for extra in _shares(rng, n - count * least, count):
-        size = least + extra
-        kinds = CONNECTIVITIES[:1] if undirected else CONNECTIVITIES[:3]
-        fit = [kind for kind in kinds if _least(kind, balanced, undirected) <= size]
-        parts.append(_part(rng, first, size, fit[int(rng.integers(len(fit)))], balanced, undirected))
-        first += size
-    return parts
+    def graph(self) -> SignedDigraph:
+        source, target = self.edges()
+        signs = self.signs(source, target).tolist()
+        weights = [size * sign for size, sign in zip(self.sizes(source.size), signs, strict=True)]
+        if self.undirected:
+            source, target, weights = np.append(source, target), np.append(target, source), weights * 2
+        number = self.rng.permutation(self.n)  # no number tells who leads
+        return SignedDigraph(map(str, range(1, self.n + 1)), number[source], number[target], Weights(weights))
 
+    def draw(self, least: int, end: int) -> int:
+        """Draw one of ``least .. end - 1``."""
+        return int(self.rng.integers(least, end))
 
-def _part(
-    rng: np.random.Generator, first: int, n: int, connectivity: str, balanced: bool, undirected: bool
-) -> list[_Block]:
-    if connectivity == "strong":
-        return [_Block(first, first + n, first, True)]
-    least = _least("strong", balanced, undirected)
-    groups = 1 if connectivity == "quasi-strong" else int(rng.integers(2, min(MOST_GROUPS, (n - 1) // least) + 1))
-    *leading, following = _shares(rng, n - 1 - groups * least, groups + 1)
-    blocks, at = [], first
-    for extra in leading:
-        blocks.append(_Block(at, at + least + extra, at, True))
-        at += least + extra
-    cuts = at + 1 + np.flatnonzero(rng.random(following) < rng.random())  # from one block to a chain of single nodes
-    ends = [*cuts.tolist(), first + n]
-    return blocks + [_Block(a, b, first, False) for a, b in zip([at, *cuts.tolist()], ends, strict=True)]
+    def shares(self, extra: int, boxes: int) -> list[int]:
+        """Share ``extra`` among ``boxes``, unevenly."""
+        return [int(x) for x in self.rng.multinomial(extra, self.rng.dirichlet(np.ones(boxes)))]
 
+    def parts(self) -> Iterator[list[_Block]]:
+        """Lay out the weakly connected parts in blocks that cover ``0 .. n - 1``."""
+        if self.connectivity != "disconnected":
+            yield self.part(0, self.n, self.connectivity)
+            return
+        count = self.draw(2, min(MOST_PARTS, self.n // self.group) + 1)
+        first = 0
+        for extra in self.shares(self.n - count * self.group, count):
+            size = self.group + extra
+            kinds = CONNECTIVITIES[:1] if self.undirected else CONNECTIVITIES[:3]
+            fit = [kind for kind in kinds if _least(kind, self.balanced, self.undirected) <= size]
+            yield self.part(first, size, fit[self.draw(0, len(fit))])
+            first += size
 
-# ---------------------------------------------------------------------- edges
+    def part(self, first: int, n: int, connectivity: str) -> list[_Block]:
+        if connectivity == "strong":
+            return [_Block(first, first + n, first, True)]
+        groups = 1 if connectivity == "quasi-strong" else self.draw(2, min(MOST_GROUPS, (n - 1) // self.group) + 1)
+        *leading, following = self.shares(n - 1 - groups * self.group, groups + 1)
+        blocks, at = [], first
+        for extra in leading:
+            blocks.append(_Block(at, at + self.group + extra, at, True))
+            at = blocks[-1].last
+        single = self.rng.random(following) < self.rng.random()  # from one block to a chain of single nodes
+        cuts = [at, *(at + 1 + np.flatnonzero(single)).tolist(), first + n]
+        return blocks + [_Block(a, b, first, False) for a, b in pairwise(cuts)]
 
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return sources and targets; of an undirected graph, one of the two directions."""
+        n, degree = self.n, self.ensemble.mean_degree
+        pairs: list[tuple[int, int]] = []
+        low, high = np.zeros((2, n), dtype=np.int64)
+        for blocks in list(self.parts()):
+            for block in blocks:
+                here = slice(block.first, block.last)
+                own = (block.first + self.rng.permutation(block.last - block.first)).tolist()
+                edges, length = self.tree(own) if self.undirected else self.ears(own)
+                if block.leads:
+                    self.leading[here] = len(self.cycles)
+                    self.cycles.append(range(len(pairs), len(pairs) + length))
+                pairs += edges
+                low[here], high[here] = block.floor, block.last
+            pairs += self.links(blocks)
+        if self.undirected:  # every edge from the smaller position to the larger one
+            pairs, degree, high = [(min(pair), max(pair)) for pair in pairs], degree / 2, np.arange(n)
+        skeleton = np.array([t * n + s for s, t in pairs], dtype=np.int64)
+        keys = np.append(skeleton, self.further(low, high, skeleton, round(degree * n) - skeleton.size))
+        return keys % n, keys // n
 
-def _edges(
-    rng: np.random.Generator,
-    n: int,
-    parts: list[list[_Block]],
-    balanced: bool,
-    mean_degree: float,
-    undirected: bool,
-) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
-    """Return sources, targets, and for each leading block the numbers of the edges along one cycle.
+    def further(self, low: np.ndarray, high: np.ndarray, taken: np.ndarray, wanted: int) -> np.ndarray:
+        """Choose ``wanted`` more edges: node ``t`` may listen to ``low[t] .. high[t] - 1`` but itself."""
+        n = self.n
+        itself = (low <= np.arange(n)) & (np.arange(n) < high)
+        ends = np.cumsum(high - low - itself)
+        wanted = min(wanted, int(ends[-1]) - taken.size)
+        if wanted <= 0:
+            return taken[:0]
+        # As many besides as are taken: whatever is drawn twice, enough remain.
+        drawn = self.rng.choice(int(ends[-1]), wanted + taken.size, replace=False)
+        target = np.searchsorted(ends, drawn, side="right")
+        source = low[target] + drawn - np.append(0, ends)[target]
+        source += itself[target] & (source >= target)
+        keys = target * n + source
+        return keys[~np.isin(keys, taken)][:wanted]
 
-    Of an undirected graph, one of the two directions.
-    """
-    pairs: list[tuple[int, int]] = []
-    cycles: list[list[int]] = []
-    low, high = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    for blocks in parts:
-        for block in blocks:
-            own = block.first + rng.permutation(block.last - block.first)
-            edges, length = _tree(rng, own.tolist(), not balanced) if undirected else _ears(rng, own.tolist())
-            if block.leads:
-                cycles.append(list(range(len(pairs), len(pairs) + length)))
-            pairs += edges
-            low[block.first : block.last], high[block.first : block.last] = block.floor, block.last
-        pairs += _links(rng, blocks)
-    if undirected:  # every edge from the smaller position to the larger one
-        pairs = [(min(pair), max(pair)) for pair in pairs]
-        wanted = round(mean_degree * n / 2)
-        high = np.arange(n)
-    else:
-        wanted = round(mean_degree * n)
-    skeleton = np.array([t * n + s for s, t in pairs], dtype=np.int64)
-    keys = np.append(skeleton, _further(rng, n, low, high, skeleton, wanted - skeleton.size))
-    return keys % n, keys // n, cycles
+    def ears(self, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
+        """Connect nodes strongly: a cycle, which comes first and whose length is told, and ears from it back to it."""
+        if len(nodes) == 1:
+            return [], 0
+        done = length = self.draw(2, len(nodes) + 1)
+        edges = _cycle(nodes[:length])
+        while done < len(nodes):
+            new = nodes[done : done + self.draw(1, len(nodes) - done + 1)]
+            begin, end = (nodes[self.draw(0, done)] for _ in range(2))
+            edges += pairwise([begin, *new, end])
+            done += len(new)
+        return edges, length
 
+    def tree(self, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
+        """Connect nodes by a tree, grown from a cycle of three nodes or more if it is not to be balanced."""
+        length = 0 if self.balanced else self.draw(3, len(nodes) + 1)
+        grown = [(nodes[self.draw(0, i)], nodes[i]) for i in range(max(length, 1), len(nodes))]
+        return _cycle(nodes[:length]) + grown, length
 
-def _further(
-    rng: np.random.Generator, n: int, low: np.ndarray, high: np.ndarray, taken: np.ndarray, wanted: int
-) -> np.ndarray:
-    """Choose ``wanted`` more edges: node ``t`` may listen to ``low[t] .. high[t] - 1`` but itself."""
-    itself = (low <= np.arange(n)) & (np.arange(n) < high)
-    ends = np.cumsum(high - low - itself)
-    wanted = min(wanted, int(ends[-1]) - taken.size)
-    if wanted <= 0:
-        return taken[:0]
-    # As many besides as are taken: whatever is drawn twice, enough remain.
-    drawn = rng.choice(int(ends[-1]), wanted + taken.size, replace=False)
-    target = np.searchsorted(ends, drawn, side="right")
-    source = low[target] + drawn - np.append(0, ends)[target]
-    source += itself[target] & (source >= target)
-    keys = target * n + source
-    return keys[~np.isin(keys, taken)][:wanted]
+    def links(self, blocks: list[_Block]) -> list[tuple[int, int]]:
+        """Let the first block of followers listen to every leading block, and each later one to somebody before it."""
+        leading = [(block.first, block.last) for block in blocks if block.leads]
+        links = []
+        for number, block in enumerate(blocks[len(leading) :]):
+            heard = leading if number == 0 else [(block.floor, block.first)]
+            links += [(self.draw(*span), self.draw(block.first, block.last)) for span in heard]
+        return links
 
-
-def _ears(rng: np.random.Generator, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
-    """Connect nodes strongly: a cycle, which comes first and whose length is told, and ears from it back to it."""
-    if len(nodes) == 1:
-        return [], 0
-    length = int(rng.integers(2, len(nodes) + 1))
-    edges = [(nodes[i], nodes[(i + 1) % length]) for i in range(length)]
-    done = length
-    while done < len(nodes):
-        new = nodes[done : done + int(rng.integers(1, len(nodes) - done + 1))]
-        begin, end = (nodes[int(k)] for k in rng.integers(done, size=2))
-        path = [begin, *new, end]
-        edges += pairwise(path)
-        done += len(new)
-    return edges, length
-
-
-def _tree(rng: np.random.Generator, nodes: list[int], cyclic: bool) -> tuple[list[tuple[int, int]], int]:
-    """Connect nodes by a tree, grown from a cycle of three nodes or more if it is to be ``cyclic``."""
-    length = int(rng.integers(3, len(nodes) + 1)) if cyclic else 0
-    edges = [(nodes[i], nodes[(i + 1) % length]) for i in range(length)]
-    edges += [(nodes[int(rng.integers(i))], nodes[i]) for i in range(max(length, 1), len(nodes))]
-    return edges, length
-
-
-def _links(rng: np.random.Generator, blocks: list[_Block]) -> list[tuple[int, int]]:
-    """Let the first block of followers listen to every leading block, and each later one to somebody before it."""
-    leading = [block for block in blocks if block.leads]
-    links = []
-    for number, block in enumerate(blocks[len(leading) :]):
-        heard = [(a.first, a.last) for a in leading] if number == 0 else [(block.floor, block.first)]
-        links += [(int(rng.integers(*span)), int(rng.integers(block.first, block.last))) for span in heard]
-    return links
-
-
-def _signs(
-    rng: np.random.Generator,
-    n: int,
-    parts: list[list[_Block]],
-    edges: tuple[np.ndarray, np.ndarray],
-    balanced: bool,
-    cycles: list[list[int]],
-    negative: float,
-) -> np.ndarray:
-    source, target = edges
-    camp = np.where(rng.random(n) < negative, -1, 1)
-    sign = np.where(rng.random(source.size) < negative, -1, 1)
-    if not balanced:
-        for cycle in cycles:
+    def signs(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+        camp, sign = (np.where(self.rng.random(m) < self.ensemble.negative, -1, 1) for m in (self.n, source.size))
+        if self.balanced:
+            inside = (self.leading[source] >= 0) & (self.leading[source] == self.leading[target])
+            return np.where(inside, camp[source] * camp[target], sign)
+        for cycle in self.cycles:
             if np.prod(sign[cycle]) > 0:
-                sign[cycle[int(rng.integers(len(cycle)))]] *= -1
+                sign[cycle[self.draw(0, len(cycle))]] *= -1
         return sign
-    block = np.full(n, -1)
-    for number, own in enumerate(b for blocks in parts for b in blocks if b.leads):
-        block[own.first : own.last] = number
-    inside = (block[source] >= 0) & (block[source] == block[target])
-    return np.where(inside, camp[source] * camp[target], sign)
+
+    def sizes(self, m: int) -> list[Fraction]:
+        (low, high), decades = self.ensemble.weight_range, self.ensemble.weight_decades
+        if decades is not None:
+            drawn = (10.0 ** self.rng.uniform(-decades / 2, decades / 2, m)).tolist()
+            return [Fraction(f"{x:.2e}") for x in drawn]
+        if low == high:
+            return [low] * m
+        if high - low < 10 * Fraction(10) ** (int(f"{float(high):e}".partition("e")[2]) - 2):
+            return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in self.rng.uniform(size=m).tolist()]
+        drawn = self.rng.uniform(float(low), float(high), m).tolist()
+        return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
+
+
+def _cycle(nodes: list[int]) -> list[tuple[int, int]]:
+    return list(zip(nodes, nodes[1:] + nodes[:1], strict=True))

@@ -6,25 +6,15 @@ The grammar is that of :mod:`lmi.exact.numbers`.
 from __future__ import annotations
 
 import math
+import operator
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
 from numbers import Integral, Rational, Real
+from typing import Any
 
 from lmi.exact import numbers
-from lmi.exact.numbers import MAX_CHARACTERS, MAX_EXPONENT, shorten
-from ptcc_certify.errors import NumberError
-
-__all__ = [
-    "MAX_CHARACTERS",
-    "MAX_EXPONENT",
-    "as_fraction",
-    "format_exact",
-    "nearest_float",
-    "parse_exact",
-    "short_exact",
-    "shorten",
-    "writable",
-]
+from lmi.exact.numbers import MAX_CHARACTERS, shorten
+from ptcc_certify.errors import NumberError, ParameterError
 
 
 def parse_exact(text: str) -> Fraction:
@@ -87,6 +77,43 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
     if not math.isfinite(number):
         raise NumberError(f"{name} is {number}, not a finite number")
     return Fraction(number)
+
+
+def whole_number(value: Any, name: str, least: int, most: int) -> int:
+    """Return an integer, NumPy's included, from ``least`` to ``most``; refuse anything else by name.
+
+    Raises
+    ------
+    ParameterError
+        The message tells the value and the domain.
+
+    Examples
+    --------
+    >>> whole_number(7, "seed", 0, 10)
+    7
+    """
+    try:
+        number = least - 1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= most:
+        domain = f"an integer from {least} to {most}"
+        raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
+    return number
+
+
+def given(value: Any) -> str:
+    """Return what was given for a parameter as a message quotes it, truth values as TOML writes them.
+
+    Examples
+    --------
+    >>> given(True), given(10**5000)
+    ('true', 'a number of thousands of digits')
+    """
+    try:
+        return str(value).lower() if isinstance(value, bool) else shorten(str(value))
+    except ValueError:  # Python writes no integer of more than 4,300 digits
+        return "a number of thousands of digits"
 
 
 def nearest_float(value: Fraction) -> float:

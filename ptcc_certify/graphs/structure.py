@@ -10,11 +10,12 @@ A graph is *structurally balanced* iff a *gauge* ``g`` in {-1, +1}^N exists with
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -250,11 +251,9 @@ class Structure(Shown):
 
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
-        claim = (
-            f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
-            if self.claim
-            else (f"{len(self.components)} components")
-        )
+        claim = f"{len(self.components)} components"
+        if self.claim:
+            claim = f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
         return (
             f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {len(self.closed_components)} closed "
             f"component(s), {balanced} balanced, {self.leaders.size} leaders; {claim})"
@@ -289,73 +288,49 @@ consensus)
 
     n, source, target, sign = graph.n_nodes, graph.source, graph.target, graph.sign
     pattern = sparse.csr_array((np.ones(source.size, dtype=np.int8), (source, target)), shape=(n, n))
-    n_strong, strong = connected_components(pattern, directed=True, connection="strong")
-    n_weak, weak = connected_components(pattern, directed=True, connection="weak")
-    strong, n_strong = _by_first_node(strong), int(n_strong)
-    weak, n_weak = _by_first_node(weak), int(n_weak)
-
+    strong, weak = (_by_first_node(connected_components(pattern, connection=kind)[1]) for kind in ("strong", "weak"))
     inside = strong[source] == strong[target]
-    is_closed = np.ones(n_strong, dtype=bool)
+    is_closed = np.ones(strong.max() + 1, dtype=bool)
     is_closed[strong[target[~inside]]] = False
     leader = is_closed[strong]
 
     closed = _closed_components(graph, strong, is_closed, inside & leader[target])
-    camps = _camps(n, source, target, sign)
+    gauge, violated, negative_cycle = _camps(n, source, target, sign)
     opposed, one_way = _mutual_edges(graph)
-    flags = _WeakFlags(
-        balanced=_none_of(weak, source[camps.violated], n_weak),
-        all_positive=_none_of(weak, source[sign < 0], n_weak),
-        undirected=_none_of(weak, source[one_way], n_weak),
-    )
-    components = _weak_components(weak, n_weak, strong, closed, flags)
-    connectivity = components[0].connectivity if n_weak == 1 else "disconnected"
+    # Which weak components are balanced, all positive, undirected.
+    flags = [_none_of(weak, source[edges]) for edges in (violated, sign < 0, one_way)]
+    components = _weak_components(weak, strong, closed, np.column_stack(flags))
     return Structure(
         graph=graph,
-        connectivity=connectivity,
+        connectivity=components[0].connectivity if len(components) == 1 else "disconnected",
         strong_component=strong,
         weak_component=weak,
         closed_components=closed,
         components=components,
         leaders=np.array([v for c in closed for v in c.nodes], dtype=np.int64),
         followers=np.flatnonzero(~leader),
-        gauge=camps.gauge if camps.violated.size == 0 else None,
-        negative_cycle=camps.negative_cycle(int(camps.violated[0])) if camps.violated.size else None,
+        gauge=None if violated.size else gauge,
+        negative_cycle=negative_cycle(int(violated[0])) if violated.size else None,
         sign_symmetric=opposed.size == 0,
         undirected=one_way.size == 0,
         all_positive=bool((sign > 0).all()),
     )
 
 
-class _Camps(NamedTuple):
-    """A gauge along a breadth-first forest, and the edges that violate it."""
+def _camps(
+    n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Callable[[int], tuple[Edge, ...]]]:
+    """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1).
 
-    gauge: np.ndarray  # (N,) int8, +1 at the smallest node of each component
-    violated: np.ndarray  # edge numbers, ascending
-    parent: np.ndarray  # (N,) predecessor in the forest; N at a root
-    parent_edge: np.ndarray  # (N,) edge number to the predecessor; -1 at a root
-    source: np.ndarray
-    target: np.ndarray
-
-    def negative_cycle(self, edge: int) -> tuple[Edge, ...]:
-        """Return the closed walk that a violating edge makes with the forest."""
-        start, end = int(self.source[edge]), int(self.target[edge])
-        left, right = self._path_to_root(start), self._path_to_root(end)
-        while left and right and left[-1] == right[-1]:
-            left.pop()
-            right.pop()
-        walk = [edge, *right, *reversed(left)]
-        return tuple((int(self.source[e]), int(self.target[e])) for e in walk)
-
-    def _path_to_root(self, node: int) -> list[int]:
-        path = []
-        while (edge := int(self.parent_edge[node])) >= 0:
-            path.append(edge)
-            node = int(self.parent[node])
-        return path
-
-
-def _camps(n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> _Camps:
-    """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1)."""
+    Returns
+    -------
+    gauge : (N,) int8 array
+        +1 at the smallest node of each component.
+    violated : int array
+        Numbers of the edges that violate it, ascending.
+    negative_cycle : function
+        Of such a number: the closed walk that the edge makes with the forest.
+    """
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -381,56 +356,56 @@ def _camps(n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> 
         gauge, jump = gauge * gauge[jump], jump[jump]
     gauge = gauge[:n]
     violated = np.flatnonzero(sign * gauge[source] * gauge[target] < 0)
-    return _Camps(gauge, violated, parent, parent_edge, source, target)
+
+    def path_to_root(node: int) -> list[int]:
+        path = []
+        while (edge := int(parent_edge[node])) >= 0:
+            path.append(edge)
+            node = int(parent[node])
+        return path
+
+    def negative_cycle(edge: int) -> tuple[Edge, ...]:
+        left, right = path_to_root(int(source[edge])), path_to_root(int(target[edge]))
+        while left and right and left[-1] == right[-1]:
+            left.pop()
+            right.pop()
+        walk = [edge, *right, *reversed(left)]
+        return tuple((int(source[e]), int(target[e])) for e in walk)
+
+    return gauge, violated, negative_cycle
 
 
 def _closed_components(
     graph: SignedDigraph, strong: np.ndarray, is_closed: np.ndarray, edges: np.ndarray
 ) -> tuple[ClosedComponent, ...]:
-    edge = np.flatnonzero(edges)
-    camps = _camps(graph.n_nodes, graph.source[edge], graph.target[edge], graph.sign[edge])
-    violating: dict[int, int] = {}
-    for position in camps.violated[::-1].tolist():
-        violating[int(strong[camps.source[position]])] = position
-    functions = _groups(strong, is_closed.size)
+    source, target, sign = graph.source[edges], graph.target[edges], graph.sign[edges]
+    gauge, violated, negative_cycle = _camps(graph.n_nodes, source, target, sign)
+    violating = {int(strong[source[i]]): i for i in violated[::-1].tolist()}  # the first of each
+    groups = _groups(strong)
     result = []
     for number in np.flatnonzero(is_closed).tolist():
-        nodes = functions[number].tolist()
+        nodes = tuple(groups[number].tolist())
         if number in violating:
-            result.append(ClosedComponent(tuple(nodes), False, None, camps.negative_cycle(violating[number])))
+            result.append(ClosedComponent(nodes, False, None, negative_cycle(violating[number])))
         else:
-            result.append(ClosedComponent(tuple(nodes), True, tuple(camps.gauge[nodes].tolist()), None))
+            result.append(ClosedComponent(nodes, True, tuple(gauge[groups[number]].tolist()), None))
     return tuple(result)
 
 
-class _WeakFlags(NamedTuple):
-    balanced: np.ndarray
-    all_positive: np.ndarray
-    undirected: np.ndarray
-
-
 def _weak_components(
-    weak: np.ndarray, n_weak: int, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: _WeakFlags
+    weak: np.ndarray, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: np.ndarray
 ) -> tuple[WeakComponent, ...]:
-    held: list[list[int]] = [[] for _ in range(n_weak)]
+    groups = _groups(weak)
+    held: list[list[int]] = [[] for _ in groups]
     for i, component in enumerate(closed):
         held[weak[component.nodes[0]]].append(i)
-    _, representative = np.unique(strong, return_index=True)
-    n_strong = np.bincount(weak[representative], minlength=n_weak).tolist()
+    _, first = np.unique(weak, return_index=True)
+    whole = _none_of(weak, strong != strong[first[weak]])
     result = []
-    for number, functions in enumerate(_groups(weak, n_weak)):
-        connectivity = "strong" if n_strong[number] == 1 else "quasi-strong" if len(held[number]) == 1 else "weak"
-        result.append(
-            WeakComponent(
-                tuple(functions.tolist()),
-                connectivity,
-                tuple(held[number]),
-                any(closed[i].balanced for i in held[number]),
-                bool(flags.balanced[number]),
-                bool(flags.all_positive[number]),
-                bool(flags.undirected[number]),
-            )
-        )
+    for nodes, closed_in, one, told in zip(groups, held, whole.tolist(), flags.tolist(), strict=True):
+        connectivity = "strong" if one else "quasi-strong" if len(closed_in) == 1 else "weak"
+        balanced = any(closed[i].balanced for i in closed_in)
+        result.append(WeakComponent(tuple(nodes.tolist()), connectivity, tuple(closed_in), balanced, *told))
     return tuple(result)
 
 
@@ -445,20 +420,17 @@ def _mutual_edges(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray]:
     return opposed, one_way
 
 
-def _none_of(component: np.ndarray, nodes: np.ndarray, count: int) -> np.ndarray:
+def _none_of(component: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Tell for each component whether none of ``nodes`` lies in it."""
-    return np.bincount(component[nodes], minlength=count) == 0
+    return np.bincount(component[nodes], minlength=component.max() + 1) == 0
 
 
-def _groups(component: np.ndarray, count: int) -> list[np.ndarray]:
+def _groups(component: np.ndarray) -> list[np.ndarray]:
     """Return the nodes of each component, ascending."""
-    order = np.argsort(component, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(component, minlength=count))[:-1])
+    return np.split(np.argsort(component, kind="stable"), np.cumsum(np.bincount(component))[:-1])
 
 
 def _by_first_node(component: np.ndarray) -> np.ndarray:
     """Renumber components by their smallest node."""
     _, first, inverse = np.unique(component, return_index=True, return_inverse=True)
-    rank = np.empty(first.size, dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(first.size)
-    return rank[inverse]
+    return np.argsort(np.argsort(first))[inverse]

@@ -106,13 +106,13 @@ def test_the_hash_is_that_of_the_written_list():
         (["0.1", "-0.25", "1/3"], "int64"),
         ([0.1, 1e300], "float64"),
         ([2.0**80, 2.0**-80], "float64"),
-        (["1/3", "1e30"], "fraction"),
-        ([f"1/{p}" for p in (10**9 + 7, 10**9 + 9, 998244353)], "fraction"),
+        (["1/3", "1e30"], "object"),
+        ([f"1/{p}" for p in (10**9 + 7, 10**9 + 9, 998244353)], "object"),
     ],
 )
 def test_weights_are_exact_in_the_smallest_form_that_holds_them(values, kind):
     graph = SignedDigraph.from_edges([(str(i), str(i + 1), v) for i, v in enumerate(values)])
-    assert graph._weights.kind == kind
+    assert graph._weights.table.dtype.name == kind
     for i, value in enumerate(values):
         assert graph.exact_weight(i) == Fraction(value)
         assert graph.weights[i] == float(Fraction(value))

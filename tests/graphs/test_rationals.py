@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lmi.exact.numbers import MAX_CHARACTERS, MAX_EXPONENT
 from ptcc_certify.errors import NumberError, PTCCError
 from ptcc_certify.graphs.rationals import (
-    MAX_CHARACTERS,
-    MAX_EXPONENT,
     as_fraction,
     format_exact,
     nearest_float,

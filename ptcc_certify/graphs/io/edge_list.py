@@ -13,7 +13,7 @@ from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
-from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
+from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
@@ -146,8 +146,8 @@ def edge_list(graph: SignedDigraph, name: str) -> bytes:
     if ordered_labels(list(graph.labels[::-1]))[0] == list(graph.labels):  # the labels themselves tell their order
         declared[graph.source] = declared[graph.target] = False
     lines = ["source,target,weight", *(labels[k] for k in np.flatnonzero(declared))]
-    for i, (s, t) in enumerate(zip(graph.source.tolist(), graph.target.tolist(), strict=True)):
-        lines.append(f"{labels[s]},{labels[t]},{format_exact(graph.exact_weight(i))}")
+    for s, t, weight in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True):
+        lines.append(f"{labels[s]},{labels[t]},{weight}")
     return "".join(f"{line}\n" for line in lines).encode("utf-8")
 
 

@@ -96,15 +96,7 @@ def read_graph(
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
 
 
-def read_graph_as(
-    path: Source,
-    read: Mapping[str, Any],
-    *,
-    orientation: str | None = None,
-    duplicates: Literal["refuse", "sum", "last"] | None = None,
-    drop_self_loops: bool | None = None,
-    undirected: bool | None = None,
-) -> SignedDigraph:
+def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> SignedDigraph:
     """Read a file as another graph was read; see :func:`read_graph`.
 
     Parameters
@@ -112,7 +104,7 @@ def read_graph_as(
     path : str, Path or file object
     read : mapping
         ``graph.read`` of the other graph, or of its certificate.
-    orientation, duplicates, drop_self_loops, undirected : optional
+    **options : keywords of :func:`read_graph`
         Count in place of what ``read`` says.
 
     Returns
@@ -132,16 +124,13 @@ def read_graph_as(
     True
     """
     turned = "information" if name_and_ending(path)[1] in _MATRICES else "listens"  # each kind has its own default
-    if orientation is None and read["orientation"] == turned:
-        orientation = turned
-    told: Any = {"refused": "refuse"}.get(read["duplicates"], read["duplicates"])
-    return read_graph(
-        path,
-        orientation=orientation,
-        duplicates=told if duplicates is None else duplicates,
-        drop_self_loops=read["self_loops"] != "refused" if drop_self_loops is None else drop_self_loops,
-        undirected=read["undirected"] if undirected is None else undirected,
-    )
+    as_read = {
+        "orientation": turned if read["orientation"] == turned else None,
+        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
+        "drop_self_loops": read["self_loops"] != "refused",
+        "undirected": read["undirected"],
+    }
+    return read_graph(path, **as_read | options)
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:

@@ -62,12 +62,15 @@ def _entries(row: Array, column: Array, entries: Array, n: int, labels: Array | 
     return Rows(names, row, column, weights, codes, lambda e: f"row {row[e] + 1}, column {column[e] + 1}")
 
 
-def _columns(start: Array, n: int, size: int) -> Array:
-    """Return the column (row) k of each entry of a compressed matrix: ``start[k] <= entry < start[k + 1]``."""
+def _uncompressed(start: Array, index: Array, entries: Array, n: int) -> tuple[Array, Array, Array]:
+    """Return column (row) and row (column) of the entries of a compressed matrix, and these.
+
+    Column k has the entries ``start[k] .. start[k + 1] - 1``.
+    """
     start = start.astype(np.int64, casting="same_kind")
-    if start.shape != (n + 1,) or start[0] != 0 or (np.diff(start) < 0).any() or start[-1] > size:
+    if start.shape != (n + 1,) or start[0] != 0 or (np.diff(start) < 0).any() or start[-1] > entries.size:
         raise ValueError("its index of columns or rows is inconsistent")
-    return np.repeat(np.arange(n), np.diff(start))
+    return np.repeat(np.arange(n), np.diff(start)), index[: start[-1]], entries[: start[-1]]
 
 
 def _the_matrix(shapes: Mapping[str, tuple[int, ...]], variables: Iterable[str], name: str) -> str:
@@ -136,9 +139,8 @@ def read_npz(data: bytes, name: str) -> Rows:
         if layout == "coo":
             row, column = arrays["row"], arrays["col"]
         elif layout in ("csr", "csc"):
-            column = _columns(arrays["indptr"], shape[0], entries.size)
-            row, entries = arrays["indices"][: column.size], entries[: column.size]
-            row, column = (row, column) if layout == "csc" else (column, row)
+            row, column, entries = _uncompressed(arrays["indptr"], arrays["indices"], entries, shape[0])
+            row, column = (row, column) if layout == "csr" else (column, row)
         else:
             raise FormatError(f"{name}: a sparse matrix of layout {shorten(layout)}; convert it with tocsr")
         return _entries(row, column, entries, shape[0], labels, name)
@@ -167,8 +169,8 @@ def read_mat(data: bytes, name: str) -> Rows:
             return _dense(next(parts).reshape(shape, order="F"), None, name)
         row, start, entries = parts
         _refuse_no_adjacency(shape, entries.dtype, name)
-        column = _columns(start, shape[1], entries.size)
-        return _entries(row[: column.size], column, entries[: column.size], shape[0], None, name)
+        column, row, entries = _uncompressed(start, row, entries, shape[1])
+        return _entries(row, column, entries, shape[0], None, name)
 
 
 def _mat_variables(data: bytes, order: str, name: str) -> Iterator[memoryview]:

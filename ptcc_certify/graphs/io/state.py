@@ -168,9 +168,10 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
         place, row = f"{name}, line {number}", [text.strip() for text in texts]
         if columns is None:
             node, value = column(row, _NODE, place), column(row, _VALUE, place)
-            columns = (0, 1) if node is None or value is None else (node, value)
             if node is not None and value is not None:
+                columns = node, value
                 continue
+            columns = 0, 1
         cells = [row[i] for i in columns if i < len(row) and row[i]]
         if any(row) and len(cells) < 2:
             raise FormatError(f"{place}: a row needs a node and a value; write node,value")

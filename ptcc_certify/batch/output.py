@@ -1,28 +1,128 @@
-"""Rows as they come, kept beside the table that they will be, so that an interrupted batch goes on where it was.
+"""The table as a file, CSV or Parquet, and beside it the rows as they come, so that an interrupted batch goes on.
 
-A row is kept with the mark of its graph, not with its place: a list that has changed finds the rows of its graphs.
+What a table cannot, or should not, replace is refused before the work. A row is kept with the mark of its graph, not
+with its place: a list that has changed finds the rows of its graphs.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Any
 
 from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
-from ptcc_certify.batch.settings import Settings
+from ptcc_certify.batch.settings import INSTALL, Settings
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 
+#: Endings of a table's name.
+TABLES = (".csv", ".parquet")
 #: What the first line of a journal begins with.
 SCHEMA = "ptcc-batch/2"
-#: No integer of a table is that large.
-LARGEST_INTEGER = 2**63 - 1
+#: Which values of a type can stand in a column of it.
+_FITTING: dict[type, Callable[[Any], bool]] = {
+    str: str.isprintable,
+    float: math.isfinite,
+    int: lambda x: abs(x) < 2**63,
+    bool: lambda x: True,
+}
+
+
+def table_bytes(rows: Sequence[Row], suffix: str) -> bytes:
+    """Return a table as CSV or Parquet; an empty entry is an empty field, or null.
+
+    Texts are written as they are: a spreadsheet takes one that begins with ``=`` for a formula, unless it is told to
+    import texts.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        From :func:`ptcc_certify.certify_many`.
+    suffix : {".csv", ".parquet"}
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ParameterError
+        Parquet is asked for, and pyarrow is not installed.
+
+    Examples
+    --------
+    >>> table_bytes([], ".csv")[:18]
+    b'graph,sha256,nodes'
+    """
+    if suffix == ".parquet":
+        pa, parquet = _pyarrow()
+        kinds = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+        schema = pa.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
+        sink = pa.BufferOutputStream()
+        parquet.write_table(pa.Table.from_pylist(list(rows), schema=schema), sink)
+        return sink.getvalue().to_pybytes()
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([_field(row[name]) for name in COLUMNS] for row in rows)
+    return text.getvalue().encode("utf-8")
+
+
+def _field(value: Any) -> str:
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise ParameterError(f"Parquet needs pyarrow; {INSTALL}, or name a .csv file") from None
+    return pyarrow, parquet
+
+
+def refuse_table(path: Path, chosen: Sequence[Source], replace: bool) -> None:
+    """Refuse before the work what could not, or should not, be written after it."""
+    name = shorten(os.fspath(path), 200)
+    if path.suffix.lower() not in TABLES:
+        raise ParameterError(f"{name}: tables are written to {' and '.join(TABLES)}; let the name end in one of these")
+    if path.suffix.lower() == ".parquet":
+        _pyarrow()
+    if not path.parent.is_dir():
+        raise ParameterError(f"{name}: the folder does not exist; make it first")
+    if path.is_dir():
+        raise ParameterError(f"{name}: is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise ParameterError(f"{name}: is no regular file; name another file")
+    if any(isinstance(s.origin, str) and os.path.realpath(s.origin) == os.path.realpath(path) for s in chosen):
+        raise ParameterError(f"{name}: is one of the graphs; name another file")
+    if path.exists() and not _is_table(path):
+        raise ParameterError(f"{name}: is there already, and no table of ptcc batch; name another file")
+    if path.exists() and not replace:
+        raise ParameterError(f"{name}: is there already; name another file, or replace it with --restart")
+
+
+def _is_table(path: Path) -> bool:
+    if path.suffix.lower() == ".parquet":
+        try:
+            return list(_pyarrow()[1].read_schema(path).names) == list(COLUMNS)
+        except (OSError, ValueError):
+            return False
+    header = table_bytes([], ".csv")
+    with path.open("rb") as file:
+        return file.read(len(header)) == header
+
+
+# ---------------------------------------------------------------------- rows as they come
 
 
 def journal_path(path: Path) -> Path:
@@ -49,7 +149,6 @@ class Journal:
         except BaseException:
             self._file.close()
             raise
-        self._empty = not self._rows
 
     def _read(self, header: dict[str, Any], restart: bool) -> None:
         data = self._file.read()
@@ -89,7 +188,7 @@ class Journal:
 
     def append(self, mark: str, row: Row) -> None:
         """Keep a row of the graph of this mark."""
-        self._empty = False
+        self._rows[mark] = row
         self._write({"of": mark, "row": row})
 
     def _write(self, entry: dict[str, Any]) -> None:
@@ -104,22 +203,18 @@ class Journal:
 
     def close(self) -> None:
         """Release the journal, and delete it if it keeps no row."""
-        if self._empty:
+        if not self._rows:
             self.remove()
         self._file.close()
 
 
 def _entry(line: bytes) -> dict[str, Any]:
-    """Return the object of a line; an empty one of a line that is none, or holds what is no finite number."""
+    """Return the object of a line; an empty one of a line that is none."""
     try:
-        entry = json.loads(line, parse_constant=_refuse_constant)
+        entry = json.loads(line)
     except (ValueError, RecursionError):
         return {}
     return entry if isinstance(entry, dict) else {}
-
-
-def _refuse_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a finite number")
 
 
 def _intact(entry: dict[str, Any]) -> bool:
@@ -130,20 +225,14 @@ def _intact(entry: dict[str, Any]) -> bool:
         and type(entry["of"]) is str
         and type(row) is dict
         and list(row) == list(COLUMNS)
-        and type(row["graph"]) is str
+        and row["graph"] is not None
         and all(value is None or _fits(value, COLUMNS[name]) for name, value in row.items())
     )
 
 
 def _fits(value: Any, kind: type) -> bool:
-    """Tell whether an entry can stand in a column."""
-    if type(value) is not kind:  # a truth value is no integer
-        return False
-    if isinstance(value, str):
-        return not any("\ud800" <= c <= "\udfff" for c in value)
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, int) and abs(value) <= LARGEST_INTEGER
+    """Tell whether an entry can stand in a column; a truth value is no integer."""
+    return type(value) is kind and _FITTING[kind](value)
 
 
 def _opened_alone(path: Path, name: str) -> IO[bytes]:
@@ -152,9 +241,7 @@ def _opened_alone(path: Path, name: str) -> IO[bytes]:
         try:
             if path.exists() and not path.is_file():
                 raise ParameterError(f"{name}: is no regular file; remove what is there, or name another -o")
-            file = path.open("r+b") if path.exists() else path.open("x+b")
-        except (FileExistsError, FileNotFoundError):
-            continue  # another process was faster
+            file = path.open("a+b")
         except OSError as error:
             raise ParameterError(f"{name}: cannot be written ({error.strerror})") from None
         try:
@@ -163,6 +250,7 @@ def _opened_alone(path: Path, name: str) -> IO[bytes]:
             file.close()
             raise ParameterError(f"{name}: another process is at work on it; wait for it, or name another -o") from None
         if path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+            file.seek(0)
             return file
         file.close()  # the other process finished in between
     raise ParameterError(f"{name}: cannot be opened; remove what is there, or name another -o")
@@ -177,13 +265,11 @@ def _lock(file: IO[bytes]) -> None:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         except OSError:
             raise BlockingIOError from None
-        file.seek(0)
         return
     import fcntl
 
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise
-    except OSError:
-        pass  # some network file systems know no locks
+    except OSError as error:  # some network file systems know no locks
+        if isinstance(error, BlockingIOError):
+            raise
