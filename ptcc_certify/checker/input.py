@@ -339,7 +339,7 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
     need(stop is None or stop < known.gain.T, "a stop beyond the deadline")
     need(period is None or period <= known.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
-    top = limits.top(known.gain)
+    top = limits.largest_gain(known.gain)
     step = doc.open("limited-gain", of, ["growth"], witness=True)
     chosen = [step["witness"]] if said["noise"] is None else entries(step["witness"], "the witness", 2)
     k = _function(known, chosen[0])

@@ -57,10 +57,7 @@ class LimitedBounds:
         With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
         first.
         """
-        top = limits.largest_gain(self.bounds.gain)
-        if top is None:
-            return None
-        clock = limits.clock_below(self.bounds.gain)
+        top, clock = limits.largest_gain(self.bounds.gain), limits.clock_below(self.bounds.gain)
         found = least((partial(self._by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
         if found is None or self.noise is None or limits.sample_period is not None:
             return found
