@@ -509,8 +509,10 @@ class InputBounds:
         Raises
         ------
         ValueError
-            It is one of a large graph, or does not decay.
+            There is none, it is one of a large graph, or it does not decay.
         """
+        if type(k) is not int or not 0 <= k < len(self.forms):
+            raise ValueError("there is no such Lyapunov function")
         form = self.forms[k]
         if form is None or form.rate <= 0:
             raise ValueError("a Lyapunov function that says nothing of single agents")
