@@ -186,9 +186,8 @@ def _power_integral_below(a: Fraction, begin: Fraction, end: Fraction, bits: int
     """
     length = max(end - begin, Fraction(0))
     y = a * length
-    if abs(y) < Fraction(1, 2**bits):
-        mean = 1 - abs(y)
-    else:
+    mean = 1 - abs(y)
+    if abs(y) > Fraction(1, 2**bits):
         mean = (exp(y, bits + _bits_below_one(y))[y < 0] - 1) / y
     return exp(a * begin, bits)[0] * length * mean
 

@@ -1,9 +1,10 @@
-"""What is proved about the input, read from a certificate's file; :func:`effort_section` writes it."""
+"""What is proved about the input, as a certificate's file has it: written, and read again."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from ptcc_certify.bounds.input import (
@@ -18,7 +19,7 @@ from ptcc_certify.bounds.input import (
     Witness,
     first_input,
 )
-from ptcc_certify.certificate.vectors import Reader, number
+from ptcc_certify.certificate.vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.nominal import Protocol
@@ -26,6 +27,58 @@ from ptcc_certify.theorems.base import Obligation
 
 Steps = Mapping[tuple[str, str], Obligation]
 Said = Mapping[str, Any]
+
+ENDS = ("lower", "upper")
+LIMITS = ("gain_cap", "stop_before", "sample_period")
+#: Keys under ``noise`` of what limits leave, and the attributes of :class:`~ptcc_certify.bounds.input.Limited`.
+NOISE = {"bound": "noise", "norm": "noisy_norm", "largest": "noisy_largest"}
+
+
+def effort_section(effort: Effort | None, out: Writer) -> Any:
+    """Return the section ``input`` of a certificate."""
+    if effort is None:
+        return None
+    agents, initial_set = partial(out.state, "input"), effort.initial_set
+    region: dict[str, Any] | None = None
+    if initial_set is not None:
+        region = {"center": agents(initial_set.center)}
+        if initial_set.axes:
+            region["axes"] = list(map(agents, initial_set.axes))
+        else:
+            region["radius"] = agents(initial_set.radius or (Fraction(0),) * len(out.labels))
+    peak, sliding, disturbed = effort.peak, effort.sliding, effort.disturbed
+    residual = [
+        {key: text(getattr(entry.limits, key)) for key in LIMITS}
+        | {"clock": text(entry.clock), "norm": text(entry.norm)}
+        | {"agents": agents(entry.agents), "largest": text(entry.largest)}
+        | {"noise": entry.noise and {key: text(getattr(entry, name)) for key, name in NOISE.items()}}
+        for entry in effort.residual
+    ]
+    return {
+        "bounded": effort.bounded,
+        "threshold": dict(zip(ENDS, map(text, effort.threshold), strict=True)),
+        "initial_set": region,
+        "constants": list(map(agents, effort.constants)),
+        "peak": peak and {"agents": agents(peak.agents), "largest": text(peak.largest), "norm": text(peak.norm)},
+        "energy": effort.energy and text(effort.energy.value),
+        "path_length": effort.path_length and text(effort.path_length.value),
+        "sliding": sliding and {"bounded": sliding.bounded, "agents": agents(sliding.agents)},
+        "residual": residual,
+        "disturbed": disturbed
+        and {"delta": text(disturbed.delta), "inputs": agents(disturbed.inputs), "drift": agents(disturbed.drift)},
+    }
+
+
+def peak_witness(peak: Peak, out: Writer) -> Said:
+    """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
+    agents = {label: [how.function, text(how.z)] for label, how in zip(out.labels, peak.how, strict=True)}
+    return {"agents": agents, "norm": peak.norm_how.function}
+
+
+def energy_witness(energy: EnergyIntegral) -> Said:
+    """Return the lower triangles of the matrices that prove the energy."""
+    first, second = ([list(map(text, row[: i + 1])) for i, row in enumerate(W)] for W in energy.matrices)
+    return {"W0": first, "W1": second}
 
 
 def read_effort(
@@ -39,32 +92,29 @@ def read_effort(
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
     if said is None:
         return None
-    initial_set, sliding, threshold = _starts(said["initial_set"], data), said["sliding"], said["threshold"]
-    region = initial_set or (None if start is None else InitialSet(start))
+    region, initial_set, sliding = said["initial_set"], None, said["sliding"]
+    if region is not None:
+        axes = tuple(map(data.agents, region.get("axes", ())))
+        initial_set = InitialSet(data.agents(region["center"]), () if axes else data.agents(region["radius"]), axes)
+    begin = initial_set or (None if start is None else InitialSet(start))
+    lower, upper = (number(said["threshold"][key]) for key in ENDS)
     return Effort(
         bounded=said["bounded"],
         by=None if said["bounded"] is None else steps["input-threshold", "input"].witness,
-        threshold=(number(threshold["lower"]), number(threshold["upper"])),
+        threshold=(lower, upper),
         initial_set=initial_set,
         constants=tuple(map(data.state, said["constants"])),
         peak=_peak(said["peak"], data, steps),
         energy=_energy(said["energy"], steps),
         path_length=_witness(said["path_length"], "input-length", steps),
-        sliding=None if sliding is None else SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
+        sliding=sliding and SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
             _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
             for k, entry in enumerate(said["residual"])
         ),
         disturbed=_disturbed(said["disturbed"], data, steps),
-        first=None if region is None else first_input(structure, protocol, region),
+        first=None if begin is None else first_input(structure, protocol, begin),
     )
-
-
-def _starts(said: Said | None, data: Reader) -> InitialSet | None:
-    if said is None:
-        return None
-    axes = tuple(map(data.agents, said.get("axes", ())))
-    return InitialSet(data.agents(said["center"]), () if axes else data.agents(said["radius"]), axes)
 
 
 def _witness(said: str | None, kind: str, steps: Steps) -> Witness | None:
@@ -86,32 +136,25 @@ def _energy(said: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
 def _peak(said: Said | None, data: Reader, steps: Steps) -> Peak | None:
     if said is None:
         return None
-    step = steps["input-peak", "input"]
-    agents, norm = data.agents(said["agents"]), exact(said["norm"])
-    how = step.witness["agents"].values()
-    return Peak(
-        agents,
-        tuple(Witness(bound, k, exact(z)) for bound, (k, z) in zip(agents, how, strict=True)),
-        norm,
-        Witness(norm, step.witness["norm"], step.numbers["z"]),
-    )
+    step, agents, norm = steps["input-peak", "input"], data.agents(said["agents"]), exact(said["norm"])
+    how = zip(agents, step.witness["agents"].values(), strict=True)
+    each = tuple(Witness(bound, k, exact(z)) for bound, (k, z) in how)
+    return Peak(agents, each, norm, Witness(norm, step.witness["norm"], step.numbers["z"]))
 
 
 def _limited(said: Said, step: Obligation, data: Reader) -> Limited:
     noise = said["noise"] or {}
-    first, second = (*step.witness, None)[:2] if isinstance(step.witness, list) else (step.witness, None)
+    first, second = step.witness if noise else (step.witness, None)
     return Limited(
-        limits=Limits(*(number(said[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
+        limits=Limits(*(number(said[key]) for key in LIMITS)),
         clock=exact(said["clock"]),
         function=first,
         growth=step.numbers["growth"],
         norm=exact(said["norm"]),
         agents=data.state(said["agents"]),
         largest=number(said["largest"]),
-        noise=number(noise.get("bound")),
         noise_function=second,
-        noisy_norm=number(noise.get("norm")),
-        noisy_largest=number(noise.get("largest")),
+        **{name: number(noise.get(key)) for key, name in NOISE.items()},
     )
 
 

@@ -29,7 +29,6 @@ from ptcc_certify.bounds.input.effort import (
 )
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
-from ptcc_certify.bounds.input.section import effort_section, energy_witness, peak_witness
 from ptcc_certify.bounds.input.tightest_bound import best_bound, kept, least_bound, usable_functions
 from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, disturbed
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
