@@ -1,7 +1,7 @@
 """Rational enclosures of square roots, exponentials and logarithms, with the standard library alone.
 
 Every function returns ``(below, above)``: rationals between which the true value lies, apart by about ``2^-bits`` of
-its size. Exponentials and logarithms are those of :mod:`decimal`, which rounds them correctly to any number of digits.
+its size. The functions are those of :mod:`decimal`, which rounds them correctly to any number of digits.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from collections.abc import Callable, Iterable
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
-from math import isqrt
 from operator import mul
 
 #: Bits to which results are enclosed unless told otherwise.
 BITS = 96
-#: Bits beyond these that are kept of exponentials and logarithms.
+#: Bits beyond these that are kept.
 SPARE_BITS = 24
 #: Beyond this argument an exponential is not formed.
 LARGEST_EXPONENT = 100_000
@@ -41,11 +40,7 @@ def sqrt(x: Fraction, bits: int = BITS) -> Enclosure:
     """
     if x < 0:
         raise ValueError("the square root of a negative number")
-    if x == 0:
-        return Fraction(0), Fraction(0)
-    shift = bits + max((x.denominator.bit_length() - x.numerator.bit_length()) // 2 + 1, 0)
-    root = isqrt((x.numerator << 2 * shift) // x.denominator)
-    return Fraction(root, 1 << shift), Fraction(root + 1, 1 << shift)
+    return _enclosed(Context.sqrt, x, bits)
 
 
 @lru_cache(maxsize=256)  # bounds of many agents ask for the same few

@@ -44,7 +44,7 @@ def root_above(x: Fraction) -> Fraction:
     >>> float(root_above(Fraction(9, 4)))
     1.5
     """
-    return rounded(sqrt(rounded(x, BITS, up=True), BITS)[1], BITS, up=True)
+    return rounded(sqrt(x, BITS)[1], BITS, up=True)
 
 
 def decay_above(x: Fraction) -> Fraction:
@@ -533,11 +533,6 @@ class InputBounds:
             largest += max(a for a, _ in moved) + T_r * max(b for _, b in moved)
             states += max(map(abs, self.reaching.sigma0)) + T_r * self.reaching.push
         return [min(largest, 2 * row.get(v, Fraction(0)) * states) for v, row in enumerate(self.rows)]
-
-    @cached_property
-    def first(self) -> Fraction:
-        """A bound of ``||E(0)||``, exact but for rounding for a single initial state."""
-        return root_above(sum((self.initial_set.largest(row) ** 2 for row in self.rows), Fraction(0)))
 
     @cached_property
     def held_norm(self) -> Fraction:

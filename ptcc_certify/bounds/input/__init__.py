@@ -44,6 +44,7 @@ from ptcc_certify.checker.input_formulas import (
     peak_above,
     root_above,
 )
+from ptcc_certify.checker.matrices import diagonal
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols import Protocol
 
@@ -190,13 +191,10 @@ def _reaching(asked: InputRequest) -> Reaching | None:
 
 def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
-    matrix = form.matrix or ()
-    scale = math.lcm(*(x.denominator for row in matrix for x in row))
-    P = [[x.numerator * (scale // x.denominator) for x in row] for row in matrix]
-    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
+    (P, scale), constants = form.entries, [Fraction(0)] * n
+    above = arithmetic().above(P, diagonal([1] * len(P)))
     if above is None:
         return None
-    constants = [Fraction(0)] * n
     try:
         for v, value in zip(form.nodes, above, strict=True):
             constants[v] = kept(value * scale * (1 + RAISE))
