@@ -225,20 +225,33 @@ class Limits:
         ValueError
             Nothing limits the gain.
         """
-        latest = self.stop_before
-        if self.sample_period is not None:
-            periods = -(-self.end(gain) // self.sample_period)  # those that begin before the end
-            latest = gain.T - self.sample_period * (periods - 1)
-        ends = [self.gain_cap] if self.gain_cap is not None else []
-        if latest is not None:
-            ends.append(gain.value(latest / gain.T))
-        if not ends:
+        latest = self.end(gain) if self.sample_period is None else self.sample_period * (self.periods(gain) - 1)
+        if latest < gain.T:
+            return self.acting(gain, latest)
+        if self.gain_cap is None:
             raise ValueError("nothing limits the gain")
-        return min(ends)
+        return self.gain_cap
+
+    def acting(self, gain: PrescribedGain, t: Fraction) -> Fraction:
+        """Return what the cap leaves of ``gain`` at an instant before the deadline."""
+        value = gain.value(1 - t / gain.T)
+        return value if self.gain_cap is None else min(value, self.gain_cap)
 
     def end(self, gain: PrescribedGain) -> Fraction:
         """Return the instant from which on the gain is 0, or the deadline."""
         return gain.T - (self.stop_before or 0)
+
+    def periods(self, gain: PrescribedGain) -> int:
+        """Return the number of periods that begin before the end.
+
+        Raises
+        ------
+        ValueError
+            Nothing is sampled.
+        """
+        if self.sample_period is None:
+            raise ValueError("nothing is sampled")
+        return -(-self.end(gain) // self.sample_period)
 
     def clock_below(self, gain: PrescribedGain) -> Fraction:
         """Bound the integral of the gain up to the deadline from below.
@@ -251,7 +264,7 @@ class Limits:
         ValueError
             Nothing limits the gain: the integral is infinite.
         """
-        lost = (self.sample_period or 0) * max(self.largest_gain(gain) - gain.value(Fraction(1)), Fraction(0))
+        lost = (self.sample_period or 0) * (self.largest_gain(gain) - self.acting(gain, Fraction(0)))
         return rounded(max(self.integrals(gain)[0] - lost, Fraction(0)), BITS)
 
     def integrals(self, gain: PrescribedGain) -> Interval:
@@ -293,25 +306,16 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
     >>> sampled_above(gain, Limits(sample_period=Fraction(1, 2)), Fraction(1), Fraction(1))
     Fraction(7, 4)
     """
-    h, end = limits.sample_period, limits.end(gain)
-    if h is None:
-        raise ValueError("nothing is sampled")
-    count = -(-end // h)
+    count, end, h = limits.periods(gain), limits.end(gain), limits.sample_period or Fraction(0)
     first, factor = max(count - LAST_PERIODS, 0), Fraction(1)
     bits = length((gain.T, gain.rho1, gain.k, h, end, rate, growth, limits.gain_cap or h))
     spend(300 * (count - first), bits, bits, "held gains")
-
-    def acting(t: Fraction) -> Fraction:
-        value = gain.value(1 - t / gain.T)
-        return min(value, limits.gain_cap or value)
-
     if first:
-        early = Limits(limits.gain_cap, gain.T - h * first)
-        clock, square = early.integrals(gain)
-        lost = h * (early.largest_gain(gain) - acting(Fraction(0)))
+        clock, square = Limits(limits.gain_cap, gain.T - h * first).integrals(gain)
+        lost = h * (limits.acting(gain, h * first) - limits.acting(gain, Fraction(0)))
         factor = decay_above(rate * max(clock - lost, Fraction(0)) - growth * h * square)
     for j in range(first, count):
-        eta = acting(h * j) * min(h, end - h * j)
+        eta = limits.acting(gain, h * j) * min(h, end - h * j)
         factor = rounded(factor * max(1 - eta * rate + eta**2 * growth, Fraction(0)), BITS, up=True)
     return factor
 
