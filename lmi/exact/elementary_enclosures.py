@@ -7,7 +7,7 @@ its size. The functions are those of :mod:`decimal`, which rounds them correctly
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from decimal import MAX_EMAX, MIN_EMIN, ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from operator import mul
@@ -94,9 +94,9 @@ def _enclosed(function: Callable[[Context, Decimal], Decimal], x: Fraction, bits
     """
     digits, ends = bits // 3 + 20, []
     for rounding, side in ((ROUND_FLOOR, Decimal(-1)), (ROUND_CEILING, Decimal(1))):
-        context = Context(prec=digits, rounding=rounding)
+        context = Context(prec=digits, rounding=rounding, Emin=MIN_EMIN, Emax=MAX_EMAX)
         value = function(context, context.divide(Decimal(x.numerator), Decimal(x.denominator)))
-        end = context.fma(abs(value), side.scaleb(3 - digits), value)
+        end = context.fma(context.abs(value), context.scaleb(side, 3 - digits), value)
         ends.append(rounded(Fraction(end), bits + SPARE_BITS, up=side > 0))
     return ends[0], ends[1]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import decimal
 from fractions import Fraction
 
 import flint
@@ -57,6 +58,34 @@ def test_logarithms_are_enclosed(x: Fraction):
     value = ball(x).log()
     assert not ball(below) > value and not ball(above) < value
     assert above - below <= Fraction(1, 2**90) * max(abs(above), abs(below), Fraction(1))
+
+
+def test_what_a_float_cannot_hold_is_enclosed():
+    """Exponentials that only ever get smaller, and arguments that are no float: far off, next to 1, next to 0."""
+    below, above = enclosure.exp(Fraction(-(10**30)))
+    assert below == 0 and above == enclosure.exp(Fraction(-100_000))[1] > 0
+    tiny = Fraction(1, 10**3000)
+    below, above = enclosure.log(tiny)
+    holds((below, above), ball(tiny).log())
+    below, above = enclosure.log(1 + tiny)
+    assert below <= tiny / 2 and tiny <= above < Fraction(1, 2**96)
+    below, above = enclosure.sqrt(tiny**2)
+    assert below <= tiny <= above <= tiny * (1 + Fraction(1, 2**96))
+    assert enclosure.log(Fraction(1)) == enclosure.sqrt(Fraction(0)) == (0, 0)
+
+
+def test_what_others_set_for_decimals_changes_nothing():
+    x, before = Fraction(355, 113), decimal.DefaultContext.copy()
+    values = [of(x, 77) for of in (enclosure.log, enclosure.sqrt, enclosure.exp)]
+    enclosure.exp.cache_clear()
+    try:
+        for context in (decimal.DefaultContext, decimal.getcontext()):
+            context.prec, context.Emin, context.Emax, context.rounding = 3, -1, 1, decimal.ROUND_UP
+        assert values == [of(x, 77) for of in (enclosure.log, enclosure.sqrt, enclosure.exp)]
+    finally:
+        for context in (decimal.DefaultContext, decimal.getcontext()):
+            context.prec, context.rounding = before.prec, before.rounding
+            context.Emin, context.Emax = before.Emin, before.Emax
 
 
 def test_what_has_no_value_is_refused():
