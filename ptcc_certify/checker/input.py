@@ -24,7 +24,7 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, 
 from ptcc_certify.checker.side_vectors import Numbers
 from ptcc_certify.checker.structure import Structure
 
-KEYS = ("bounded", "threshold", "initial_set", "constants", "peak", "energy", "path_length", "sliding")
+KEYS = ("bounded", "threshold", "initial_set", "constants", "sliding")
 LIMIT_KEYS = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
 #: Graphs up to this size have bounds of the input.
 INPUT_NODES = 400
@@ -78,24 +78,23 @@ def check_input(doc: Document, known: Verified) -> None:
     need((said is not None) == decays, "the input is spoken of iff the decay is proved")
     if said is None:
         return
-    fields(said, (*KEYS, "residual", "disturbed"), "input")
+    fields(said, (*KEYS, *PARTS), "input")
+    need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
     _threshold(doc, known, said)
     constants = _constants(doc, known, entries(said["constants"], "constants", len(known.functions)))
     _sliding(doc, known, said["sliding"])
     initial_set = _starts(doc, known, said["initial_set"])
     if initial_set is None:
-        for key in ("peak", "energy", "path_length", "disturbed"):
-            need(said[key] is None, f"{key} without an initial state, or of too large a graph")
-        need(said["residual"] == [], "limits without an initial state, or of too large a graph")
+        for key in PARTS:
+            empty = said[key] is None or (key == "residual" and not said[key])
+            need(empty, f"{key} without an initial state, or of too large a graph")
         return
     try:
         bounds = _bounds(doc, known, initial_set, constants)
-        _peak(doc, known, said["peak"], bounds)
-        _integrals(doc, known, said, bounds)
-        need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
-        for k, entry in enumerate(said["residual"]):
-            _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
-        _disturbed(doc, known, said["disturbed"], bounds)
+        for key, verify in PARTS.items():
+            doc.at = f"input.{key}"
+            if said[key] is not None:
+                verify(doc, known, said, bounds)
     except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
 
@@ -238,10 +237,7 @@ def _bounds(
 
 def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
-    doc.at = "input.peak"
-    if said is None:
-        return
-    fields(said, ("agents", "largest", "norm"), "peak")
+    said = fields(said["peak"], ("agents", "largest", "norm"), "peak")
     step = doc.open("input-peak", "input", ["z"], witness=True)
     witness = fields(step["witness"], ("agents", "norm"), "the witness")
     ways = ordered(known.structure.graph.labels, witness["agents"], "agents").values()
@@ -257,29 +253,33 @@ def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBound
     doc.done(f"at most {up(max(peaks))}, norm {up(exact(said['norm']))}")
 
 
-def _integrals(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
-    """Verify energy and path length by one function, or the energy by two matrices."""
-    for key, kind, of in (
-        ("energy", "input-energy", formulas.energy_above),
-        ("path_length", "input-length", formulas.length_above),
-    ):
-        doc.at = f"input.{key}"
-        if said[key] is None:
-            continue
-        if key == "energy" and isinstance(doc.following.get("witness"), dict):
-            step = doc.open(kind, "input", ["p", "m0", "m1"], witness=True)
-            matrices = fields(step["witness"], ("W0", "W1"), "the witness")
-            need(bounds.reaching is None, "sliding variables move")
-            even, grown = (
-                _remainder(doc, known, matrices[W], c, step[m], bounds)
-                for W, c, m in (("W0", Fraction(0), "m0"), ("W1", 1 / known.gain.k, "m1"))
-            )
-            least = formulas.integral_above(known.gain, even, grown, step["p"])
-        else:
-            step = doc.open(kind, "input", ["z"], witness=True)
-            least = bounds.bound(of, None, step["witness"], step["z"])
-        need(exact(said[key]) >= least, "the bound is not proved")
-        doc.done(f"at most {up(exact(said[key]))}")
+def _energy(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the energy, by one function or by two matrices."""
+    if not isinstance(doc.following.get("witness"), dict):
+        _by_function(doc, said["energy"], "input-energy", formulas.energy_above, bounds)
+        return
+    step = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
+    matrices = fields(step["witness"], ("W0", "W1"), "the witness")
+    need(bounds.reaching is None, "sliding variables move")
+    even = _remainder(doc, known, matrices["W0"], Fraction(0), step["m0"], bounds)
+    grown = _remainder(doc, known, matrices["W1"], 1 / known.gain.k, step["m1"], bounds)
+    _at_most(doc, said["energy"], formulas.integral_above(known.gain, even, grown, step["p"]))
+
+
+def _path_length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the length of the path."""
+    _by_function(doc, said["path_length"], "input-length", formulas.length_above, bounds)
+
+
+def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
+    """Verify a bound for the norm that follows from one function and an instant."""
+    step = doc.open(kind, "input", ["z"], witness=True)
+    _at_most(doc, bound, bounds.bound(of, None, step["witness"], step["z"]))
+
+
+def _at_most(doc: Document, bound: Any, least: Fraction) -> None:
+    need(exact(bound) >= least, "the bound is not proved")
+    doc.done(f"at most {up(exact(bound))}")
 
 
 def _remainder(
@@ -312,6 +312,12 @@ def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
 
 
 # ---------------------------------------------------------------------- limits of actuators
+
+
+def _residual(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify what is left under each of the limits."""
+    for k, entry in enumerate(said["residual"]):
+        _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
 
 
 def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, bounds: formulas.InputBounds) -> None:
@@ -386,11 +392,8 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
 
 def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
-    doc.at = "input.disturbed"
-    if said is None:
-        return
     need(not known.protocol.sliding, "the sliding-mode protocol has its own claims")
-    fields(said, ("delta", "inputs", "drift"), "disturbed")
+    said = fields(said["disturbed"], ("delta", "inputs", "drift"), "disturbed")
     step = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
     delta = exact(said["delta"])
     need(delta == step["delta"] and delta > 0, "another delta")
@@ -399,3 +402,7 @@ def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.Input
         drift = [delta * known.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in known.final.projection]
         _above(doc, known, said["drift"], "the drift", drift)
     doc.done(f"for every disturbance within {down(delta)}")
+
+
+#: What is verified of initial states, by key, in the order of the proof.
+PARTS = {"peak": _peak, "energy": _energy, "path_length": _path_length, "residual": _residual, "disturbed": _disturbed}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -114,12 +115,9 @@ def bound_effort(asked: InputRequest) -> Effort:
     )
     usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
-    peak = None
-    if own is not None:
-        peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.pole >= 2], own)
-    ample = [k for k in usable if bounds.form(k).rate * gain.pole > 1]
+    peak = None if own is None else _peak(bounds, usable, own)
     cap = None if influence is None or not influence.exact or not asked.limits else largest_deviation(region, influence)
-    energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, ample))
+    energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, usable))
     limited = LimitedBounds(bounds, usable, asked.deviations, cap, peak, asked.noise)
     entries = [limited.left(entry) for entry in asked.limits]
     return replace(
@@ -191,16 +189,13 @@ def _reaching(asked: InputRequest) -> Reaching | None:
 
 def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
-    (P, scale), constants = form.entries, [Fraction(0)] * n
+    P, scale = form.entries
     above = arithmetic().above(P, diagonal([1] * len(P)))
-    if above is None:
-        return None
-    try:
-        for v, value in zip(form.nodes, above, strict=True):
-            constants[v] = kept(value * scale * (1 + RAISE))
-    except OverflowError:
-        return None
-    return tuple(constants)
+    with suppress(OverflowError):
+        if above is not None:
+            known = {v: kept(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
+            return tuple(known.get(v, Fraction(0)) for v in range(n))
+    return None
 
 
 def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
@@ -210,8 +205,7 @@ def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]
     how = tuple(a for a in agents if a is not None)
     if norm is None or len(how) < len(agents):
         return None
-    try:
+    with suppress(OverflowError):
         whole = kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
         return Peak(tuple(kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
-    except OverflowError:
-        return None
+    return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
@@ -112,15 +111,6 @@ class LimitedBounds:
             grown = (sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items())
             return min(grown, default=math.inf)
 
-        def proved(period: Fraction) -> bool:
-            sampled = Limits(limits.gain_cap, limits.stop_before, period)
-            with suppress(ValueError, ArithmeticError):
-                for k, m in growths.items():
-                    left = bounds.share(k, sampled, Fraction(0), m) * bounds.start(k)
-                    if kept(bounds.root_constant(k, None) * left) <= self.first:
-                        return True
-            return False
-
         high = nearest_float(limits.sample_period or gain.T)
         low = high / 2
         while low >= SHORTEST_SHARE * T and excess(low) > 0:
@@ -131,7 +121,7 @@ class LimitedBounds:
             middle = (low + high) / 2
             low, high = (middle, high) if excess(middle) <= 0 else (low, middle)
         tried = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
-        return next((period for period in tried if proved(period)), None)
+        return next((h for h in tried if self.left(replace(limits, sample_period=h)) is not None), None)
 
 
 def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
