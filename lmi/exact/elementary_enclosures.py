@@ -95,7 +95,8 @@ def _enclosed(function: Callable[[Context, Decimal], Decimal], x: Fraction, bits
     digits, ends = bits // 3 + 20, []
     for rounding, side in ((ROUND_FLOOR, Decimal(-1)), (ROUND_CEILING, Decimal(1))):
         context = Context(prec=digits, rounding=rounding, Emin=MIN_EMIN, Emax=MAX_EMAX)
-        value = function(context, context.divide(Decimal(x.numerator), Decimal(x.denominator)))
+        short = rounded(x, 4 * digits, up=side > 0)  # long integers are slow to become decimals
+        value = function(context, context.divide(Decimal(short.numerator), Decimal(short.denominator)))
         end = context.fma(context.abs(value), context.scaleb(side, 3 - digits), value)
         ends.append(rounded(Fraction(end), bits + SPARE_BITS, up=side > 0))
     return ends[0], ends[1]

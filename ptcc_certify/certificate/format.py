@@ -97,7 +97,7 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
     start, ends = data.state(document["initial_state"]), None
     if paper is not None and paper["rho_interval"] is not None:
         ends = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
-    effort = read_effort(document["input"], start, structure, protocol, data, steps)
+    effort = read_effort(document, structure, protocol, data, steps)
     return {
         "structure": structure,
         "protocol": protocol,

@@ -41,11 +41,9 @@ def effort_section(effort: Effort | None, out: Writer) -> Any:
     agents, initial_set = partial(out.state, "input"), effort.initial_set
     region: dict[str, Any] | None = None
     if initial_set is not None:
-        region = {"center": agents(initial_set.center)}
-        if initial_set.axes:
-            region["axes"] = list(map(agents, initial_set.axes))
-        else:
-            region["radius"] = agents(initial_set.radius or (Fraction(0),) * len(out.labels))
+        radius = initial_set.radius or (Fraction(0),) * len(out.labels)
+        extent = {"axes": list(map(agents, initial_set.axes))} if initial_set.axes else {"radius": agents(radius)}
+        region = {"center": agents(initial_set.center), **extent}
     peak, sliding, disturbed = effort.peak, effort.sliding, effort.disturbed
     residual = [
         {key: text(getattr(entry.limits, key)) for key in LIMITS}
@@ -81,15 +79,9 @@ def energy_witness(energy: EnergyIntegral) -> Said:
     return {"W0": first, "W1": second}
 
 
-def read_effort(
-    said: Said | None,
-    start: tuple[Fraction, ...] | None,
-    structure: Structure,
-    protocol: Protocol,
-    data: Reader,
-    steps: Steps,
-) -> Effort | None:
+def read_effort(document: Said, structure: Structure, protocol: Protocol, data: Reader, steps: Steps) -> Effort | None:
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
+    said, start = document["input"], data.state(document["initial_state"])
     if said is None:
         return None
     region, initial_set, sliding = said["initial_set"], None, said["sliding"]

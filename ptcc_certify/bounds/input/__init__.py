@@ -45,7 +45,6 @@ from ptcc_certify.checker.input_formulas import (
     peak_above,
     root_above,
 )
-from ptcc_certify.checker.matrices import diagonal
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols import Protocol
 
@@ -110,9 +109,8 @@ def bound_effort(asked: InputRequest) -> Effort:
         return effort
     constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in asked.forms)
     region = asked.initial_set or InitialSet(tuple(asked.start or ()))
-    bounds = InputBounds(
-        structure.graph.exact_rows(range(n)), gain.exact, asked.forms, constants, region, _reaching(asked)
-    )
+    rows = structure.graph.exact_rows(range(n))
+    bounds = InputBounds(rows, gain.exact, asked.forms, constants, region, _reaching(asked))
     usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None if own is None else _peak(bounds, usable, own)
@@ -190,7 +188,7 @@ def _reaching(asked: InputRequest) -> Reaching | None:
 def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
     P, scale = form.entries
-    above = arithmetic().above(P, diagonal([1] * len(P)))
+    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
     with suppress(OverflowError):
         if above is not None:
             known = {v: kept(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
