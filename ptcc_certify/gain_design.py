@@ -502,7 +502,7 @@ def _lower_product(base: Certificate, asked: Asked) -> tuple[Fraction | None, st
     known, initial_set, graph = [(Fraction(0), "")], asked.initial_set, base.graph
     agents = [shorten(label) for label in graph.labels]
     if base.influence.exact and graph.n_nodes <= INPUT_NODES:
-        for agent, row in zip(agents, ways(initial_set, base.influence), strict=True):
+        for agent, row in zip(agents, ways(base.influence), strict=True):
             way = _largest_below(initial_set, row) - (asked.residual or 0)
             known.append((way, f"the way of agent {agent} to its final state"))
     limit = base.upper_bound

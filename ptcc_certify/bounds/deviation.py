@@ -16,7 +16,6 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -24,8 +23,10 @@ from lmi.exact import arithmetic
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.fast import floats, unit_diagonal
 from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.input.initial_set import ways
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
+from ptcc_certify.theorems.base import integer_matrix, integer_rows
 
 #: Bits of the constants that are kept.
 KEPT_BITS = 40
@@ -76,20 +77,11 @@ class DeviationGeometry:
     @cached_property
     def _deviation(self) -> tuple[Integers, int]:
         """``D = I - Q`` times a scale on the columns ``kept``, and the scale."""
-        rows = [
-            {j: -Fraction(x) for j, x in self._influence.row(v).items()} for v in range(self._structure.graph.n_nodes)
-        ]
-        for v, row in enumerate(rows):
-            row[v] = row.get(v, Fraction(0)) + 1
-        return self._on_kept(rows)
+        return self._on_kept(ways(self._influence))
 
     def _on_kept(self, rows: Sequence[Mapping[int, Fraction]]) -> tuple[Integers, int]:
         """Return sparse rows times a scale on the columns ``kept``, and the scale."""
-        kept = set(self._kept)
-        parts = [{j: x for j, x in row.items() if j in kept} for row in rows]
-        scale = math.lcm(*{x.denominator for row in parts for x in row.values()})
-        whole = ({j: int(x * scale) for j, x in row.items()} for row in parts)
-        return [[row.get(j, 0) for j in self._kept] for row in whole], scale
+        return _over_one_scale([[row.get(j, Fraction(0)) for j in self._kept] for row in rows])
 
     def _error_form(self, V: LyapunovFunction) -> tuple[Integers, Fraction]:
         """Return ``L'P L`` times a scale on ``kept``, and the scale."""
@@ -101,9 +93,9 @@ class DeviationGeometry:
             (weights,), scale = _over_one_scale([V.weights])
             moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(V.nodes, weights, strict=True)])
         else:
-            P, scale = _over_one_scale(V.matrix)
-            moved = flint.fmpz_mat(P) * rows
-        return _rows(rows.transpose() * moved), Fraction(scale * unit**2)
+            P, scale = integer_matrix(V.matrix)
+            moved = P * rows
+        return integer_rows(rows.transpose() * moved), Fraction(scale * unit**2)
 
     def _mean_form(self, p: Sequence[Fraction]) -> tuple[Integers, Fraction]:
         """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``, and the scale."""
@@ -117,12 +109,8 @@ class DeviationGeometry:
 
 def _over_one_scale(rows: Sequence[Sequence[Fraction]]) -> tuple[Integers, int]:
     """Return rational rows times their common denominator, and that."""
-    scale = math.lcm(*{x.denominator for row in rows for x in row})
-    return [[x.numerator * (scale // x.denominator) for x in row] for row in rows], scale
-
-
-def _rows(M: Any) -> Integers:
-    return [[int(x) for x in row] for row in M.tolist()]
+    whole, scale = integer_matrix(rows)
+    return integer_rows(whole), scale
 
 
 def _constants(F: Integers, D: Integers) -> list[Fraction] | None:

@@ -18,9 +18,9 @@ import numpy as np
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState
 from ptcc_certify.bounds.final_state_enclosure import rounding_radius
-from ptcc_certify.bounds.input import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
+from ptcc_certify.bounds.input import EnergyIntegral, Peak
 from ptcc_certify.certificate.content import Content, Observations, Source
-from ptcc_certify.certificate.format_effort import read_effort
+from ptcc_certify.certificate.format_effort import effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import (
@@ -76,7 +76,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "influence": influence,
         "final_state": final,
         "reaching_time": _write_reaching(content),
-        "input": effort_section(content.effort, graph.labels, format_exact),
+        "input": effort_section(content.effort, out),
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
@@ -98,7 +98,7 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
     start, ends = data.state(document["initial_state"]), None
     if paper is not None and paper["rho_interval"] is not None:
         ends = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
-    effort = read_effort(document["input"], start, structure, protocol, data, steps)
+    effort = read_effort(document, structure, protocol, data, steps)
     return {
         "structure": structure,
         "protocol": protocol,
@@ -348,9 +348,9 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     if isinstance(witness, Dominance):
         witness = _dominance_witness(witness, out)
     elif isinstance(witness, EnergyIntegral):
-        witness = energy_witness(witness, format_exact)
+        witness = energy_witness(witness)
     elif isinstance(witness, Peak):
-        witness = peak_witness(witness, out.labels, format_exact)
+        witness = peak_witness(witness, out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):

@@ -1,9 +1,10 @@
-"""What is proved about the input, read from a certificate's file; :func:`effort_section` writes it."""
+"""What is proved about the input, as a certificate's file has it: written, and read again."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from ptcc_certify.bounds.input import (
@@ -18,7 +19,7 @@ from ptcc_certify.bounds.input import (
     Witness,
     first_input,
 )
-from ptcc_certify.certificate.vectors import Reader, number
+from ptcc_certify.certificate.vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.nominal import Protocol
@@ -27,44 +28,85 @@ from ptcc_certify.theorems.base import Obligation
 Steps = Mapping[tuple[str, str], Obligation]
 Said = Mapping[str, Any]
 
+ENDS = ("lower", "upper")
+LIMITS = ("gain_cap", "stop_before", "sample_period")
+#: Keys under ``noise`` of what limits leave, and the attributes of :class:`~ptcc_certify.bounds.input.Limited`.
+NOISE = {"bound": "noise", "norm": "noisy_norm", "largest": "noisy_largest"}
 
-def read_effort(
-    section: Said | None,
-    start: tuple[Fraction, ...] | None,
-    structure: Structure,
-    protocol: Protocol,
-    data: Reader,
-    steps: Steps,
-) -> Effort | None:
+
+def effort_section(effort: Effort | None, out: Writer) -> Any:
+    """Return the section ``input`` of a certificate."""
+    if effort is None:
+        return None
+    agents, initial_set = partial(out.state, "input"), effort.initial_set
+    region: dict[str, Any] | None = None
+    if initial_set is not None:
+        radius = initial_set.radius or (Fraction(0),) * len(out.labels)
+        extent = {"axes": list(map(agents, initial_set.axes))} if initial_set.axes else {"radius": agents(radius)}
+        region = {"center": agents(initial_set.center), **extent}
+    peak, sliding, disturbed = effort.peak, effort.sliding, effort.disturbed
+    residual = [
+        {key: text(getattr(entry.limits, key)) for key in LIMITS}
+        | {"clock": text(entry.clock), "norm": text(entry.norm)}
+        | {"agents": agents(entry.agents), "largest": text(entry.largest)}
+        | {"noise": entry.noise and {key: text(getattr(entry, name)) for key, name in NOISE.items()}}
+        for entry in effort.residual
+    ]
+    return {
+        "bounded": effort.bounded,
+        "threshold": dict(zip(ENDS, map(text, effort.threshold), strict=True)),
+        "initial_set": region,
+        "constants": list(map(agents, effort.constants)),
+        "peak": peak and {"agents": agents(peak.agents), "largest": text(peak.largest), "norm": text(peak.norm)},
+        "energy": effort.energy and text(effort.energy.value),
+        "path_length": effort.path_length and text(effort.path_length.value),
+        "sliding": sliding and {"bounded": sliding.bounded, "agents": agents(sliding.agents)},
+        "residual": residual,
+        "disturbed": disturbed
+        and {"delta": text(disturbed.delta), "inputs": agents(disturbed.inputs), "drift": agents(disturbed.drift)},
+    }
+
+
+def peak_witness(peak: Peak, out: Writer) -> Said:
+    """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
+    agents = {label: [how.function, text(how.z)] for label, how in zip(out.labels, peak.how, strict=True)}
+    return {"agents": agents, "norm": peak.norm_how.function}
+
+
+def energy_witness(energy: EnergyIntegral) -> Said:
+    """Return the lower triangles of the matrices that prove the energy."""
+    first, second = ([list(map(text, row[: i + 1])) for i, row in enumerate(W)] for W in energy.matrices)
+    return {"W0": first, "W1": second}
+
+
+def read_effort(document: Said, structure: Structure, protocol: Protocol, data: Reader, steps: Steps) -> Effort | None:
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
+    section, start = document["input"], data.state(document["initial_state"])
     if section is None:
         return None
-    initial_set, sliding, threshold = _starts(section["initial_set"], data), section["sliding"], section["threshold"]
-    region = initial_set or (None if start is None else InitialSet(start))
+    region, initial_set, sliding = section["initial_set"], None, section["sliding"]
+    if region is not None:
+        axes = tuple(map(data.agents, region.get("axes", ())))
+        initial_set = InitialSet(data.agents(region["center"]), () if axes else data.agents(region["radius"]), axes)
+    begin = initial_set or (None if start is None else InitialSet(start))
+    lower, upper = (number(section["threshold"][key]) for key in ENDS)
     return Effort(
         bounded=section["bounded"],
         by=None if section["bounded"] is None else steps["input-threshold", "input"].witness,
-        threshold=(number(threshold["lower"]), number(threshold["upper"])),
+        threshold=(lower, upper),
         initial_set=initial_set,
         constants=tuple(map(data.state, section["constants"])),
         peak=_peak(section["peak"], data, steps),
         energy=_energy(section["energy"], steps),
         path_length=_witness(section["path_length"], "input-length", steps),
-        sliding=None if sliding is None else SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
+        sliding=sliding and SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
             _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
             for k, entry in enumerate(section["residual"])
         ),
         disturbed=_disturbed(section["disturbed"], data, steps),
-        first=None if region is None else first_input(structure, protocol, region),
+        first=None if begin is None else first_input(structure, protocol, begin),
     )
-
-
-def _starts(section: Said | None, data: Reader) -> InitialSet | None:
-    if section is None:
-        return None
-    axes = tuple(map(data.agents, section.get("axes", ())))
-    return InitialSet(data.agents(section["center"]), () if axes else data.agents(section["radius"]), axes)
 
 
 def _witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
@@ -86,32 +128,25 @@ def _energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | Non
 def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
     if section is None:
         return None
-    step = steps["input-peak", "input"]
-    agents, norm = data.agents(section["agents"]), exact(section["norm"])
-    how = step.witness["agents"].values()
-    return Peak(
-        agents,
-        tuple(Witness(bound, k, exact(z)) for bound, (k, z) in zip(agents, how, strict=True)),
-        norm,
-        Witness(norm, step.witness["norm"], step.numbers["z"]),
-    )
+    step, agents, norm = steps["input-peak", "input"], data.agents(section["agents"]), exact(section["norm"])
+    how = zip(agents, step.witness["agents"].values(), strict=True)
+    each = tuple(Witness(bound, k, exact(z)) for bound, (k, z) in how)
+    return Peak(agents, each, norm, Witness(norm, step.witness["norm"], step.numbers["z"]))
 
 
 def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
     noise = section["noise"] or {}
-    first, second = (*step.witness, None)[:2] if isinstance(step.witness, list) else (step.witness, None)
+    first, second = step.witness if noise else (step.witness, None)
     return Limited(
-        limits=Limits(*(number(section[key]) for key in ("gain_cap", "stop_before", "sample_period"))),
+        limits=Limits(*(number(section[key]) for key in LIMITS)),
         clock=exact(section["clock"]),
         function=first,
         growth=step.numbers["growth"],
         norm=exact(section["norm"]),
         agents=data.state(section["agents"]),
         largest=number(section["largest"]),
-        noise=number(noise.get("bound")),
         noise_function=second,
-        noisy_norm=number(noise.get("norm")),
-        noisy_largest=number(noise.get("largest")),
+        **{name: number(noise.get(key)) for key, name in NOISE.items()},
     )
 
 

@@ -274,7 +274,7 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
     if effort is None:
         return Fraction(0), None
-    tops = [top for entry in certificate.limits if (top := entry.largest_gain(p.gain.exact)) is not None]
+    tops = [entry.largest_gain(p.gain.exact) for entry in certificate.limits]
     share = min([Fraction(1), *(top / p.gain.first for top in tops)])
     least: Fraction | float = (effort.first or Fraction(0)) * share
     if certificate.noise is not None:

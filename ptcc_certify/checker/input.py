@@ -17,14 +17,14 @@ from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
+from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
 from ptcc_certify.checker.side_vectors import Numbers
 from ptcc_certify.checker.structure import Structure
 
-KEYS = ("bounded", "threshold", "initial_set", "constants", "peak", "energy", "path_length", "sliding")
+KEYS = ("bounded", "threshold", "initial_set", "constants", "sliding")
 LIMIT_KEYS = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
 #: Graphs up to this size have bounds of the input.
 INPUT_NODES = 400
@@ -78,34 +78,25 @@ def check_input(doc: Document, known: Verified) -> None:
     need((said is not None) == decays, "the input is spoken of iff the decay is proved")
     if said is None:
         return
-    fields(said, (*KEYS, "residual", "disturbed"), "input")
+    fields(said, (*KEYS, *PARTS), "input")
+    need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
     _threshold(doc, known, said)
     constants = _constants(doc, known, entries(said["constants"], "constants", len(known.functions)))
     _sliding(doc, known, said["sliding"])
     initial_set = _starts(doc, known, said["initial_set"])
     if initial_set is None:
-        for key in ("peak", "energy", "path_length", "disturbed"):
-            need(said[key] is None, f"{key} without an initial state, or of too large a graph")
-        need(said["residual"] == [], "limits without an initial state, or of too large a graph")
+        for key in PARTS:
+            empty = said[key] is None or (key == "residual" and not said[key])
+            need(empty, f"{key} without an initial state, or of too large a graph")
         return
     try:
         bounds = _bounds(doc, known, initial_set, constants)
-        _peak(doc, known, said["peak"], bounds)
-        _integral(doc, known, said["energy"], bounds)
-        _length(doc, known, said["path_length"], bounds)
-        need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
-        for k, entry in enumerate(said["residual"]):
-            _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
-        _disturbed(doc, known, said["disturbed"], bounds)
-    except ValueError as error:
+        for key, verify in PARTS.items():
+            doc.at = f"input.{key}"
+            if said[key] is not None:
+                verify(doc, known, said, bounds)
+    except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
-
-
-def _function(known: Verified, k: Any) -> int:
-    """Return the number of a Lyapunov function."""
-    if type(k) is not int or not 0 <= k < len(known.functions):
-        raise RejectedError("there is no such Lyapunov function")
-    return k
 
 
 def _each(doc: Document, known: Verified, said: Any, what: str) -> Numbers:
@@ -168,28 +159,25 @@ def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
 
 def _constants(doc: Document, known: Verified, said: Sequence[Any]) -> list[list[Fraction] | None]:
     """Verify ``e_k^2 <= c_k V`` for full matrices; for diagonal ones the constants follow."""
-    found: list[list[Fraction] | None] = []
+    found: list[list[Fraction] | None] = [None] * len(said)
     for k, (given, function) in enumerate(zip(said, known.functions, strict=True)):
         doc.at = f"input.constants[{k}]"
         if given is None:
-            found.append(None)
             continue
         form = function.form
         if form is None or form.matrix is None:
             raise RejectedError("constants that follow from a diagonal")
         doc.open("input-constants", f"lyapunov.functions[{k}]")
-        constants = list(_each(doc, known, given, "constants"))
-        P, scale = integers(form.matrix)
-        place, forms = {v: i for i, v in enumerate(form.nodes)}, []
+        constants, (P, scale), forms = list(_each(doc, known, given, "constants")), form.entries, []
         for v, c in enumerate(constants):
             p, q = (c / scale).as_integer_ratio()
             sized(v + 1, longest((q, q * p)), "constants")
-            forms.append(([q * (place.get(v) == i) for i in range(len(P))], q * p))
+            forms.append(([q * (own == v) for own in form.nodes], q * p))
         failed = doc.exact.bounded(P, forms)
         label = known.structure.graph.labels[failed or 0]
         need(failed is None, f"the constant of agent {shorten(label)} is not proved")
         doc.done(f"at most {up(max(constants))}")
-        found.append(constants)
+        found[k] = constants
     return found
 
 
@@ -249,69 +237,66 @@ def _bounds(
 
 def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
-    doc.at = "input.peak"
-    if said is None:
-        return
-    fields(said, ("agents", "largest", "norm"), "peak")
+    said = fields(said["peak"], ("agents", "largest", "norm"), "peak")
     step = doc.open("input-peak", "input", ["z"], witness=True)
     witness = fields(step["witness"], ("agents", "norm"), "the witness")
     ways = ordered(known.structure.graph.labels, witness["agents"], "agents").values()
     own = known.sliding_part() if known.protocol.sliding else [Fraction(0)] * len(bounds.rows)
     least = []
     for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in ways):
-        least.append(bounds.bound(formulas.peak_above, v, _function(known, k), exact(z)) + own[v])
+        least.append(bounds.bound(formulas.peak_above, v, k, exact(z)) + own[v])
     peaks = _above(doc, known, said["agents"], "the peak", least)
     need(exact(said["largest"]) == max(peaks), "the largest peak is another")
-    norm = bounds.bound(formulas.peak_above, None, _function(known, witness["norm"]), step["z"])
+    norm = bounds.bound(formulas.peak_above, None, witness["norm"], step["z"])
     norm += formulas.root_above(sum((x * x for x in own), Fraction(0)))
     need(exact(said["norm"]) >= norm, "the peak of the norm is not proved")
     doc.done(f"at most {up(max(peaks))}, norm {up(exact(said['norm']))}")
 
 
-def _length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
-    """Verify the length of the path."""
-    doc.at = "input.path_length"
-    if said is not None:
-        step = doc.open("input-length", "input", ["z"], witness=True)
-        least = bounds.bound(formulas.length_above, None, _function(known, step["witness"]), step["z"])
-        need(exact(said) >= least, "the bound is not proved")
-        doc.done(f"at most {up(exact(said))}")
-
-
-def _integral(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
-    """Verify the energy: by one function, or by ``L'W + W L - c W > m I`` on the range of ``L`` for two matrices."""
-    doc.at = "input.energy"
-    if said is None:
+def _energy(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the energy, by one function or by two matrices."""
+    if not isinstance(doc.following.get("witness"), dict):
+        _by_function(doc, said["energy"], "input-energy", formulas.energy_above, bounds)
         return
-    if isinstance(doc.following.get("witness"), dict):
-        step = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
-        matrices = fields(step["witness"], ("W0", "W1"), "the witness")
-        need(bounds.reaching is None, "sliding variables move")
-        even = _remainder(doc, known, matrices, "W0", step["m0"], bounds)
-        grown = _remainder(doc, known, matrices, "W1", step["m1"], bounds)
-        least = formulas.integral_above(known.gain, even, grown, step["p"])
-    else:
-        step = doc.open("input-energy", "input", ["z"], witness=True)
-        least = bounds.bound(formulas.energy_above, None, _function(known, step["witness"]), step["z"])
-    need(exact(said) >= least, "the bound is not proved")
-    doc.done(f"at most {up(exact(said))}")
+    step = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
+    matrices = fields(step["witness"], ("W0", "W1"), "the witness")
+    need(bounds.reaching is None, "sliding variables move")
+    even = _remainder(doc, known, matrices["W0"], Fraction(0), step["m0"], bounds)
+    grown = _remainder(doc, known, matrices["W1"], 1 / known.gain.k, step["m1"], bounds)
+    _at_most(doc, said["energy"], formulas.integral_above(known.gain, even, grown, step["p"]))
+
+
+def _path_length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify the length of the path."""
+    _by_function(doc, said["path_length"], "input-length", formulas.length_above, bounds)
+
+
+def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
+    """Verify a bound for the norm that follows from one function and an instant."""
+    step = doc.open(kind, "input", ["z"], witness=True)
+    _at_most(doc, bound, bounds.bound(of, None, step["witness"], step["z"]))
+
+
+def _at_most(doc: Document, bound: Any, least: Fraction) -> None:
+    need(exact(bound) >= least, "the bound is not proved")
+    doc.done(f"at most {up(exact(bound))}")
 
 
 def _remainder(
-    doc: Document, known: Verified, said: Any, key: str, m: Fraction, bounds: formulas.InputBounds
+    doc: Document, known: Verified, said: Any, c: Fraction, m: Fraction, bounds: formulas.InputBounds
 ) -> Fraction:
-    """Verify ``W L + L'W - c W - m I > 0`` on the range of ``L``, ``c`` being 0 or ``1/k``, then ``W > 0`` besides.
+    """Verify ``W L + L'W - c W > m I`` on the range of ``L``, and ``W > 0`` besides unless ``c = 0``.
 
     Returns a bound of the integral of ``e^(c s) ||E||^2``.
     """
-    graph, nodes, c = known.structure.graph, known.structure.graph.listening, (key == "W1") / known.gain.k
+    graph, nodes = known.structure.graph, known.structure.graph.listening
     need_rows(graph.n)
-    rows = triangle(said[key], len(nodes))
+    rows = triangle(said, len(nodes))
     W, scale = integers(rows)
     S, more = decrease(doc.exact, W, block(graph, nodes), c, graph.unit)
-    for T in [less(S, m * scale * more), *([W] if c else [])]:  # W0 > 0 need not be known: E tends to 0
+    for T in [less(S, m * scale * more), *([W] if c else [])]:  # W > 0 need not be known for c = 0: E tends to 0
         proved = m > 0 and doc.exact.definite(_on_range(doc, known.structure, T))
-        need(proved, f"the inequality of {key} is not proved")
+        need(proved, f"the inequality of {'W1' if c else 'W0'} is not proved")
     return bounds.largest_form(rows) / m
 
 
@@ -329,6 +314,12 @@ def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
 # ---------------------------------------------------------------------- limits of actuators
 
 
+def _residual(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+    """Verify what is left under each of the limits."""
+    for k, entry in enumerate(said["residual"]):
+        _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
+
+
 def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, bounds: formulas.InputBounds) -> None:
     """Verify what is left at the deadline under limits of the gain, and the largest input."""
     doc.at = of
@@ -339,10 +330,10 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
     need(stop is None or stop < known.gain.T, "a stop beyond the deadline")
     need(period is None or period <= known.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
-    top = limits.top(known.gain)
+    top = limits.largest_gain(known.gain)
     step = doc.open("limited-gain", of, ["growth"], witness=True)
     chosen = [step["witness"]] if said["noise"] is None else entries(step["witness"], "the witness", 2)
-    k = _function(known, chosen[0])
+    k = chosen[0]
     form = bounds.form(k)
     need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
     if period is not None:
@@ -367,7 +358,7 @@ def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, boun
         need(period is None, "noise of a held gain")
         noise = {key: exact(x) for key, x in fields(said["noise"], ("bound", "norm", "largest"), "noise").items()}
         need(noise["bound"] > 0, "noise of no size")
-        whole, each = bounds.noisy(_function(known, chosen[1]), noise["bound"])
+        whole, each = bounds.noisy(chosen[1], noise["bound"])
         need(noise["norm"] >= norm + whole, "what is left by noise is not proved")
         largest = exact(said["largest"]) + top * max(each)
         need(noise["largest"] >= largest, "the largest input under noise is not proved")
@@ -386,8 +377,7 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
     """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
     graph = structure.graph
     need(form.coordinates == "E", "deviations say nothing of a step")
-    P = integers(form.matrix)[0] if form.matrix else diagonal(integers([form.diagonal or []])[0][0])
-    F = congruence(doc.exact, P, [graph.row(v) for v in form.nodes], graph.n)
+    F = congruence(doc.exact, form.entries[0], [graph.row(v) for v in form.nodes], graph.n)
     step = congruence(doc.exact, F, block(graph, range(graph.n)), graph.n)
     p, q = (growth * graph.unit**2).as_integer_ratio()
     bits, ratio = longest(chain.from_iterable([*F, *step])), longest((p, q))
@@ -402,17 +392,17 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
 
 def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
-    doc.at = "input.disturbed"
-    if said is None:
-        return
     need(not known.protocol.sliding, "the sliding-mode protocol has its own claims")
-    fields(said, ("delta", "inputs", "drift"), "disturbed")
+    said = fields(said["disturbed"], ("delta", "inputs", "drift"), "disturbed")
     step = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
     delta = exact(said["delta"])
     need(delta == step["delta"] and delta > 0, "another delta")
-    inputs = bounds.disturbed(_function(known, step["witness"]), delta)
-    _above(doc, known, said["inputs"], "the input", inputs)
+    _above(doc, known, said["inputs"], "the input", bounds.disturbed(step["witness"], delta))
     if said["drift"] is not None:
         drift = [delta * known.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in known.final.projection]
         _above(doc, known, said["drift"], "the drift", drift)
     doc.done(f"for every disturbance within {down(delta)}")
+
+
+#: What is verified of initial states, by key, in the order of the proof.
+PARTS = {"peak": _peak, "energy": _energy, "path_length": _path_length, "residual": _residual, "disturbed": _disturbed}

@@ -9,16 +9,20 @@ arguments are rationals, every rounding is upwards (or downwards where a name sa
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from itertools import islice
+from itertools import chain, pairwise
+from operator import mul
 from typing import Any, NamedTuple
 
+from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import LARGEST_EXPONENT, exp, log, rounded, sqrt
+from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
+from ptcc_certify.checker.matrices import Matrix, congruence, diagonal
+from ptcc_certify.checker.reading import Interval, length
 
 #: Bits to which bounds are rounded.
 BITS = 64
@@ -29,7 +33,6 @@ LAST_PERIODS = 2000
 
 Linear = Mapping[int, Fraction]
 Rows = Sequence[Sequence[Fraction]]
-Interval = tuple[Fraction, Fraction]
 Of = Callable[["PrescribedGain", Fraction, Fraction, Fraction, Fraction], Fraction]
 
 
@@ -41,18 +44,23 @@ def root_above(x: Fraction) -> Fraction:
     >>> float(root_above(Fraction(9, 4)))
     1.5
     """
-    return rounded(sqrt(rounded(x, BITS, up=True), BITS)[1], BITS, up=True)
+    return rounded(sqrt(x, BITS)[1], BITS, up=True)
 
 
 def decay_above(x: Fraction) -> Fraction:
-    """Bound ``e^-x`` from above for ``x >= 0``; beyond ``x = 100,000`` it is no longer made smaller.
+    """Bound ``e^-x`` from above; beyond ``x = 100,000`` it is no longer made smaller.
+
+    Raises
+    ------
+    OverflowError
+        ``x`` is below -100,000.
 
     Examples
     --------
     >>> float(decay_above(Fraction(1)))
     0.36787944117144233
     """
-    return exp(-min(rounded(x, BITS), Fraction(LARGEST_EXPONENT)), BITS)[1]
+    return exp(-rounded(x, BITS), BITS)[1]
 
 
 @dataclass(frozen=True)
@@ -67,25 +75,29 @@ class PrescribedGain:
     Examples
     --------
     >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
-    >>> float(gain.above(Fraction(0))), float(gain.clock_below(Fraction(1)))
-    (3.0, 2.6321205588285577)
+    >>> half = log(Fraction(2))[0], Fraction(1, 2)  # z and 1 - t/T
+    >>> gain.value(half[1]), float(gain.clock(*half))
+    (Fraction(5, 1), 1.8862943611198906)
     """
 
     T: Fraction
     rho1: Fraction
     k: Fraction
 
-    def above(self, z: Fraction) -> Fraction:
-        """Bound the gain at ``z`` from above."""
-        return rounded(self.rho1 + self.k / self.T * exp(z, BITS)[1], BITS, up=True)
+    def value(self, q: Fraction) -> Fraction:
+        """Return the gain where ``1 - t/T = q``; from above for a lower bound of ``q``."""
+        return self.rho1 + self.k / (self.T * q)
 
-    def clock_below(self, z: Fraction) -> Fraction:
-        """Bound the clock ``s`` at ``z`` from below."""
-        return rounded(self.rho1 * self.T * (1 - exp(-z, BITS)[1]) + self.k * z, BITS)
+    def clock(self, z: Fraction, q: Fraction) -> Fraction:
+        """Return the clock, the integral of the gain, where ``1 - t/T = q = e^-z``.
 
-    def clock_above(self, z: Fraction) -> Fraction:
-        """Bound the clock ``s`` at ``z`` from above."""
-        return rounded(self.rho1 * self.T * (1 - exp(-z, BITS)[0]) + self.k * z, BITS, up=True)
+        From above for a lower bound of ``q`` and an upper one of ``z``, from below for the others.
+        """
+        return self.rho1 * self.T * (1 - q) + self.k * z
+
+    def square(self, z: Fraction, q: Fraction) -> Fraction:
+        """Return the integral of the square of the gain where ``1 - t/T = q = e^-z``; rounded like :meth:`clock`."""
+        return self.rho1**2 * self.T * (1 - q) + 2 * self.rho1 * self.k * z + self.k**2 / self.T * (1 / q - 1)
 
 
 def peak_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
@@ -109,15 +121,16 @@ def peak_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Frac
     """
     if rate * gain.k < 2:
         raise ValueError("the input is not bounded by this rate")
-    top = gain.above(z)
-    late = start * decay_above(rate / 2 * gain.clock_below(z)) * top
+    low, high = exp(-z, BITS)
+    top = gain.value(low)
+    late = start * decay_above(rate / 2 * gain.clock(z, high)) * top
     return rounded(late if z == 0 else max(held * top, late), BITS, up=True)
 
 
 def energy_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
     """Bound ``int_0^T (gain |e|)^2 dt`` for ``rate k > 1``.
 
-    Up to ``z`` it is ``held^2 (rho1^2 t + 2 rho1 k z + (k^2/T)(e^z - 1))``, and from there on, integrated by parts,
+    Up to ``z`` it is ``held^2 int_0^t gain^2 dt``, and from there on, integrated by parts,
     ``start^2 e^(-rate s) (gain + (k/T) e^z / (rate k - 1)) / rate`` at most.
 
     Raises
@@ -131,14 +144,12 @@ def energy_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fr
     >>> round(float(energy_above(gain, Fraction(1), Fraction(1), Fraction(2), Fraction(0))), 6)  # int (1-t)^(2-2) dt
     1.0
     """
-    rho1, k, T = gain.rho1, gain.k, gain.T
-    if rate * k <= 1:
+    if rate * gain.k <= 1:
         raise ValueError("the energy is not bounded by this rate")
-    grown = exp(z, BITS)[1]
-    early = held**2 * (rho1**2 * T * (1 - exp(-z, BITS)[0]) + 2 * rho1 * k * z + k**2 / T * (grown - 1))
-    left = decay_above(rate * gain.clock_below(z))
-    late = start**2 * left * (gain.above(z) + k / T * grown / (rate * k - 1)) / rate
-    return rounded((early if z else 0) + late, BITS, up=True)
+    low, high = exp(-z, BITS)
+    late = start**2 * decay_above(rate * gain.clock(z, high)) / rate
+    late *= gain.value(low) + gain.k / (gain.T * low) / (rate * gain.k - 1)
+    return rounded((held**2 * gain.square(z, low) if z else 0) + late, BITS, up=True)
 
 
 def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
@@ -150,8 +161,9 @@ def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fr
     >>> float(length_above(gain, Fraction(1), Fraction(3), Fraction(2), Fraction(0)))
     3.0
     """
-    late = 2 / rate * start * decay_above(rate / 2 * gain.clock_below(z))
-    return rounded((held * gain.clock_above(z) if z else 0) + late, BITS, up=True)
+    low, high = exp(-z, BITS)
+    late = 2 / rate * start * decay_above(rate / 2 * gain.clock(z, high))
+    return rounded((held * gain.clock(z, low) if z else 0) + late, BITS, up=True)
 
 
 def integral_above(gain: PrescribedGain, even: Fraction, grown: Fraction, p: Fraction) -> Fraction:
@@ -205,30 +217,41 @@ class Limits:
     stop_before: Fraction | None = None
     sample_period: Fraction | None = None
 
-    def largest_gain(self, gain: PrescribedGain) -> Fraction | None:
-        """Return the largest value of ``gain`` that acts; None if it grows without limit."""
-        latest = self.stop_before
-        if self.sample_period is not None:
-            end = gain.T - (latest or 0)
-            periods = -(-end // self.sample_period)  # those that begin before the end
-            latest = gain.T - self.sample_period * (periods - 1)
-        ends = [self.gain_cap] if self.gain_cap is not None else []
-        if latest is not None:
-            ends.append(gain.rho1 + gain.k / latest)
-        return min(ends, default=None)
-
-    def top(self, gain: PrescribedGain) -> Fraction:
-        """Return the largest gain that acts of ``gain``.
+    def largest_gain(self, gain: PrescribedGain) -> Fraction:
+        """Return the largest value of ``gain`` that acts.
 
         Raises
         ------
         ValueError
             Nothing limits the gain.
         """
-        top = self.largest_gain(gain)
-        if top is None:
+        latest = self.end(gain) if self.sample_period is None else self.sample_period * (self.periods(gain) - 1)
+        if latest < gain.T:
+            return self.acting(gain, latest)
+        if self.gain_cap is None:
             raise ValueError("nothing limits the gain")
-        return top
+        return self.gain_cap
+
+    def acting(self, gain: PrescribedGain, t: Fraction) -> Fraction:
+        """Return what the cap leaves of ``gain`` at an instant before the deadline."""
+        value = gain.value(1 - t / gain.T)
+        return value if self.gain_cap is None else min(value, self.gain_cap)
+
+    def end(self, gain: PrescribedGain) -> Fraction:
+        """Return the instant from which on the gain is 0, or the deadline."""
+        return gain.T - (self.stop_before or 0)
+
+    def periods(self, gain: PrescribedGain) -> int:
+        """Return the number of periods that begin before the end.
+
+        Raises
+        ------
+        ValueError
+            Nothing is sampled.
+        """
+        if self.sample_period is None:
+            raise ValueError("nothing is sampled")
+        return -(-self.end(gain) // self.sample_period)
 
     def clock_below(self, gain: PrescribedGain) -> Fraction:
         """Bound the integral of the gain up to the deadline from below.
@@ -241,31 +264,25 @@ class Limits:
         ValueError
             Nothing limits the gain: the integral is infinite.
         """
-        T, rho1, k, top = gain.T, gain.rho1, gain.k, self.top(gain)
-        end, turn = T - (self.stop_before or 0), self._turn(gain, top)
-        s = rho1 * turn + k * log(T / (T - turn), BITS)[0] + top * (end - turn)
-        if self.sample_period is not None:
-            s -= self.sample_period * max(top - rho1 - k / T, Fraction(0))
-        return rounded(max(s, Fraction(0)), BITS)
+        lost = (self.sample_period or 0) * (self.largest_gain(gain) - self.acting(gain, Fraction(0)))
+        return rounded(max(self.integrals(gain)[0] - lost, Fraction(0)), BITS)
 
-    def square_above(self, gain: PrescribedGain) -> Fraction:
-        """Bound the integral of the square of ``gain`` up to the deadline from above, without sampling.
+    def integrals(self, gain: PrescribedGain) -> Interval:
+        """Bound the integral of ``gain`` up to the deadline from below, and that of its square from above.
+
+        Without sampling, but for the largest gain.
 
         Raises
         ------
         ValueError
-            Nothing limits the gain: the integral is infinite.
+            Nothing limits the gain: the integrals are infinite.
         """
-        T, rho1, k, top = gain.T, gain.rho1, gain.k, self.top(gain)
-        end, turn = T - (self.stop_before or 0), self._turn(gain, top)
-        squares = rho1**2 * turn + 2 * rho1 * k * log(T / (T - turn), BITS)[1] + k**2 * (1 / (T - turn) - 1 / T)
-        return rounded(squares + top**2 * (end - turn), BITS, up=True)
-
-    def _turn(self, gain: PrescribedGain, top: Fraction) -> Fraction:
-        """Return the instant from which on the gain is ``top``, the stop unless that comes first."""
-        if top <= gain.rho1 + gain.k / gain.T:
-            return Fraction(0)
-        return min(gain.T - gain.k / (top - gain.rho1), gain.T - (self.stop_before or 0))
+        top, end, turn = self.largest_gain(gain), self.end(gain), Fraction(0)  # from the turn on the gain is the top
+        if top > gain.value(Fraction(1)):
+            turn = min(gain.T - gain.k / (top - gain.rho1), end)
+        q = 1 - turn / gain.T
+        low, high = log(1 / q, BITS)
+        return gain.clock(low, q) + top * (end - turn), gain.square(high, q) + top**2 * (end - turn)
 
 
 def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: Fraction) -> Fraction:
@@ -279,7 +296,9 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
     Raises
     ------
     ValueError
-        There is no period, or the bound is too large to be formed.
+        There is no period.
+    OverflowError
+        The bound is too large to be formed.
 
     Examples
     --------
@@ -287,24 +306,16 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
     >>> sampled_above(gain, Limits(sample_period=Fraction(1, 2)), Fraction(1), Fraction(1))
     Fraction(7, 4)
     """
-    h, g0 = limits.sample_period, gain.rho1 + gain.k / gain.T
-    if h is None:
-        raise ValueError("nothing is sampled")
-    end = gain.T - (limits.stop_before or 0)
-    count = -(-end // h)
-    first = max(count - LAST_PERIODS, 0)
-    factor, bits = Fraction(1), _bits((gain.T, gain.rho1, gain.k, h, end, rate, growth, limits.gain_cap or h))
+    count, end, h = limits.periods(gain), limits.end(gain), limits.sample_period or Fraction(0)
+    first, factor = max(count - LAST_PERIODS, 0), Fraction(1)
+    bits = length((gain.T, gain.rho1, gain.k, h, end, rate, growth, limits.gain_cap or h))
     spend(300 * (count - first), bits, bits, "held gains")
     if first:
-        early = Limits(limits.gain_cap, gain.T - h * first)
-        lost = h * ((early.largest_gain(gain) or g0) - min(g0, limits.gain_cap or g0))
-        power = rate * max(early.clock_below(gain) - lost, Fraction(0)) - growth * h * early.square_above(gain)
-        if power < -LARGEST_EXPONENT:
-            raise ValueError("a bound that is too large to be formed")
-        factor = decay_above(power) if power >= 0 else exp(rounded(-power, BITS, up=True), BITS)[1]
+        clock, square = Limits(limits.gain_cap, gain.T - h * first).integrals(gain)
+        lost = h * (limits.acting(gain, h * first) - limits.acting(gain, Fraction(0)))
+        factor = decay_above(rate * max(clock - lost, Fraction(0)) - growth * h * square)
     for j in range(first, count):
-        g = gain.rho1 + gain.k / (gain.T - h * j)
-        eta = min(g, limits.gain_cap or g) * min(h, end - h * j)
+        eta = limits.acting(gain, h * j) * min(h, end - h * j)
         factor = rounded(factor * max(1 - eta * rate + eta**2 * growth, Fraction(0)), BITS, up=True)
     return factor
 
@@ -337,25 +348,16 @@ class Form:
     gauge: Sequence[int] = ()
 
     @cached_property
-    def entries(self) -> tuple[list[list[tuple[int, int]]], int]:
-        """The rows of ``P`` without zeros, pairs of place and entry, in integers over a scale; and the scale."""
-        lines = [[w] for w in self.diagonal] if self.diagonal is not None else self.matrix or ()
-        whole, scale = _whole([p for line in lines for p in line])
-        left = iter(whole)
-        first = range(len(lines)) if self.diagonal is not None else [0] * len(lines)
-        return [
-            [(j, p) for j, p in enumerate(islice(left, len(x)), i) if p] for i, x in zip(first, lines, strict=True)
-        ], scale
+    def entries(self) -> tuple[Matrix, int]:
+        """``P`` in integers over a scale, and the scale."""
+        P, scale = integers([self.diagonal] if self.diagonal is not None else self.matrix or [])
+        return (P if self.diagonal is None else diagonal(P[0])), scale
 
     def value(self, z: Sequence[Fraction], sizes: bool = False) -> Fraction:
-        """Return ``z'P z``, or ``z'|P| z`` with the sizes of the entries."""
-        (rows, common), (Z, scale) = self.entries, _whole(z)
-        total = sum(x * sum((abs(p) if sizes else p) * Z[j] for j, p in row) for x, row in zip(Z, rows, strict=True))
+        """Return ``z'P z``, or ``z'|P| z`` with the sizes of the entries, which bounds it where ``|z_i|`` is less."""
+        (P, common), ((Z,), scale) = self.entries, integers([z])
+        total = sum(x * sum(map(mul, map(abs, row) if sizes else row, Z)) for x, row in zip(Z, P, strict=True) if x)
         return Fraction(total, common * scale**2)
-
-    def largest_value(self, sizes: Sequence[Fraction]) -> Fraction:
-        """Bound ``z'P z`` where ``|z_i| <= sizes_i``."""
-        return self.value(sizes, sizes=True)
 
 
 @dataclass(frozen=True)
@@ -437,50 +439,41 @@ class Reaching:
     @cached_property
     def quiet(self) -> Fraction:
         """``z = ln(T/(T - t))``, ``T = T_r + T_s``, from above, of an instant from which on all are 0."""
-        left = self.T_s
-        if self.z is not None and self.z <= LARGEST_EXPONENT:
-            left += self.T_r * exp(-self.z, BITS)[0]
+        left = self.T_s + (0 if self.z is None else self.T_r * exp(-self.z, BITS)[0])
         return log((self.T_r + self.T_s) / left, BITS)[1]
 
     def decay(self, remaining: Interval) -> Interval:
         """Enclose ``psi`` where ``1 - t/T`` is within an interval."""
-        low, high = (((self.T_r + self.T_s) * x - self.T_s) / self.T_r for x in remaining)  # (T_r - t)/T_r
-        if high <= 0:
-            return Fraction(0), Fraction(0)
-        low, high = min(low, Fraction(1)), min(high, Fraction(1))
-        above = decay_above(max(self.mu2 * self.T_r * (1 - high) - self.power * log(high, BITS)[1], Fraction(0)))
-        if low <= 0:
-            return Fraction(0), above
-        push = rounded(self.mu2 * self.T_r * (1 - low) - self.power * log(low, BITS)[0], BITS, up=True)
-        return (exp(-push, BITS)[0] if push <= LARGEST_EXPONENT else Fraction(0)), above
+        low, high = (((self.T_r + self.T_s) * q - self.T_s) / self.T_r for q in remaining)
+        return self._psi(low, 0), self._psi(high, 1)
+
+    def _psi(self, share: Fraction, end: int) -> Fraction:
+        """Bound ``psi`` where ``(T_r - t)/T_r = share`` by the lower or the upper end of an enclosure."""
+        share = min(share, Fraction(1))
+        if share <= 0:
+            return Fraction(0)
+        return exp(self.power * log(share, BITS)[end] - self.mu2 * self.T_r * (1 - share), BITS)[end]
 
     def pushes(self, row: Linear) -> tuple[Fraction, Fraction]:
         """Bound ``|sum_k a_k s_k c_k|`` where ``0 <= c_k <= |sigma_k(0)|``, and where ``0 <= c_k <= push``."""
-        moved = [(a * self.sigma0[k], a * self._sign(k)) for k, a in row.items() if self.sigma0[k]]
-        one, other = (
-            max(sum((x for x in own if x > 0), Fraction(0)), -sum((x for x in own if x < 0), Fraction(0)))
-            for own in (zip(*moved, strict=True) if moved else ((), ()))
-        )
-        return one, other * self.push
-
-    def _sign(self, k: int) -> int:
-        return 1 if self.sigma0[k] > 0 else -1
+        by_size = [a * self.sigma0[k] for k, a in row.items() if self.sigma0[k]]
+        by_sign = [a if self.sigma0[k] > 0 else -a for k, a in row.items() if self.sigma0[k]]
+        return _one_sided(by_size), _one_sided(by_sign) * self.push
 
 
 class Piece(NamedTuple):
-    """A piece of the time while sliding variables move, all from above but ``clock_below``.
+    """A piece of the time while sliding variables move, all from above.
 
-    The gain at its two ends, how far the clock goes, how long it lasts, ``int gain^2 dt``, and by how much ``psi``
-    falls.
+    ``sqrt(V)`` at its begin, what the piece adds to it, the gain at its two ends, how far the clock goes, and
+    ``int gain^2 dt``.
     """
 
+    root: Fraction
+    added: Fraction
     first: Fraction
     last: Fraction
-    clock_below: Fraction
-    clock_above: Fraction
-    time: Fraction
+    clock: Fraction
     square: Fraction
-    drop: Fraction
 
 
 @dataclass(frozen=True)
@@ -520,8 +513,10 @@ class InputBounds:
         Raises
         ------
         ValueError
-            It is one of a large graph, or does not decay.
+            There is none, it is one of a large graph, or it does not decay.
         """
+        if type(k) is not int or not 0 <= k < len(self.forms):
+            raise ValueError("there is no such Lyapunov function")
         form = self.forms[k]
         if form is None or form.rate <= 0:
             raise ValueError("a Lyapunov function that says nothing of single agents")
@@ -532,35 +527,16 @@ class InputBounds:
         """``z`` from which on the sliding variables are 0; 0 if they always are."""
         return Fraction(0) if self.reaching is None else self.reaching.quiet
 
-    def _squared(self, sizes: Sequence[Fraction]) -> list[Fraction]:
-        """Return ``|L^2| sizes``."""
-        pushed = []
-        bits = 2 * _bits(x for row in self.rows for x in row.values()) + _bits(sizes)
-        spend(5 * sum(len(self.rows[j]) for row in self.rows for j in row), bits, bits, "L^2")
-        for row in self.rows:
-            square: dict[int, Fraction] = {}
-            for j, x in row.items():
-                for i, y in self.rows[j].items():
-                    square[i] = square.get(i, Fraction(0)) + x * y
-            pushed.append(sum((abs(x) * sizes[j] for j, x in square.items()), Fraction(0)))
-        return pushed
-
     @cached_property
     def held(self) -> list[Fraction]:
         """What no ``|e_k|`` ever exceeds: ``e^(-L s)`` expands neither ``max |x_k|`` nor ``max |e_k|``."""
         largest = max(map(self.initial_set.largest, self.rows))
         states = max(self.initial_set.largest({v: Fraction(1)}) for v in range(len(self.rows)))
         if self.reaching is not None:
-            moved = [self.reaching.pushes(row) for row in self.rows]
-            largest += max(a for a, _ in moved) + self.reaching.T_r * max(b for _, b in moved)
-            states += max(map(abs, self.reaching.sigma0)) + self.reaching.T_r * self.reaching.push
-        heard = [2 * row.get(v, Fraction(0)) for v, row in enumerate(self.rows)]
-        return [min(largest, h * states) for h in heard]
-
-    @cached_property
-    def first(self) -> Fraction:
-        """A bound of ``||E(0)||``, exact but for rounding for a single initial state."""
-        return root_above(sum((self.initial_set.largest(row) ** 2 for row in self.rows), Fraction(0)))
+            moved, T_r = [self.reaching.pushes(row) for row in self.rows], self.reaching.T_r
+            largest += max(a for a, _ in moved) + T_r * max(b for _, b in moved)
+            states += max(map(abs, self.reaching.sigma0)) + T_r * self.reaching.push
+        return [min(largest, 2 * row.get(v, Fraction(0)) * states) for v, row in enumerate(self.rows)]
 
     @cached_property
     def held_norm(self) -> Fraction:
@@ -569,64 +545,71 @@ class InputBounds:
 
     def start(self, k: int) -> Fraction:
         """Bound ``sqrt(V(0))`` of the set; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
-        if ("start", k) not in self._kept:
-            form = self.form(k)
-            rows = self._coordinates(form)
-            known = [self._center[v] for v in form.nodes] if form.coordinates == "E" else None
-            self._kept["start", k] = rounded(_largest_root(form, rows, self.initial_set, known), BITS, up=True)
-        return self._kept["start", k]
-
-    @cached_property
-    def _center(self) -> list[Fraction]:
-        """``L`` times the center of the starts."""
-        return [_dot(row, self.initial_set.center) for row in self.rows]
+        if k not in self._kept:
+            self._kept[k] = rounded(self._largest_root(self.form(k)), BITS, up=True)
+        return self._kept[k]
 
     def _coordinates(self, form: Form) -> list[Linear]:
-        """Return the rows of the coordinates of a form."""
-        return [self.rows[v] for v in form.nodes] if form.coordinates == "E" else list(_deviations(form))
+        """Return the rows of the coordinates of a form: of ``L``, or of ``X - (p'G X / p'1) G 1``."""
+        if form.coordinates == "E":
+            return [self.rows[v] for v in form.nodes]
+        own = list(zip(form.nodes, form.gauge, form.diagonal or (), strict=True))
+        total = sum(w for _, _, w in own)
+        return [{j: (v == j) - g * h * w / total for j, h, w in own} for v, g, _ in own]
 
-    def _pieces(self, z: Fraction) -> list[Piece]:
-        """Return what the pieces of the time up to ``z`` have in common."""
-        if z not in self._kept:
-            assert self.reaching is not None
-            bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, z, self.reaching.T_r, self.reaching.mu2))
-            spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
-            (T, rho1, k), up = (self.gain.T, self.gain.rho1, self.gain.k), True
-            instants = [z * j / PIECES for j in range(PIECES + 1)]
-            remaining = [exp(-x, BITS) for x in instants]  # 1 - t/T
-            decay = [(Fraction(1), Fraction(1)), *(self.reaching.decay(x) for x in remaining[1:])]
-            gains = [rounded(rho1 + k / T / low, BITS, up) for low, _ in remaining]
-            pieces = []
-            for j in range(PIECES):
-                (low, high), (end, nearest) = remaining[j], remaining[j + 1]
-                step, time = k * z / PIECES, rounded(T * (high - end), BITS, up)
-                square = rho1**2 * time + 2 * rho1 * step + k**2 / T * (1 / end - 1 / high)
-                clock = rounded(rho1 * T * max(low - nearest, Fraction(0)) + step, BITS)
-                above, drop = rounded(rho1 * time + step, BITS, up), rounded(decay[j][1] - decay[j + 1][0], BITS, up)
-                pieces.append(Piece(gains[j], gains[j + 1], clock, above, time, rounded(square, BITS, up), drop))
-            self._kept[z] = pieces
-        return self._kept[z]
+    def _largest_root(self, form: Form) -> Fraction:
+        """Bound ``sqrt(z'P z)`` over the initial states, ``z = A X(0)`` the coordinates of a form; it is a norm.
 
-    def _reached(self, k: int, z: Fraction) -> tuple[list[tuple[Fraction, Fraction]], Fraction]:
-        """Bound ``sqrt(V)`` while sliding variables move: at the begin of each piece, and what it adds.
+        The lesser of two bounds: from the largest ``|z_i|``, and from the center and ``M = A'P A``, with
+        ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid.
+        """
+        rows, initial_set, (P, _) = self._coordinates(form), self.initial_set, form.entries
+        vectors = [initial_set.center, initial_set.radius, *initial_set.axes]
+        bits = length(chain.from_iterable(row.values() for row in rows)) + length(chain.from_iterable(vectors))
+        own = bits + longest(chain.from_iterable(P))
+        spend(5 * len(vectors) * (sum(map(len, rows)) + len(P) ** 2), bits, own, "initial states")
 
-        From ``z`` on ``sqrt(V)`` is at most the last number times ``e^(-rate s / 2)``.
+        def value(x: Sequence[Fraction]) -> Fraction:
+            return form.value([_dot(row, x) for row in rows])
+
+        middle = root_above(value(initial_set.center))
+        if initial_set.point:
+            return middle
+        spread = (
+            _spread(form, rows, initial_set.radius)
+            if initial_set.radius
+            else sum(map(value, initial_set.axes), Fraction(0))
+        )
+        entries = root_above(form.value([initial_set.largest(row) for row in rows], sizes=True))
+        return min(entries, middle + root_above(spread))
+
+    def _reached(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
+        """Bound ``sqrt(V)`` in pieces of the time up to ``z``, while sliding variables move.
+
+        From ``z`` on ``sqrt(V)`` is at most the number that is returned besides, times ``e^(-rate s / 2)``.
 
         In a piece from ``a`` to ``b`` of the time ``sqrt(V)`` gains at most ``w (psi(a) - psi(b)) + f (b - a)``, ``w``
         and ``f`` being the norms of what bounds ``L sigma``, ``|sigma_k| <= |sigma_k(0)|``, and ``L f``.
         """
-        if (k, z) not in self._kept:
-            assert self.reaching is not None
-            form = self.form(k)
-            pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
-            w, f = (root_above(form.largest_value(own)) for own in pushes)
-            v, found = self.start(k), []
-            for piece in self._pieces(z):
-                added = rounded(w * piece.drop + f * piece.time, BITS, up=True)
-                found.append((v, added))
-                v = rounded(v * decay_above(form.rate / 2 * piece.clock_below) + added, BITS, up=True)
-            begin = rounded(v * exp(form.rate / 2 * self.gain.clock_above(z), BITS)[1], BITS, up=True)
-            self._kept[k, z] = found, begin
+        if (k, z) in self._kept:
+            return self._kept[k, z]
+        assert self.reaching is not None
+        gain, form, v, pieces = self.gain, self.form(k), self.start(k), list[Piece]()
+        bits = length((gain.T, gain.rho1, gain.k, z, self.reaching.T_r, self.reaching.mu2))
+        spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
+        pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
+        w, f = (root_above(form.value(own, sizes=True)) for own in pushes)
+        shares = ((z * j / PIECES, exp(-z * j / PIECES, BITS)) for j in range(PIECES + 1))  # z and 1 - t/T
+        instants = [(x, q, self.reaching.decay(q)) for x, q in shares]
+        for (a, (low, high), before), (b, (end, nearest), after) in pairwise(instants):
+            added = w * (before[1] - after[0]) + f * gain.T * (high - end)
+            clock, square = gain.clock(b, end) - gain.clock(a, high), gain.square(b, end) - gain.square(a, high)
+            above = (v, added, gain.value(low), gain.value(end), clock, square)
+            pieces.append(Piece(*(rounded(x, BITS, up=True) for x in above)))
+            passed = max(gain.clock(b, nearest) - gain.clock(a, low), Fraction(0))
+            v = rounded(v * decay_above(form.rate / 2 * passed) + added, BITS, up=True)
+        begin = rounded(v * exp(form.rate / 2 * gain.clock(z, instants[-1][1][0]), BITS)[1], BITS, up=True)
+        self._kept[k, z] = pieces, begin
         return self._kept[k, z]
 
     def share(self, k: int, limits: Limits, clock: Fraction, growth: Fraction) -> Fraction:
@@ -670,35 +653,26 @@ class InputBounds:
         """
         if not self.quiet <= z <= LARGEST_EXPONENT:
             raise ValueError("an instant at which sliding variables still move, or one too late")
-        bits = _bits((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
+        bits = length((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
         spend(50, bits, bits, "bounds of the input")
         held = self.held_norm if v is None else self.held[v]
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
             return of(self.gain, held, c * self.start(k), rate, z)
         pieces, begin = self._reached(k, z)
-        early, late = self._early(of, held, c, z, pieces), of(self.gain, Fraction(0), c * begin, rate, z)
-        return rounded(max(early, late) if of is peak_above else early + late, BITS, up=True)
-
-    def _early(
-        self, of: Of, held: Fraction, c: Fraction, z: Fraction, reached: Sequence[tuple[Fraction, Fraction]]
-    ) -> Fraction:
-        """Bound the peak, the energy or the length up to ``z``, while sliding variables move."""
-        pieces = self._pieces(z)
+        late = of(self.gain, Fraction(0), c * begin, rate, z)
         if of is peak_above:  # gain e^(-rate s / 2) does not grow
-            most = (p.first * v + p.last * added for p, (v, added) in zip(pieces, reached, strict=True))
-            return min(c * max(most), held * pieces[-1].last)
-        sizes = [min(c * (v + added), held) for v, added in reached]
-        if of is energy_above:
-            return sum((p.square * size**2 for p, size in zip(pieces, sizes, strict=True)), Fraction(0))
-        return sum((p.clock_above * size for p, size in zip(pieces, sizes, strict=True)), Fraction(0))
+            most = max(p.first * p.root + p.last * p.added for p in pieces)
+            return rounded(max(late, min(c * most, held * pieces[-1].last)), BITS, up=True)
+        for p in pieces:
+            size = min(c * (p.root + p.added), held)
+            late += p.square * size**2 if of is energy_above else p.clock * size
+        return rounded(late, BITS, up=True)
 
     def largest_form(self, W: Rows) -> Fraction:
         """Bound ``E(0)'W E(0)`` over the starts, ``E`` on the nodes that listen, in order."""
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
-        form = Form(one, "E", nodes, None, W, one)
-        known = [self._center[v] for v in nodes]
-        return _largest_root(form, [self.rows[v] for v in nodes], self.initial_set, known) ** 2
+        return self._largest_root(Form(one, "E", nodes, None, W, one)) ** 2
 
     def disturbed(self, k: int, delta: Fraction) -> list[Fraction]:
         """Bound what disturbances ``|d_k| <= delta`` add to the inputs of the nominal protocol.
@@ -714,7 +688,7 @@ class InputBounds:
         q = form.rate * self.gain.k / 2
         if q <= 1 or form.coordinates != "E":
             raise ValueError("the input may grow without limit")
-        pushed = root_above(form.largest_value([2 * self.rows[v].get(v, Fraction(0)) for v in form.nodes]))
+        pushed = root_above(form.value([2 * self.rows[v].get(v, Fraction(0)) for v in form.nodes], sizes=True))
         each = pushed * delta * (self.gain.rho1 * self.gain.T + self.gain.k) / (q - 1)
         return [root_above(c) * each for c in self.constant(k)]
 
@@ -732,23 +706,18 @@ class InputBounds:
         form = self.form(k)
         if form.coordinates != "E":
             raise ValueError("deviations say nothing of noise")
-        every = [Fraction(1)] * len(self.rows)
-        twice = self._squared(every)
-        added = root_above(form.largest_value([twice[v] for v in form.nodes])) * noise * 2 / form.rate
+        bits, twice = 3 * length(x for row in self.rows for x in row.values()), []
+        spend(5 * sum(len(self.rows[j]) for row in self.rows for j in row), bits, bits, "L^2")
+        for v in form.nodes:
+            square = dict[int, Fraction]()
+            for j, x in self.rows[v].items():
+                for i, y in self.rows[j].items():
+                    square[i] = square.get(i, Fraction(0)) + x * y
+            twice.append(sum(map(abs, square.values()), Fraction(0)))
+        added = root_above(form.value(twice, sizes=True)) * noise * 2 / form.rate
         own = (2 * row.get(v, Fraction(0)) * noise for v, row in enumerate(self.rows))
         each = [root_above(c) * added + x for c, x in zip(self.constant(k), own, strict=True)]
         return self.root_constant(k, None) * added, each
-
-
-def _bits(values: Iterable[Fraction]) -> int:
-    """Return the bits of the longest numerator or denominator."""
-    return max((max(x.numerator.bit_length(), x.denominator.bit_length()) for x in values), default=0)
-
-
-def _whole(values: Sequence[Fraction]) -> tuple[list[int], int]:
-    """Return rationals times their common denominator, and that."""
-    scale = math.lcm(*{x.denominator for x in values})
-    return [x.numerator * (scale // x.denominator) for x in values], scale
 
 
 def _dot(row: Linear, x: Sequence[Fraction]) -> Fraction:
@@ -756,63 +725,16 @@ def _dot(row: Linear, x: Sequence[Fraction]) -> Fraction:
     return sum((a * x[j] for j, a in row.items()), Fraction(0))
 
 
-def _count(form: Form, rows: Sequence[Linear], initial_set: InitialSet) -> None:
-    """Count the work of :func:`_largest_root`."""
-    n, matrix = len(rows), [*([form.diagonal] if form.diagonal is not None else form.matrix or ())]
-    vectors = [initial_set.center, *([initial_set.radius] if initial_set.radius else []), *initial_set.axes]
-    bits = _bits(x for row in rows for x in row.values()) + _bits(x for vector in vectors for x in vector)
-    entries = sum(map(len, rows))
-    spend(
-        5 * len(vectors) * (entries + n * len(matrix)), bits, bits + _bits(x for row in matrix for x in row), "starts"
-    )
-    if initial_set.radius:
-        spend((entries + n * len(matrix)) * len(initial_set.center), bits, bits, "starts")
-
-
-def _largest_root(
-    form: Form, rows: Sequence[Linear], initial_set: InitialSet, center: Sequence[Fraction] | None = None
-) -> Fraction:
-    """Bound ``sqrt(z'P z)`` over the starts, ``z = A X(0)`` with the rows of ``A``; ``sqrt(V)`` is a norm.
-
-    The lesser of two bounds: from the largest ``|z_i|``, and from the center and ``M = A'P A``, with
-    ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid. ``center`` is ``z`` of
-    the center, where it is known.
-    """
-    _count(form, rows, initial_set)
-    middle = root_above(form.value([_dot(row, initial_set.center) for row in rows] if center is None else center))
-    if initial_set.point:
-        return middle
-    if initial_set.axes:
-        spread = sum((form.value([_dot(row, axis) for row in rows]) for axis in initial_set.axes), Fraction(0))
-    else:
-        spread = _spread(form, rows, initial_set.radius)
-    entries = root_above(form.largest_value([initial_set.largest(row) for row in rows]))
-    return min(entries, middle + root_above(spread))
+def _one_sided(values: Sequence[Fraction]) -> Fraction:
+    """Return the larger of the sums of the positive and of the negative numbers, in size."""
+    return (sum(map(abs, values), Fraction(0)) + abs(sum(values, Fraction(0)))) / 2
 
 
 def _spread(form: Form, rows: Sequence[Linear], radius: Sequence[Fraction]) -> Fraction:
     """Return ``sum_jl |M_jl| radius_j radius_l``, ``M = A'P A``; in integers."""
-    (whole, unit), (R, scale) = _whole([x for row in rows for x in row.values()]), _whole(radius)
-    left, (lines, common) = iter(whole), form.entries
-    A = [dict(zip(row, left, strict=False)) for row in rows]
-    M = [[0] * len(R) for _ in R]
-    for own, line in zip(A, lines, strict=True):
-        moved = [0] * len(R)  # a row of P A
-        for place, w in line:
-            for j, a in A[place].items():
-                moved[j] += w * a
-        for j, a in own.items():
-            M[j] = [m + a * x for m, x in zip(M[j], moved, strict=True)]
+    (whole, unit), ((R,), scale) = integers([list(row.values()) for row in rows]), integers([radius])
+    P, common = form.entries
+    A = [dict(zip(row, own, strict=True)) for row, own in zip(rows, whole, strict=True)]
+    M = congruence(Arithmetic(), P, A, len(R))
     total = sum(r * sum(abs(m) * q for m, q in zip(row, R, strict=True)) for r, row in zip(R, M, strict=True))
     return Fraction(total, common * unit**2 * scale**2)
-
-
-def _deviations(form: Form) -> list[dict[int, Fraction]]:
-    """Return the rows of ``X - (p'G X / p'1) G 1``."""
-    p = form.diagonal or ()
-    total, rows = sum(p), []
-    for v, g in zip(form.nodes, form.gauge, strict=True):
-        row = {w: -g * h * x / total for w, h, x in zip(form.nodes, form.gauge, p, strict=True)}
-        row[v] += 1
-        rows.append(row)
-    return rows

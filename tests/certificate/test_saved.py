@@ -16,14 +16,14 @@ from generators import all_classes, random_graph, sparse_digraph
 
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.input import effort_section
 from ptcc_certify.certificate import vectors
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.format_effort import effort_section
 from ptcc_certify.certificate.format_graph import structure_document
+from ptcc_certify.certificate.vectors import Writer
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
-from ptcc_certify.graphs.rationals import format_exact
 
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -75,8 +75,8 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
         assert (own.rate, own.overshoot, own.lowest) == (other.rate, other.overshoot, other.lowest)
         assert own.deviation == other.deviation and own.name == other.name
         assert own.nodes == other.nodes and own.gauge == other.gauge and np.array_equal(own.array, other.array)
-    labels = made.graph.labels
-    assert effort_section(saved.effort, labels, format_exact) == effort_section(made.effort, labels, format_exact)
+    out = Writer(made.graph.labels)
+    assert effort_section(saved.effort, out) == effort_section(made.effort, out)
     if made.effort is not None and saved.effort is not None:
         own, other = saved.effort, made.effort
         assert [o for o in own.obligations if o.kind != "input-peak"] == [

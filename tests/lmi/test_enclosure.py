@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import decimal
 from fractions import Fraction
 
 import flint
@@ -59,10 +60,32 @@ def test_logarithms_are_enclosed(x: Fraction):
     assert above - below <= Fraction(1, 2**90) * max(abs(above), abs(below), Fraction(1))
 
 
-@given(x=positive(20), y=st.fractions(-30, 30, max_denominator=1000))
-@settings(max_examples=80, deadline=None)
-def test_powers_are_enclosed(x: Fraction, y: Fraction):
-    holds(enclosure.power(x, y), ball(x) ** ball(y), 88)
+def test_what_a_float_cannot_hold_is_enclosed():
+    """Exponentials that only ever get smaller, and arguments that are no float: far off, next to 1, next to 0."""
+    below, above = enclosure.exp(Fraction(-(10**30)))
+    assert below == 0 and above == enclosure.exp(Fraction(-100_000))[1] > 0
+    tiny = Fraction(1, 10**3000)
+    below, above = enclosure.log(tiny)
+    holds((below, above), ball(tiny).log())
+    below, above = enclosure.log(1 + tiny)
+    assert below <= tiny / 2 and tiny <= above < Fraction(1, 2**96)
+    below, above = enclosure.sqrt(tiny**2)
+    assert below <= tiny <= above <= tiny * (1 + Fraction(1, 2**96))
+    assert enclosure.log(Fraction(1)) == enclosure.sqrt(Fraction(0)) == (0, 0)
+
+
+def test_what_others_set_for_decimals_changes_nothing():
+    x, before = Fraction(355, 113), decimal.DefaultContext.copy()
+    values = [of(x, 77) for of in (enclosure.log, enclosure.sqrt, enclosure.exp)]
+    enclosure.exp.cache_clear()
+    try:
+        for context in (decimal.DefaultContext, decimal.getcontext()):
+            context.prec, context.Emin, context.Emax, context.rounding = 3, -1, 1, decimal.ROUND_UP
+        assert values == [of(x, 77) for of in (enclosure.log, enclosure.sqrt, enclosure.exp)]
+    finally:
+        for context in (decimal.DefaultContext, decimal.getcontext()):
+            context.prec, context.rounding = before.prec, before.rounding
+            context.Emin, context.Emax = before.Emin, before.Emax
 
 
 def test_what_has_no_value_is_refused():
@@ -88,7 +111,7 @@ def test_the_reaching_integral_is_bounded_from_below_and_hardly(
     """The power series of the checker against the incomplete gamma functions of ball arithmetic."""
     gains = {"rho1": 1, "rho2": 1, "mu1": 2, "delta": 1}
     protocol = SlidingModeProtocol(T_r=T_r, T_s=1, kappa=kappa, mu2=mu2, mu3=mu3, **gains)  # type: ignore[arg-type]
-    below = enclosure.decay_integral_below(T_r, mu2, mu3 * kappa, z)
+    below = enclosure.decay_integrals_below(T_r, mu2, mu3 * kappa, [z])[z]
     value = inverse_decay_integral(protocol, z)
     if value.is_finite() and value.rel_accuracy_bits() > 120:
         assert ball(below) <= value

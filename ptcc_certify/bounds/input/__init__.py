@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -29,7 +30,6 @@ from ptcc_certify.bounds.input.effort import (
 )
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
-from ptcc_certify.bounds.input.section import effort_section, energy_witness, peak_witness
 from ptcc_certify.bounds.input.tightest_bound import best_bound, kept, least_bound, usable_functions
 from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, disturbed
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
@@ -109,17 +109,13 @@ def bound_effort(asked: InputRequest) -> Effort:
         return effort
     constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in asked.forms)
     region = asked.initial_set or InitialSet(tuple(asked.start or ()))
-    bounds = InputBounds(
-        structure.graph.exact_rows(range(n)), gain.exact, asked.forms, constants, region, _reaching(asked)
-    )
+    rows = structure.graph.exact_rows(range(n))
+    bounds = InputBounds(rows, gain.exact, asked.forms, constants, region, _reaching(asked))
     usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
-    peak = None
-    if own is not None:
-        peak = _peak(bounds, [k for k in usable if bounds.form(k).rate * gain.pole >= 2], own)
-    ample = [k for k in usable if bounds.form(k).rate * gain.pole > 1]
+    peak = None if own is None else _peak(bounds, usable, own)
     cap = None if influence is None or not influence.exact or not asked.limits else largest_deviation(region, influence)
-    energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, ample))
+    energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, usable))
     limited = LimitedBounds(bounds, usable, asked.deviations, cap, peak, asked.noise)
     entries = [limited.left(entry) for entry in asked.limits]
     return replace(
@@ -191,19 +187,13 @@ def _reaching(asked: InputRequest) -> Reaching | None:
 
 def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
-    matrix = form.matrix or ()
-    scale = math.lcm(*(x.denominator for row in matrix for x in row))
-    P = [[x.numerator * (scale // x.denominator) for x in row] for row in matrix]
+    P, scale = form.entries
     above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
-    if above is None:
-        return None
-    constants = [Fraction(0)] * n
-    try:
-        for v, value in zip(form.nodes, above, strict=True):
-            constants[v] = kept(value * scale * (1 + RAISE))
-    except OverflowError:
-        return None
-    return tuple(constants)
+    with suppress(OverflowError):
+        if above is not None:
+            known = {v: kept(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
+            return tuple(known.get(v, Fraction(0)) for v in range(n))
+    return None
 
 
 def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
@@ -213,8 +203,7 @@ def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]
     how = tuple(a for a in agents if a is not None)
     if norm is None or len(how) < len(agents):
         return None
-    try:
+    with suppress(OverflowError):
         whole = kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
         return Peak(tuple(kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
-    except OverflowError:
-        return None
+    return None

@@ -35,7 +35,7 @@ def energy_integral(structure: Structure, bounds: InputBounds) -> EnergyIntegral
         wanted = max(log(grown) - log(even), 0.0) if even and grown else 0.0
         p = min(rounded(Fraction(wanted), INSTANT_BITS), most)
         return EnergyIntegral(kept(integral_above(gain, even, grown, p)), p, (first, second), (m0, m1))
-    except (np.linalg.LinAlgError, ValueError, OverflowError):
+    except (ValueError, ArithmeticError):
         return None
 
 

@@ -137,10 +137,10 @@ def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
     return values
 
 
-def ways(initial_set: InitialSet, influence: Influence) -> list[Linear]:
+def ways(influence: Influence) -> list[Linear]:
     """Return the rows of ``I - Q``: from its initial to its final state, each agent's way."""
     rows: list[Linear] = []
-    for v in range(len(initial_set.center)):
+    for v in range(influence.structure.graph.n_nodes):
         row = {j: -Fraction(x) for j, x in influence.row(v).items()}
         rows.append(row | {v: row.get(v, Fraction(0)) + 1})
     return rows
@@ -169,4 +169,4 @@ def largest_deviation(initial_set: InitialSet, influence: Influence) -> Fraction
     >>> largest_deviation(InitialSet([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
     Fraction(2, 1)
     """
-    return max(map(initial_set.largest, ways(initial_set, influence)))
+    return max(map(initial_set.largest, ways(influence)))

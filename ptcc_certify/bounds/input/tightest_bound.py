@@ -46,7 +46,7 @@ def least(attempts: Iterable[Callable[[], Found | None]], size: Callable[[Found]
     """Return the least of what can be proved; None if nothing can."""
     proved = []
     for attempt in attempts:
-        with suppress(ValueError, OverflowError):
+        with suppress(ValueError, ArithmeticError):
             proved.append(attempt())
     return min((found for found in proved if found is not None), key=size, default=None)
 
@@ -55,7 +55,7 @@ def usable_functions(bounds: InputBounds) -> list[int]:
     """Return which Lyapunov functions decay and say something of single agents."""
     functions = []
     for k in range(len(bounds.forms)):
-        with suppress(ValueError, OverflowError):
+        with suppress(ValueError, ArithmeticError):
             bounds.constant(k)
             bounds.start(k)
             functions.append(k)
@@ -75,7 +75,7 @@ def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequen
             instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
             try:
                 own = Witness(kept(bounds.bound(of, agent, k, instant)), k, instant)
-            except (ValueError, OverflowError):
+            except (ValueError, ArithmeticError):
                 continue
             if found is None or own.value < found.value:
                 found = own

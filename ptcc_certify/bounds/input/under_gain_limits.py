@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -51,16 +50,19 @@ class LimitedBounds:
     peak: Peak | None
     noise: Fraction | None
 
+    @cached_property
+    def first(self) -> Fraction:
+        """A bound of ``||E(0)||``, exact but for rounding for a single initial state."""
+        bounds = self.bounds
+        return root_above(sum((bounds.initial_set.largest(row) ** 2 for row in bounds.rows), Fraction(0)))
+
     def left(self, limits: Limits) -> Limited | None:
         """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
 
         With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
         first.
         """
-        top = limits.largest_gain(self.bounds.gain)
-        if top is None:
-            return None
-        clock = limits.clock_below(self.bounds.gain)
+        top, clock = limits.largest_gain(self.bounds.gain), limits.clock_below(self.bounds.gain)
         found = least((partial(self._by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
         if found is None or self.noise is None or limits.sample_period is not None:
             return found
@@ -75,7 +77,7 @@ class LimitedBounds:
             return None
         left = bounds.share(k, limits, clock, growth) * bounds.start(k)
         norm = kept(bounds.root_constant(k, None) * left)
-        if held and norm > bounds.first:
+        if held and norm > self.first:
             return None
         known = self.deviations[k] if k < len(self.deviations) else None
         sizes = [root_above(c) * left for c in known or ()]
@@ -95,7 +97,7 @@ class LimitedBounds:
     def longest_period(self, limits: Sequence[Limits], found: Sequence[Limited | None], gain: Gain) -> Fraction | None:
         """Return a period of four digits with which all is certified that is not, near to the longest; None if none."""
         failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
-        if not failed or any(entry.sample_period is None for entry in failed) or not self.bounds.first:
+        if not failed or any(entry.sample_period is None for entry in failed) or not self.first:
             return None
         growths = {k: m for k in self.functions if (m := step_growth(self.bounds, k)) is not None}
         periods = [self._longest_period(entry, gain, growths) for entry in failed]
@@ -103,20 +105,11 @@ class LimitedBounds:
 
     def _longest_period(self, limits: Limits, gain: Gain, growths: dict[int, Fraction]) -> Fraction | None:
         T, bounds = nearest_float(gain.T), self.bounds
-        sizes = {k: log(decaying(bounds, k, None)) - log(bounds.first) for k in growths}
+        sizes = {k: log(decaying(bounds, k, None)) - log(self.first) for k in growths}
 
         def excess(period: float) -> float:
             grown = (sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items())
             return min(grown, default=math.inf)
-
-        def proved(period: Fraction) -> bool:
-            sampled = Limits(limits.gain_cap, limits.stop_before, period)
-            with suppress(ValueError, OverflowError):
-                for k, m in growths.items():
-                    left = bounds.share(k, sampled, Fraction(0), m) * bounds.start(k)
-                    if kept(bounds.root_constant(k, None) * left) <= bounds.first:
-                        return True
-            return False
 
         high = nearest_float(limits.sample_period or gain.T)
         low = high / 2
@@ -128,7 +121,7 @@ class LimitedBounds:
             middle = (low + high) / 2
             low, high = (middle, high) if excess(middle) <= 0 else (low, middle)
         tried = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
-        return next((period for period in tried if proved(period)), None)
+        return next((h for h in tried if self.left(replace(limits, sample_period=h)) is not None), None)
 
 
 def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
@@ -153,14 +146,12 @@ def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
     if form.coordinates != "E":
         return None
     A = np.array([[float(bounds.rows[v].get(w, 0)) for w in form.nodes] for v in form.nodes])
+    P, scale = form.entries
     try:
         with np.errstate(all="ignore"):
-            if form.diagonal is not None:
-                R = np.diag(np.sqrt([float(w) for w in form.diagonal]))
-            else:
-                R = np.linalg.cholesky(np.array([[float(x) for x in row] for row in form.matrix or ()])).T
+            R = np.linalg.cholesky(np.array([[x / scale for x in row] for row in P])).T
             size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2))
-    except (np.linalg.LinAlgError, OverflowError):
+    except (ValueError, ArithmeticError):
         return None
     return kept(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
 
