@@ -45,7 +45,7 @@ from ptcc_certify.lyapunov.rate_upper_bound import RateBound
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.theorems.base import ExactInterval, Obligation, RateProof
+from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 
 _LIMITS = ("gain_cap", "stop_before", "sample_period")
 

@@ -42,9 +42,9 @@ from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.base import RateProof, Theorem
 from ptcc_certify.theorems.lemmas import EXACT_NODES, FACTOR_NODES, laplacian_spectrum
 from ptcc_certify.theorems.table import theorem_for
+from ptcc_certify.theorems.theorem import RateProof, Theorem
 
 #: What :func:`certify` does, in this order.
 STEPS = (
