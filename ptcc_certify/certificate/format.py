@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.final_state import FinalState
-from ptcc_certify.bounds.final_state_enclosure import rounding_radius
+from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input import EnergyIntegral, Peak, effort_section, energy_witness, peak_witness
 from ptcc_certify.certificate.content import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import read_effort
