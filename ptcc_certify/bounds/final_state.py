@@ -138,15 +138,12 @@ class Influence:
         >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
         {0: Fraction(1, 4), 2: Fraction(-3, 4)}
         """
-        for component, null_vector in self.groups:
-            if node in component.nodes:
-                own = (component.gauge or ())[component.nodes.index(node)]
-                return {v: own * w for v, w in zip(component.nodes, null_vector, strict=True)}
         where = np.flatnonzero(self.structure.followers == node)
-        if where.size == 0:
-            return {}
+        weights: Sequence[Number] = [dict(zip(c.nodes, c.gauge or (), strict=True)).get(node, 0) for c in self.balanced]
+        if where.size:
+            weights = self._weights_of(int(where[0]))
         result: dict[int, Number] = {}
-        for (component, null_vector), weight in zip(self.groups, self._weights_of(int(where[0])), strict=True):
+        for (component, null_vector), weight in zip(self.groups, weights, strict=True):
             if weight:
                 result.update({v: weight * w for v, w in zip(component.nodes, null_vector, strict=True)})
         return result

@@ -9,7 +9,6 @@ decrease by,
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 
@@ -151,9 +150,12 @@ class BalancedComposite(Composite):
     ``lmin(H_F L_F + L_F' H_F) / lmax(H_F)``. The ``Gamma`` of an unbalanced group is ``lmin(H_k L_k + L_k' H_k) I``.
     """
 
-    @abstractmethod
+    #: Whether the ``Gamma`` of a balanced group is ``2 a(L_k) lmin(H_k) I``, or ``2 a(L_k) H_k``.
+    uniform: bool
+
     def _share(self, diagonal: Sequence[Fraction]) -> Sequence[Fraction]:
         """Return the diagonal that ``2 a(L_k)`` multiplies in ``Gamma``."""
+        return [min(diagonal)] * len(diagonal) if self.uniform else diagonal
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """Free blocks, ``H_F`` and ``rho`` from one semidefinite program; ``rho`` polished in its exact interval."""

@@ -1,10 +1,5 @@
 """Theorem 2: quasi-strongly connected signed digraphs: one closed component, and followers."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from fractions import Fraction
-
 from ptcc_certify.theorems.composite import BalancedComposite, Composite
 
 
@@ -24,9 +19,7 @@ class BalancedQuasiStrong(BalancedComposite):
     )
     leader, follower, matrix, product = "Xi_L", "Xi_F", "Xi", "Phi"
     positive = "2 a(L_L)"
-
-    def _share(self, diagonal: Sequence[Fraction]) -> Sequence[Fraction]:
-        return diagonal
+    uniform = False
 
 
 class UnbalancedQuasiStrong(Composite):

@@ -39,8 +39,6 @@ class BalancedStrong(Theorem):
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """``2 a(L) P``."""
-        if not V.blocks:
-            return np.zeros((0, 0))
         return self.rate(structure, V) * np.diag(floats(V.weights))
 
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:

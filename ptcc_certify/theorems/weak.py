@@ -3,11 +3,6 @@
 The block-triangular argument needs no weak connectivity, so the same Lyapunov functions serve disconnected graphs.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from fractions import Fraction
-
 from ptcc_certify.theorems.composite import BalancedComposite, Composite
 
 
@@ -28,9 +23,7 @@ class BalancedWeak(BalancedComposite):
     )
     leader, follower, matrix, product = "H_{k}", "H_F", "H", "Pi"
     positive = "the decrease of {block}"
-
-    def _share(self, diagonal: Sequence[Fraction]) -> Sequence[Fraction]:
-        return [min(diagonal)] * len(diagonal)
+    uniform = True
 
 
 class UnbalancedWeak(Composite):
