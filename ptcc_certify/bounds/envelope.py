@@ -246,7 +246,7 @@ class Envelope:
         Raises
         ------
         ParameterError
-            ``remaining`` is not one number from 0 to 1.
+            ``remaining`` is not one number from 0 to 1; or there is a reaching phase (see :meth:`norm_factor`).
         """
         if np.ndim(remaining):
             raise ParameterError("remaining is one number from 0 to 1; for several instants ask norm_bound")
@@ -409,9 +409,9 @@ class Envelope:
             relative = np.array([float(x / (top or 1)) for x in z])
             yield function, float(np.sqrt(function.value(relative))) * (1 + 1e-12) * float_up(top) if top else 0.0
 
-    def _unit(self, x0: np.ndarray) -> float:
+    def _unit(self, x0: Iterable[Any]) -> float:
         """Return the size of the initial state, in which squares neither overflow nor vanish."""
-        return float(np.abs(x0).max(initial=0.0)) or 1.0
+        return max((abs(float(x)) for x in x0), default=0.0) or 1.0
 
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every Lyapunov function; see :class:`Comparison`.
@@ -485,11 +485,9 @@ class Envelope:
         if not self._with_deviation or trajectory.t[0] != 0:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
-        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         worst = 0.0
-        for column in range(states.shape[1]):
-            x, start = states[:, column], [Fraction(v) for v in states[:, column, 0].tolist()]
-            size = self._unit(x[:, 0])
+        for x in _columns(trajectory):
+            size, start = self._unit(x[:, 0]), [Fraction(v) for v in x[:, 0].tolist()]
             final, _ = self._influence.apply(self._undriven(start))
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
@@ -514,20 +512,15 @@ class Envelope:
         list of History
             One for each column of the states.
         """
-        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
-        states = states / _sizes(states)
-        z = function.coordinates_of(states, self._laplacian)
-        unit = _sizes(z)
-        root = np.sqrt(function.value(z / unit))
-        bounds = _grown(root[:, 0], function.rate_below, trajectory.clock - trajectory.clock[0])
-        return [
-            History(
-                root[column],
-                bounds[column],
-                FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, states[:, column], float(unit[column, 0])),
-            )
-            for column in range(states.shape[1])
-        ]
+        found = []
+        for x in _columns(trajectory):
+            x = x / self._unit(x[:, 0])
+            z = function.coordinates_of(x, self._laplacian)
+            unit = float(np.abs(z[:, 0]).max(initial=0.0)) or 1.0
+            root = np.sqrt(function.value(z / unit))
+            bound = _grown(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
+            found.append(History(root, bound, FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, x, unit)))
+        return found
 
     def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
@@ -558,7 +551,6 @@ def deviation_constants(function: LyapunovFunction) -> np.ndarray:
     return np.append(function.deviation.roots, function.deviation.norm_root)
 
 
-def _sizes(values: np.ndarray) -> np.ndarray:
-    """Return the (S, 1) largest entries of (N, S, M) values at the first instant, 1 for a column of zeros."""
-    sizes = np.abs(values[:, :, :1]).max(axis=0, initial=0.0)
-    return np.where(sizes > 0, sizes, 1.0)
+def _columns(trajectory: Trajectory) -> np.ndarray:
+    """Return the states of a run column by column, (S, N, M)."""
+    return np.moveaxis(trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size), 1, 0)

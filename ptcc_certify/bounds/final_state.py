@@ -338,7 +338,7 @@ def final_state(
     exact : bool, optional
         See :func:`influence`.
     matrix : Influence, optional
-        ``Q``, if it is known already; if it is enclosed, so is the final state.
+        ``Q``, if it is known already.
 
     Returns
     -------
@@ -348,9 +348,6 @@ def final_state(
     ------
     ParameterError
         Wrong length, or an entry that is not a finite number.
-    NotEnclosedError
-        ``Q`` is enclosed, but the followers' equations are too ill-conditioned for floats, or a consensus value may
-        be 0.
 
     References
     ----------
@@ -366,8 +363,6 @@ def final_state(
     """
     start = exact_initial_state(structure, x0)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
-    if matrix.enclosure is not None:
-        return _enclosed_final_state(matrix, matrix.enclosure, start)
     final, values = matrix.apply(start if matrix.exact else [float(x) for x in start])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     size = max((abs(float(x)) for x in start), default=0.0)
@@ -425,7 +420,8 @@ def enclose(influence: Influence) -> Influence:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
-    >>> found = final_state(st, [1, 0, 1], matrix=enclose(influence(st, exact=False)))
+    >>> who, start = enclose(influence(st, exact=False)), [Fraction(1), Fraction(0), Fraction(1)]
+    >>> found = enclosed_final_state(who, start)
     >>> bool(abs(Fraction(found.states[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
     True
     """
@@ -441,9 +437,16 @@ def enclose(influence: Influence) -> Influence:
     return replace(influence, enclosure=Enclosure(left_null_vectors, u))
 
 
-def _enclosed_final_state(influence: Influence, enclosure: Enclosure, start: list[Fraction]) -> FinalState:
-    """Enclose ``Q start``."""
-    structure, n, unit = influence.structure, len(start), Fraction(1)
+def enclosed_final_state(influence: Influence, start: Sequence[Fraction]) -> FinalState:
+    """Enclose ``Q start``, what is known of ``Q`` being enclosed.
+
+    Raises
+    ------
+    NotEnclosedError
+        The followers' equations are too ill-conditioned for floats, or a consensus value may be 0.
+    """
+    structure, n, unit, enclosure = influence.structure, len(start), Fraction(1), influence.enclosure
+    assert enclosure is not None
     size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
     if 0 < size < _SMALLEST:
         unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))

@@ -93,7 +93,7 @@ class SlidingEnvelope(Envelope):
     def _at(self, clock: Any) -> Instants:
         """Refuse values of the clock alone where there is a reaching phase."""
         if not self.direct:
-            raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
+            raise ParameterError("sigma(0) is not 0: in the reaching phase ask state_bound or deviation_bound")
         return super()._at(clock)
 
     def _when(self, remaining: Any) -> Instants:
@@ -133,7 +133,7 @@ class SlidingEnvelope(Envelope):
     def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
         if self.direct:
             return super()._norms(at, x0)
-        bound, unit = np.full_like(at.clock, np.inf), self._unit(np.array([float(x) for x in x0]))
+        bound, unit = np.full_like(at.clock, np.inf), self._unit(x0)
         for function, v, sliding in self._bounds(self._in_norm, x0, unit, at):
             with np.errstate(over="ignore"):
                 bound = np.minimum(bound, (v + sliding) / math.sqrt(function.lowest_below) * unit * (1 + 1e-12))
@@ -210,9 +210,8 @@ class SlidingEnvelope(Envelope):
                 found.append(History(root, bound / unit, floor))
         return found
 
-    def _unit(self, x0: np.ndarray) -> float:
-        """Return the size of the initial state, in which squares neither overflow nor vanish."""
-        return max(float(np.abs(x0).max()), *(abs(float(x)) for x in self.sigma0)) or 1.0
+    def _unit(self, x0: Iterable[Any]) -> float:
+        return super()._unit([*x0, *self.sigma0])
 
     def _bounds(
         self, functions: Iterable[LyapunovFunction], x0: Sequence[Fraction], unit: float, at: Instants
@@ -280,7 +279,7 @@ class SlidingEnvelope(Envelope):
         """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
         if self.direct:
             return super()._deviations(at, x0, unit)
-        own = unit or self._unit(np.array([float(x) for x in x0]))
+        own = unit or self._unit(x0)
         bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
         for function, v, _ in self._bounds(self._with_deviation, x0, own, at):
             with np.errstate(invalid="ignore", over="ignore"):

@@ -22,7 +22,15 @@ from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import FinalState, Influence, NotEnclosedError, enclose, final_state, influence
+from ptcc_certify.bounds.final_state import (
+    FinalState,
+    Influence,
+    NotEnclosedError,
+    enclose,
+    enclosed_final_state,
+    final_state,
+    influence,
+)
 from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.content import Observations
@@ -309,7 +317,7 @@ class Case:
         if not matrix.exact:
             try:
                 enclosed = enclose(matrix)
-                result = None if moved is None else final_state(structure, moved, matrix=enclosed)
+                result = None if moved is None else enclosed_final_state(enclosed, moved)
                 matrix = enclosed
             except NotEnclosedError as error:
                 self.notes.append(f"the final state is floating point only: {error}")
