@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from numbers import Rational
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
+from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
 
 if TYPE_CHECKING:
@@ -148,6 +147,13 @@ class Comparison:
         return worst > 1 + 1e-6 or self.reaching_kept is False
 
 
+class Instants(NamedTuple):
+    """Where bounds are asked: values of the clock, and of ``z = ln(T_r/(T_r - t))`` if there is a reaching phase."""
+
+    clock: np.ndarray
+    z: Any = None
+
+
 class History(NamedTuple):
     """``sqrt(V)`` of one run and its bound over time, (M,) each, and the floor ``f`` of the integrator."""
 
@@ -218,11 +224,12 @@ class Envelope:
         Raises
         ------
         ParameterError
-            A value is negative or not a number.
+            A value is negative or not a number; or there is a reaching phase: sliding variables drive the agents, and
+            no multiple of their start bounds them.
         """
-        clock = clock_values(clock)
-        factors = [_grown(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm]
-        return np.minimum.reduce(factors) if factors else np.full_like(clock, np.inf)
+        clock = self._at(clock).clock
+        factors = (_grown(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm)
+        return np.minimum.reduce([np.full_like(clock, np.inf), *factors])
 
     def residual(self, remaining: float) -> float:
         """Bound of ``||z(t)|| / ||z(0)||`` where ``1 - t/T`` equals ``remaining``: what is left at that instant.
@@ -239,15 +246,23 @@ class Envelope:
         Raises
         ------
         ParameterError
-            ``remaining`` is not one number from 0 to 1.
+            ``remaining`` is not one number from 0 to 1; or there is a reaching phase (see :meth:`norm_factor`).
         """
         if np.ndim(remaining):
             raise ParameterError("remaining is one number from 0 to 1; for several instants ask norm_bound")
-        return float(self.norm_factor(self._clock(remaining)))
+        return float(self.norm_factor(self._when(remaining).clock))
 
-    def _clock(self, remaining: Any) -> np.ndarray:
-        """Return the clock where ``1 - t/T`` is ``remaining``, or refuse it."""
-        return np.asarray(self.gain.clock_at_remaining(remaining_part(remaining)))
+    def _at(self, clock: Any) -> Instants:
+        """Return the instants at values of the clock, or refuse them."""
+        return Instants(clock_values(clock))
+
+    def _when(self, remaining: Any) -> Instants:
+        """Return the instants where ``1 - t/T`` is ``remaining``, or refuse them."""
+        return Instants(np.asarray(self.gain.clock_at_remaining(remaining_part(remaining))))
+
+    def _of(self, trajectory: Trajectory) -> Instants:
+        """Return the samples of a run."""
+        return Instants(trajectory.clock)
 
     def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` at clock values ``s`` from ``x0``: ``min_i sqrt(e^(-rate_i s) V_i(0) / lmin(P_i))``.
@@ -267,11 +282,10 @@ class Envelope:
         Raises
         ------
         ParameterError
-            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph; or there is a reaching
+            phase, in which the clock alone bounds nothing.
         """
-        clock, x0 = clock_values(clock), exact_initial_state(self.structure, x0)
-        bounds = [_grown(self._start(m, x0) / math.sqrt(m.lowest_below), m.rate_below, clock) for m in self._in_norm]
-        return np.minimum.reduce(bounds) if bounds else np.full_like(clock, np.inf)
+        return self._norms(self._at(clock), exact_initial_state(self.structure, x0))
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,).
@@ -281,7 +295,13 @@ class Envelope:
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        return self.bound(self._clock(remaining), x0)
+        return self._norms(self._when(remaining), exact_initial_state(self.structure, x0))
+
+    def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
+        """Return the bounds of ``||z||`` from ``x0``."""
+        starts = self._starts(self._in_norm, x0)
+        bounds = (_grown(root / math.sqrt(m.lowest_below), m.rate_below, at.clock) for m, root in starts)
+        return np.minimum.reduce([np.full_like(at.clock, np.inf), *bounds])
 
     def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - final_state_k|`` from ``x0`` where ``1 - t/T`` is ``remaining``.
@@ -302,7 +322,7 @@ class Envelope:
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        return self.deviation(self._clock(remaining), x0)
+        return self._deviations(self._when(remaining), exact_initial_state(self.structure, x0))[:-1]
 
     def deviation(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its final state.
@@ -324,33 +344,30 @@ class Envelope:
         Raises
         ------
         ParameterError
-            A value of the clock is negative or not a number, or ``x0`` does not fit the graph.
+            A value of the clock is negative or not a number, or ``x0`` does not fit the graph; or there is a reaching
+            phase, in which the clock alone bounds nothing.
         """
-        return self._deviations(clock, x0, lambda d: d.roots)
+        return self._deviations(self._at(clock), exact_initial_state(self.structure, x0))[:-1]
 
     def deviation_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`deviation`."""
-        return self._deviations(clock, x0, lambda d: np.array([d.norm_root]))[0]
+        return self._deviations(self._at(clock), exact_initial_state(self.structure, x0))[-1]
 
-    def _deviations(
-        self,
-        clock: np.ndarray | float,
-        x0: Any,
-        constants: Callable[[DeviationBound], np.ndarray],
-    ) -> np.ndarray:
-        clock, x0 = clock_values(clock), exact_initial_state(self.structure, x0)
-        bounds = []
-        for m in self.functions:
-            if m.deviation is not None:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    size = np.nan_to_num(constants(m.deviation) * self._start(m, x0), posinf=np.inf)  # 0 times inf is 0
-                bounds.append(_grown(size, m.rate_below, clock))
-        if bounds:
-            most = self._largest_deviation(x0)
-            if len(bounds[0]) < len(x0):  # of the norm, which has N such entries
-                most *= math.sqrt(len(x0)) * (1 + 1e-15)
-            return np.minimum(np.minimum.reduce(bounds), most)
-        return np.full((len(x0), *clock.shape), 0.0 if self._still else np.inf)
+    def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:
+        """Return the bounds of every agent and of the norm, (N + 1, M), in that unit or in 1."""
+        x0 = [x / Fraction(unit or 1) for x in x0]
+        bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
+        for m, root in self._starts(self._with_deviation, x0):
+            with np.errstate(over="ignore", invalid="ignore"):
+                size = np.nan_to_num(deviation_constants(m) * root, posinf=np.inf)  # 0 times inf is 0
+            bounds = np.minimum(bounds, _grown(size, m.rate_below, at.clock))
+        if self._with_deviation:
+            bounds = np.minimum(bounds.T, self._largest_deviations(x0)).T
+        return bounds
+
+    @property
+    def _with_deviation(self) -> list[LyapunovFunction]:
+        return [m for m in self.functions if m.deviation is not None]
 
     @cached_property
     def _still(self) -> bool:
@@ -361,40 +378,40 @@ class Envelope:
     def _influence(self) -> Influence:
         return influence(self.structure)
 
-    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
-        """Return ``max_k |x_k(0) - (Q x0)_k|``, rounded up."""
-        start = [as_exact(x) for x in x0]
-        final, _ = self._influence.apply(start)
-        return float_up(max(abs(x - Fraction(end)) for x, end in zip(start, final, strict=True)))
+    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+        """Return the initial state from which the nominal motion has the same final state."""
+        return list(x0)
+
+    def _largest_deviations(self, x0: Sequence[Fraction]) -> np.ndarray:
+        """Return what no deviation of an agent and no norm of them, (N + 1,), ever exceeds, rounded up.
+
+        That is ``max_k |x_k(0) - final_state_k|``, and under the sliding-mode protocol ``sum_k |sigma_k(0)|`` more:
+        ``d = x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does
+        not expand the largest entry.
+        """
+        start = self._undriven(x0)
+        gaps = (abs(x - Fraction(end)) for x, end in zip(x0, self._influence.apply(start)[0], strict=True))
+        most = float_up(max(gaps) + sum((abs(x - y) for x, y in zip(x0, start, strict=True)), Fraction(0)))
+        return np.append(np.full(len(x0), most), most * math.sqrt(len(x0)) * (1 + 1e-15))
 
     @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
         return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
 
-    @cached_property
-    def _errors(self) -> dict[tuple[Fraction, ...], list[Fraction]]:
-        return {}
+    def _starts(
+        self, functions: Iterable[LyapunovFunction], x0: Sequence[Fraction]
+    ) -> Iterator[tuple[LyapunovFunction, float]]:
+        """Yield ``sqrt(V(0))`` of functions, rounded up: coordinates in rationals, since entries may cancel in them."""
+        error = [-sum((w * x0[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
+        for function in functions:
+            z = function.exact_coordinates_of(x0, error)
+            top = max(map(abs, z), default=Fraction(0))
+            relative = np.array([float(x / (top or 1)) for x in z])
+            yield function, float(np.sqrt(function.value(relative))) * (1 + 1e-12) * float_up(top) if top else 0.0
 
-    def _exact_error(self, x0: Sequence[Fraction]) -> list[Fraction]:
-        """Return ``-L x0``, for which every Lyapunov function asks."""
-        key = tuple(x0)
-        if key not in self._errors:
-            self._errors.clear()
-            self._errors[key] = [-sum((w * key[j] for j, w in row.items()), Fraction(0)) for row in self._rows]
-        return self._errors[key]
-
-    def _start(self, function: LyapunovFunction, x0: Sequence[Fraction]) -> float:
-        """Return ``sqrt(V(0))``, rounded up: the coordinates in rationals, since entries may cancel in them."""
-        z = function.exact_coordinates_of(x0, self._exact_error(x0))
-        top = max(map(abs, z), default=Fraction(0))
-        if top == 0:
-            return 0.0
-        relative = np.array([float(x / top) for x in z])
-        return float(np.sqrt(function.value(relative))) * (1 + 1e-12) * float_up(top)
-
-    def _unit(self, x0: np.ndarray) -> float:
+    def _unit(self, x0: Iterable[Any]) -> float:
         """Return the size of the initial state, in which squares neither overflow nor vanish."""
-        return float(np.abs(x0).max(initial=0.0)) or 1.0
+        return max((abs(float(x)) for x in x0), default=0.0) or 1.0
 
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every Lyapunov function; see :class:`Comparison`.
@@ -465,32 +482,20 @@ class Envelope:
 
         Before the deadline only: the bound is 0 from there on, and whether the run has arrived is told elsewhere.
         """
-        if not any(m.deviation is not None for m in self.functions) or trajectory.t[0] != 0:
+        if not self._with_deviation or trajectory.t[0] != 0:
             return None
         judged = judged & (trajectory.t < float(self.gain.T))
-        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
         worst = 0.0
-        for column in range(states.shape[1]):
-            x = states[:, column]
-            size = self._unit(x[:, 0])
-            bounds, start = self._deviation_bounds(trajectory, x, size)
-            final, _ = self._influence.apply(start)
+        for x in _columns(trajectory):
+            size, start = self._unit(x[:, 0]), [Fraction(v) for v in x[:, 0].tolist()]
+            final, _ = self._influence.apply(self._undriven(start))
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
-            norm = np.linalg.norm(excess, axis=0)
+            excess = np.vstack([excess, np.linalg.norm(excess, axis=0)])
             with np.errstate(divide="ignore", invalid="ignore"):
-                both = np.vstack([excess, norm]) / bounds
-            worst = max(worst, float(np.where(np.vstack([excess, norm]) > 0, both, 0.0)[:, judged].max(initial=0.0)))
+                ratio = np.where(excess > 0, excess / self._deviations(self._of(trajectory), start, size), 0.0)
+            worst = max(worst, float(ratio[:, judged].max(initial=0.0)))
         return worst
-
-    def _deviation_bounds(
-        self, trajectory: Trajectory, x: np.ndarray, unit: float
-    ) -> tuple[np.ndarray, list[Fraction]]:
-        """Return the bounds of every agent and of the norm (N + 1, M) in that unit, and what ``Q`` is applied to."""
-        start = [as_exact(v) for v in x[:, 0]]
-        own = [v / Fraction(unit) for v in start]
-        bounds = np.vstack([self.deviation(trajectory.clock, own), self.deviation_norm(trajectory.clock, own)])
-        return bounds, start
 
     def histories(self, function: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` and its bound along a run, column by column, in units of the initial state.
@@ -507,20 +512,15 @@ class Envelope:
         list of History
             One for each column of the states.
         """
-        states = trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size)
-        states = states / _sizes(states)
-        z = function.coordinates_of(states, self._laplacian)
-        unit = _sizes(z)
-        root = np.sqrt(function.value(z / unit))
-        bounds = _grown(root[:, 0], function.rate_below, trajectory.clock - trajectory.clock[0])
-        return [
-            History(
-                root[column],
-                bounds[column],
-                FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, states[:, column], float(unit[column, 0])),
-            )
-            for column in range(states.shape[1])
-        ]
+        found = []
+        for x in _columns(trajectory):
+            x = x / self._unit(x[:, 0])
+            z = function.coordinates_of(x, self._laplacian)
+            unit = float(np.abs(z[:, 0]).max(initial=0.0)) or 1.0
+            root = np.sqrt(function.value(z / unit))
+            bound = _grown(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
+            found.append(History(root, bound, FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, x, unit)))
+        return found
 
     def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
@@ -529,9 +529,8 @@ class Envelope:
             size = np.asarray(abs(self._laplacian) @ size)[function.rows]  # type: ignore[arg-type, operator]
         else:
             size = 2 * size[function.rows]
-        if function.root.ndim == 1:
-            return float(np.linalg.norm(function.root * (size / unit)))
-        return float(np.linalg.norm(np.abs(function.root) @ (size / unit)))
+        root, size = np.abs(function.root), size / unit
+        return float(np.linalg.norm(root * size if root.ndim == 1 else root @ size))
 
 
 def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
@@ -546,12 +545,12 @@ def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarr
     return np.where(np.isnan(grown), 0.0, grown)
 
 
-def as_exact(x: Any) -> Fraction:
-    """Return a rational as it is, a float as the dyadic number that it is."""
-    return Fraction(x) if isinstance(x, Rational) else Fraction(float(x))
+def deviation_constants(function: LyapunovFunction) -> np.ndarray:
+    """Return what ``sqrt(V)`` is multiplied by in the bounds of all agents and of the norm, (N + 1,)."""
+    assert function.deviation is not None
+    return np.append(function.deviation.roots, function.deviation.norm_root)
 
 
-def _sizes(values: np.ndarray) -> np.ndarray:
-    """Return the (S, 1) largest entries of (N, S, M) values at the first instant, 1 for a column of zeros."""
-    sizes = np.abs(values[:, :, :1]).max(axis=0, initial=0.0)
-    return np.where(sizes > 0, sizes, 1.0)
+def _columns(trajectory: Trajectory) -> np.ndarray:
+    """Return the states of a run column by column, (S, N, M)."""
+    return np.moveaxis(trajectory.states.reshape(len(trajectory.labels), -1, trajectory.t.size), 1, 0)

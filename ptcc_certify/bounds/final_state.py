@@ -1,22 +1,33 @@
-"""Where the agents end: ``X(T) = Q X(0)``, exactly; who decides whom; Definitions 1 to 5 as predicates.
+"""Where the agents end: ``X(T) = Q X(0)``, exactly or in intervals; who decides whom.
 
 ``Q`` projects onto the kernel of ``L`` along its range. An unbalanced closed component goes to 0; a balanced one to
 ``G_k 1 c_k`` with ``c_k = eta_k' G_k X_Lk(0)``, ``eta_k' M(L_Lk) = 0``, ``eta_k' 1 = 1``; followers go to
 ``-L_F^-1 L_FL X_L(T)``.
+
+In a large graph the final state is enclosed: leaders by left null vectors, followers by one solve.
+With ``u > 0`` and ``M(L_F) u > 0``, any approximation ``y`` of the followers' end has
+
+    |x_F - y|  <=  max_i((|r_i| + s_i) / (M(L_F) u)_i) u,      r = L_F y + L_FL x_L,
+
+``s`` what the radii of the leaders add. The left null vector of a large leader group is enclosed in the same way.
+Residuals are taken in floats with room for their rounding, or in rationals where that room is too wide; the check of
+the certificate forms them exactly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from lmi.sparse_h_matrix import solve
-from ptcc_certify.errors import HypothesisError, NumberError, ParameterError
+from lmi.errors import LMIError
+from lmi.sparse_h_matrix import SparseHMatrix, solve
+from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.io import in_node_order
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
@@ -29,12 +40,17 @@ from ptcc_certify.theorems.lemmas import (
     left_vector,
 )
 
-if TYPE_CHECKING:
-    from ptcc_certify.simulation.trajectory import Trajectory
-
 Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
 MANY_PULLS = 1_000_000
+#: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
+_ROUNDING, _NARROW = 1e-12, 4e-7
+#: Residual of a witness in every row, relatively.
+_LOOSE = 0.05
+#: Room for the rounding of a radius, and of texts and floats of a middle.
+_MORE, _ULP = 1 + 1e-6, 2.0**-52
+#: Starts below this size leave no room for radii in float64, and are taken in another unit.
+_SMALLEST = Fraction(1, 10**290)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +113,11 @@ class Influence:
         """The balanced closed components, to which ``left_null_vectors`` and ``containment_weights`` belong."""
         return tuple(c for c in self.structure.closed_components if c.balanced)
 
+    @property
+    def groups(self) -> Iterator[tuple[ClosedComponent, tuple[Number, ...]]]:
+        """The balanced closed components with their ``left_null_vectors``."""
+        return zip(self.balanced, self.left_null_vectors, strict=True)
+
     def row(self, node: int) -> dict[int, Number]:
         """Return the row of ``Q`` of one node as ``{leader index: weight}``.
 
@@ -117,16 +138,12 @@ class Influence:
         >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
         {0: Fraction(1, 4), 2: Fraction(-3, 4)}
         """
-        for component, null_vector in zip(self.balanced, self.left_null_vectors, strict=True):
-            if node in component.nodes:
-                own = (component.gauge or ())[component.nodes.index(node)]
-                return {v: own * w for v, w in zip(component.nodes, null_vector, strict=True)}
         where = np.flatnonzero(self.structure.followers == node)
-        if where.size == 0:
-            return {}
+        weights: Sequence[Number] = [dict(zip(c.nodes, c.gauge or (), strict=True)).get(node, 0) for c in self.balanced]
+        if where.size:
+            weights = self._weights_of(int(where[0]))
         result: dict[int, Number] = {}
-        weights = self._weights_of(int(where[0]))
-        for component, null_vector, weight in zip(self.balanced, self.left_null_vectors, weights, strict=True):
+        for (component, null_vector), weight in zip(self.groups, weights, strict=True):
             if weight:
                 result.update({v: weight * w for v, w in zip(component.nodes, null_vector, strict=True)})
         return result
@@ -147,7 +164,7 @@ class Influence:
         zero: Number = Fraction(0) if self.exact else 0.0
         values = [
             sum((w * x0[v] for v, w in zip(component.nodes, null_vector, strict=True)), zero)
-            for component, null_vector in zip(self.balanced, self.left_null_vectors, strict=True)
+            for component, null_vector in self.groups
         ]
         final: list[Number] = [zero] * self.structure.graph.n_nodes
         for component, value in zip(self.balanced, values, strict=True):
@@ -218,7 +235,6 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
     groups, place = graph.subgraph(several) if several else graph, {v: i for i, v in enumerate(several)}
     balanced = [c for c in structure.closed_components if c.balanced]
     for component in balanced:
-        gauge = component.gauge or ()
         if len(component.nodes) == 1:
             left_null_vectors.append((Fraction(1),))
             continue
@@ -231,16 +247,15 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
             whole = dyadic_left_vector(block, p)
             total = sum(whole or ())
             eta = [Fraction(w, total) for w in whole] if whole else p.tolist()
-        left_null_vectors.append(tuple(g * w for g, w in zip(gauge, eta, strict=True)))
-    if not exact and structure.followers.size * len(balanced) > MANY_PULLS:
-        return Influence(structure, tuple(left_null_vectors), None, False)
-    try:
-        weights: Sequence[Sequence[Number]] = (
-            exact_containment_weights(structure) if exact else containment_weights(structure).tolist()
-        )
-    except RuntimeError:  # a factor of floats that is exactly singular
-        return Influence(structure, tuple(left_null_vectors), None, False)
-    return Influence(structure, tuple(left_null_vectors), tuple(tuple(row) for row in weights), exact)
+        left_null_vectors.append(tuple(g * w for g, w in zip(component.gauge or (), eta, strict=True)))
+    weights: Sequence[Sequence[Number]] | None = None
+    if exact:
+        weights = exact_containment_weights(structure)
+    elif structure.followers.size * len(balanced) <= MANY_PULLS:
+        with suppress(RuntimeError):  # of a factor in floats that is exactly singular
+            weights = containment_weights(structure).tolist()
+    rows = None if weights is None else tuple(map(tuple, weights))
+    return Influence(structure, tuple(left_null_vectors), rows, exact)
 
 
 @dataclass(frozen=True)
@@ -385,213 +400,187 @@ def exact_initial_state(
     return start
 
 
-# ---------------------------------------------------------------------- Definitions 1 to 5
+# ---------------------------------------------------------------------- large graphs
 
 
-def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -> bool:
-    """Definition 1 on one run of the error system: ``E -> 0`` at the deadline and ``E = 0`` from there on.
+class NotEnclosedError(ArithmeticError):
+    """No interval was found; the message tells why."""
 
-    Definition 1 speaks of all initial states of a system; a single trajectory can only refute it.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        Of a protocol with a deadline, sampled at it and beyond.
-    tolerance : float
-        Relative to the largest ``|E|`` of the run.
-
-    Returns
-    -------
-    bool
-        False refutes prescribed-time stability; True does not prove it.
+def enclose(influence: Influence) -> Influence:
+    """Enclose the left null vectors of ``Q``, and find the witness of all intervals.
 
     Raises
     ------
-    HypothesisError
-        The deadline is not among the samples.
-
-    References
-    ----------
-    Definition 1 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
-
-    Examples
-    --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
-    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1])
-    >>> is_prescribed_time_stable(run)
-    True
-    """
-    if trajectory.deadline_index is None:
-        raise HypothesisError("the trajectory has no sample at a deadline, so the definition does not apply")
-    after = trajectory.error[..., trajectory.deadline_index :]
-    return bool(np.abs(after).max(initial=0.0) <= tolerance * np.abs(trajectory.error).max(initial=0.0))
-
-
-def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
-    """Definition 2: ``x_k = 0`` for all agents (from the deadline on).
-
-    Parameters
-    ----------
-    x : sequence of N numbers, mapping or pandas Series by label, FinalState or Trajectory
-        A trajectory is judged at its deadline and at every later sample, relative to its largest start.
-    structure : Structure
-    tolerance : float
-        0 asks for equality, which makes sense for exact final states.
-
-    Returns
-    -------
-    bool
-
-    References
-    ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    NotEnclosedError
+        The equations of followers or left null vectors are too ill-conditioned for floats.
 
     Examples
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
-    >>> st = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]))
-    >>> is_stability(final_state(st, [3, 4]), st)
+    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
+    >>> who, start = enclose(influence(st, exact=False)), [Fraction(1), Fraction(0), Fraction(1)]
+    >>> found = enclosed_final_state(who, start)
+    >>> bool(abs(Fraction(found.states[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
     True
     """
-    return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, structure, tolerance))
+    structure, F = influence.structure, influence.structure.followers
+    u = np.ones(structure.graph.n_nodes)
+    if F.size:
+        u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
+    left_null_vectors = {
+        k: _enclosed_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
+        for k, (component, null_vector) in enumerate(influence.groups)
+        if not all(isinstance(w, Fraction | int) for w in null_vector)
+    }
+    return replace(influence, enclosure=Enclosure(left_null_vectors, u))
 
 
-def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
-    """Definition 3: ``|x_k| = x*`` for all agents, with ``x* > 0`` (see :func:`is_stability` for parameters).
+def enclosed_final_state(influence: Influence, start: Sequence[Fraction]) -> FinalState:
+    """Enclose ``Q start``, what is known of ``Q`` being enclosed.
 
-    Parameters
-    ----------
-    x : sequence of N numbers, FinalState or Trajectory
-        See :func:`is_stability`.
-    structure : Structure
-    tolerance : float
-        0 asks for equality, which makes sense for exact final states.
+    Raises
+    ------
+    NotEnclosedError
+        The followers' equations are too ill-conditioned for floats, or a consensus value may be 0.
+    """
+    structure, n, unit, enclosure = influence.structure, len(start), Fraction(1), influence.enclosure
+    assert enclosure is not None
+    size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
+    if 0 < size < _SMALLEST:
+        unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
+        start = [x / unit for x in start]
+    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, Fraction]()
+    numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
+    degenerate = []
+    for k, (number, (component, null_vector)) in enumerate(zip(numbers, influence.groups, strict=True)):
+        signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
+        if k in enclosure.left_null_vectors and any(start[v] for v in component.nodes):
+            own, (weights, radii) = np.array([float(start[v]) for v in nodes]), enclosure.left_null_vectors[k]
+            value, total = float(weights @ own), float(np.abs(weights) @ np.abs(own))
+            spread = (float(radii @ np.abs(own)) + _ROUNDING * total) * _MORE
+            if abs(value) <= 2 * spread:
+                raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
+            middle[nodes], radius[nodes] = signs * value, spread
+            continue
+        shares = zip(component.nodes, null_vector, strict=True)
+        known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
+        degenerate += [number] if known == 0 else []
+        exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
+        middle[nodes], radius[nodes] = signs * float(known), rounding_radius(known)
+    exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
+    F = structure.followers
+    if F.size and middle.any():
+        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, enclosure.witness)
+    final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
+    spreads = [Fraction(r) * unit for r in radius.tolist()]
+    for v, x in exact.items():
+        final[v], spreads[v] = x * unit, Fraction(0)
+    values = [final[c.nodes[0]] * (c.gauge or (1,))[0] for c in influence.balanced]
+    return FinalState(structure.graph.labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
 
-    Returns
-    -------
-    bool
 
-    References
-    ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+def rounding_radius(value: Fraction) -> float:
+    """Bound how far the nearest float, or its decimal text, is from a rational.
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
-    >>> is_bipartite_consensus(final_state(st, [3, 4]), st), is_bipartite_consensus(final_state(st, [3, 3]), st)
-    (True, False)
+    >>> rounding_radius(Fraction(1, 2)), 0 < rounding_radius(Fraction(1, 3)) < 1e-15
+    (0.0, True)
     """
-    return all(_same_modulus(state, tol) for state, tol in _states(x, structure, tolerance))
+    near = float(value)
+    return 0.0 if Fraction(near) == value else float(_spacing(near))
 
 
-def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
-    """Definition 4: ``|x_k| = x_f > 0`` for all leaders, ``|x_l| <= x_f`` for all followers; one closed component.
-
-    Parameters
-    ----------
-    x : sequence of N numbers, FinalState or Trajectory
-        See :func:`is_stability`.
-    structure : Structure
-    tolerance : float
-        0 asks for equality, which makes sense for exact final states.
-
-    Returns
-    -------
-    bool
-
-    References
-    ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
-
-    Examples
-    --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 3, 1), (3, 2, 1)]))
-    >>> is_interval_bipartite_consensus(final_state(st, [2, 0, 0]), st)
-    True
-    """
-    if len(structure.closed_components) != 1:
-        return False
-    leaders, followers = structure.leaders.tolist(), structure.followers.tolist()
-    return all(
-        _same_modulus([state[k] for k in leaders], tol)
-        and all(abs(state[k]) <= abs(state[leaders[0]]) + tol for k in followers)
-        for state, tol in _states(x, structure, tolerance)
-    )
+def _spacing(x: float | np.ndarray) -> Any:
+    """Bound the rounding of a float or of its decimal text."""
+    return 2 * _ULP * np.abs(x) + 5e-324
 
 
-def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
-    """Definition 5: balanced closed components in bipartite consensus, unbalanced at 0, followers within the leaders.
-
-    Parameters
-    ----------
-    x : sequence of N numbers, FinalState or Trajectory
-        See :func:`is_stability`.
-    structure : Structure
-    tolerance : float
-        0 asks for equality, which makes sense for exact final states.
-
-    Returns
-    -------
-    bool
-
-    References
-    ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
-
-    Examples
-    --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))
-    >>> is_bipartite_containment(final_state(st, [1, 0, 2]), st)
-    True
-    """
-    return all(_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
+def _witness(block: Any) -> np.ndarray:
+    """Return ``u > 0`` with ``M(block) u > 0``, its largest entry 1."""
+    with np.errstate(all="ignore"):
+        try:
+            matrix = SparseHMatrix(block)
+        except LMIError as error:
+            raise NotEnclosedError(str(error)) from None
+        ones = np.ones(matrix.diagonal.size)
+        rows = matrix.M.multiply(1 / matrix.diagonal[:, None]).tocsr()  # rows of every size weigh alike
+        u = solve(rows, ones, ones, _LOOSE / np.sqrt(ones.size))
+        u /= u.max()
+        pushed = matrix.M @ u
+    if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(pushed).all() and (pushed > 0).all()):
+        raise NotEnclosedError("the equations are too ill-conditioned for floats")
+    return u
 
 
-def _contained(state: Sequence[Any], structure: Structure, tolerance: float) -> bool:
-    for component in structure.closed_components:
-        own = [state[v] for v in component.nodes]
-        if component.balanced and not _same_modulus(own, tolerance):
-            return False
-        if not component.balanced and any(abs(v) > tolerance for v in own):
-            return False
-    hull = max(abs(state[v]) for v in structure.leaders.tolist())
-    return all(abs(state[v]) <= hull + tolerance for v in structure.followers.tolist())
+def _enclosed_left_null_vector(
+    structure: Structure, component: ClosedComponent, null_vector: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
+    nodes = np.array(component.nodes)
+    block = structure.graph.laplacian().tocsr()[nodes][:, nodes].tocsr()
+    signs = np.array(component.gauge or (), dtype=float)
+    eta = signs * null_vector
+    top = int(np.argmax(eta))
+    rest = np.delete(np.arange(nodes.size), top)
+    own = _witness(block[rest][:, rest].T.tocsr())
+    u[nodes[rest]] = own
+    columns = block.T.tocsr()[rest]  # of the comparison matrix, but for signs
+    z = eta / eta[top]
+    pushed = 2 * block.diagonal()[rest] * own - abs(columns[:, rest]) @ own
+    total = abs(columns) @ z
+    residual = np.abs(2 * block.diagonal()[rest] * z[rest] - total)
+    with np.errstate(all="ignore"):
+        error = float(((residual + _ULP * (np.diff(columns.indptr) + 4) * total) / pushed).max()) * _MORE
+    weights = np.zeros(nodes.size)
+    weights[rest] = own
+    low, high = z.sum() - error * weights.sum(), z.sum() + error * weights.sum()
+    if not low > 0.5 * high:
+        group = f"a leader group of {nodes.size} nodes"
+        raise NotEnclosedError(f"the left null vector of {group} is too ill-conditioned for floats")
+    ends = np.abs((z - error * weights) / high - eta), np.abs((z + error * weights) / low - eta)
+    return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
 
 
-def _same_modulus(state: Sequence[Any], tolerance: float) -> bool:
-    sizes = [abs(v) for v in state]
-    return min(sizes) > tolerance and max(sizes) - min(sizes) <= tolerance
+def _enclosed_followers(
+    structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return middles and radii of the followers, in a unit near to the largest leader."""
+    F = structure.followers
+    unit = float(np.exp2(np.floor(np.log2(np.abs(middle).max()))))
+    rows = structure.graph.laplacian().tocsr()[F]
+    state, blur = middle / unit, abs(rows) @ (radius / unit)
+    block = rows[:, F].tocsr()
+    with np.errstate(all="ignore"):
+        solved = follower_state(structure, state)
+        if not np.isfinite(solved).all():
+            raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
+        state[F] = solved
+        comparison = 2 * block.diagonal() * u[F] - abs(block) @ u[F]
+        residual = np.abs(rows @ state) + blur + _ROUNDING * (abs(rows) @ np.abs(state))
+        error = float((residual / comparison).max()) * 1.01
+    if not error * u[F].max() <= _NARROW:
+        error = _exact_error(structure, exact, state, blur + _ULP * (abs(rows) @ np.abs(state)), u, unit)
+    found = solved * unit
+    return found, (error * u[F] * unit + _spacing(found)) * _MORE
 
 
-def _states(x: Any, structure: Structure, tolerance: float) -> list[tuple[Sequence[Any], float]]:
-    """Return the states to judge, each with its absolute tolerance (an int 0 keeps rationals exact)."""
-    if isinstance(x, FinalState) and tolerance == 0:
-        return [(x.states, 0)]
-    if isinstance(x, FinalState):
-        size = max((abs(float(v)) for v in x.states), default=0.0)
-        return [(x.states, tolerance * size)]
-    if hasattr(x, "deadline_index"):
-        if x.deadline_index is None:
-            raise HypothesisError("the trajectory has no sample at a deadline, so the definitions do not apply")
-        states = np.asarray(x.states)
-        states = states.reshape(states.shape[0], -1, states.shape[-1])
-        sizes = np.abs(states[:, :, 0]).max(axis=0)
-        return [
-            (states[:, column, i].tolist(), tolerance * float(sizes[column]))
-            for column in range(states.shape[1])
-            for i in range(x.deadline_index, states.shape[-1])
-        ]
-    return [(in_node_order(x, structure.graph, "x"), tolerance)]
+def _exact_error(
+    structure: Structure, exact: dict[int, Fraction], state: np.ndarray, blur: np.ndarray, u: np.ndarray, unit: float
+) -> float:
+    """Return ``max_i (|r_i| + s_i) / (M(L_F) u)_i``, the residual in rationals."""
+    F = structure.followers.tolist()
+    following = set(F)
+    known = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
+    weights = [Fraction(x) for x in u.tolist()]
+    error = Fraction(0)
+    for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
+        left = sum((x * known[j] for j, x in row.items()), Fraction(0))
+        signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
+        pushed = sum(signs, Fraction(0))
+        if pushed <= 0:
+            raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
+        error = max(error, (abs(left) + Fraction(more)) / pushed)
+    return float(error) * _MORE

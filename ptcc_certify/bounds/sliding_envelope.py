@@ -15,7 +15,7 @@ where ``b_k`` bounds ``|sigma_k|`` whatever the disturbance. The coordinates of 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -23,22 +23,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.directed_rounding import float_up
 from ptcc_certify.bounds.envelope import (
     FLOOR_FACTOR,
     Comparison,
     Envelope,
     History,
-    as_exact,
+    Instants,
     clock_values,
+    deviation_constants,
     remaining_part,
 )
-from ptcc_certify.bounds.final_state import exact_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime, sliding_bound
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
@@ -87,34 +85,32 @@ class SlidingEnvelope(Envelope):
         """Whether ``sigma(0) = 0``: there is no reaching phase, and the bounds are those of the nominal protocol."""
         return not any(self.sigma0)
 
-    def norm_factor(self, clock: np.ndarray | float) -> np.ndarray:
-        """Bound of ``||z(t)|| / ||z(0)||``; see :meth:`Envelope.norm_factor`.
+    @property
+    def _spans(self) -> tuple[float, float, float]:
+        """``T``, ``T_r`` and ``T_s`` in floats."""
+        return float(self.protocol.T), float(self.protocol.T_r), float(self.protocol.T_s)
 
-        Raises
-        ------
-        ParameterError
-            ``sigma(0)`` is not 0: sliding variables drive the agents, and no multiple of their start bounds them.
-        """
-        self._need_direct()
-        return super().norm_factor(clock)
-
-    def bound(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
-        """Bound of ``||z||`` at clock values; see :meth:`Envelope.bound`, and :meth:`state_bound` for any sigma(0).
-
-        Raises
-        ------
-        ParameterError
-            ``sigma(0)`` is not 0.
-        """
-        self._need_direct()
-        return super().bound(clock, x0)
-
-    def _need_direct(self) -> None:
+    def _at(self, clock: Any) -> Instants:
+        """Refuse values of the clock alone where there is a reaching phase."""
         if not self.direct:
-            raise ParameterError("sigma(0) is not 0, so there is a reaching phase; ask state_bound instead")
+            raise ParameterError("sigma(0) is not 0: in the reaching phase ask state_bound or deviation_bound")
+        return super()._at(clock)
+
+    def _when(self, remaining: Any) -> Instants:
+        """Return ``s`` and ``z`` where ``1 - t/(T_r + T_s)`` is ``remaining``, or refuse it."""
+        q, (T, T_r, T_s) = remaining_part(remaining), self._spans
+        with np.errstate(divide="ignore"):
+            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
+            return Instants(np.asarray(self.gain.clock_at_remaining(q)), z)
+
+    def _of(self, trajectory: Trajectory) -> Instants:
+        run = trajectory.sliding
+        assert run is not None
+        with np.errstate(divide="ignore"):
+            return Instants(run.clock, -np.log(run.reaching_remaining))
 
     def state_bound(self, remaining: np.ndarray | float, x0: Any) -> np.ndarray:
-        """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` equals ``remaining``, from ``x0``.
+        """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` is ``remaining``, from ``x0``, whatever the disturbance.
 
         Parameters
         ----------
@@ -132,21 +128,16 @@ class SlidingEnvelope(Envelope):
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_initial_state(self.structure, x0)
-        z, clock = self._instants(q)
-        bound, unit = np.full(q.size, np.inf), self._unit(np.array([float(x) for x in x0]))
-        for function in self._in_norm:
-            if self._usable(function):
-                v, sliding = self._bounds(function, x0, unit, z, clock)
-                with np.errstate(over="ignore"):
-                    bound = np.minimum(bound, (v + sliding) / math.sqrt(function.lowest_below) * unit * (1 + 1e-12))
-        return bound if np.ndim(remaining) else bound[0]
+        return self.norm_bound(remaining, x0)
 
-    def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
-        """Bound of ``||z||`` from ``x0``, (M,), whatever the disturbance; see :meth:`Envelope.norm_bound`."""
+    def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
         if self.direct:
-            return super().norm_bound(remaining, x0)
-        return self.state_bound(np.asarray(remaining), x0)
+            return super()._norms(at, x0)
+        bound, unit = np.full_like(at.clock, np.inf), self._unit(x0)
+        for function, v, sliding in self._bounds(self._in_norm, x0, unit, at):
+            with np.errstate(over="ignore"):
+                bound = np.minimum(bound, (v + sliding) / math.sqrt(function.lowest_below) * unit * (1 + 1e-12))
+        return bound
 
     def sliding_norm(self, z: np.ndarray) -> np.ndarray:
         """Return Proposition 1's bound of ``||sigma||`` at instants ``z``: ``e^(-clock) ||sigma(0)||``.
@@ -193,7 +184,7 @@ class SlidingEnvelope(Envelope):
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
         kept = bool((run.reaching_z <= certain + late).all())
-        z = self._z(run)
+        z = self._of(trajectory).z
         bound, size = self._sliding(z), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(run.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -208,58 +199,43 @@ class SlidingEnvelope(Envelope):
             return super().histories(function, trajectory)
         run = trajectory.sliding
         assert run is not None
-        if not self._usable(function):
-            return []
-        own = self._unit(trajectory.states[:, 0])
+        own, start = self._unit(trajectory.states[:, 0]), [Fraction(x) for x in trajectory.states[:, 0].tolist()]
         x, y = trajectory.states / own, (run.states - run.sigma) / own
-        size = max(float(np.abs(part).max()) for part in (x, y))
-        v, sliding = self._bounds(function, trajectory.states[:, 0], own, self._z(run), run.clock)
-        unit = float((v + sliding).max()) or 1.0
-        floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(function, np.ones((len(y), 1)), unit)
-        return [
-            History(np.sqrt(function.value(function.coordinates_of(part, self._laplacian) / unit)), bound / unit, floor)
-            for part, bound in ((x, v + sliding), (y, v))
-        ]
+        size, found = max(float(np.abs(part).max()) for part in (x, y)), []
+        for _, v, sliding in self._bounds([function], start, own, self._of(trajectory)):
+            unit = float((v + sliding).max()) or 1.0
+            floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(function, np.ones((len(y), 1)), unit)
+            for part, bound in ((x, v + sliding), (y, v)):
+                root = np.sqrt(function.value(function.coordinates_of(part, self._laplacian) / unit))
+                found.append(History(root, bound / unit, floor))
+        return found
 
-    def _unit(self, x0: np.ndarray) -> float:
-        """Return the size of the initial state, in which squares neither overflow nor vanish."""
-        return max(float(np.abs(x0).max()), *(abs(float(x)) for x in self.sigma0)) or 1.0
-
-    @staticmethod
-    def _z(trajectory: SlidingTrajectory) -> np.ndarray:
-        with np.errstate(divide="ignore"):
-            return -np.log(trajectory.reaching_remaining)
-
-    def _usable(self, function: LyapunovFunction) -> bool:
-        """Whether a function bounds the reaching phase: one that bounds only the growth would end in infinity."""
-        return self.direct or function.rate_below > 0
+    def _unit(self, x0: Iterable[Any]) -> float:
+        return super()._unit([*x0, *self.sigma0])
 
     def _bounds(
-        self, function: LyapunovFunction, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega`` at instants given by both clocks.
+        self, functions: Iterable[LyapunovFunction], x0: Sequence[Fraction], unit: float, at: Instants
+    ) -> Iterator[tuple[LyapunovFunction, np.ndarray, np.ndarray]]:
+        """Yield functions with their bounds of ``||z_y||_Omega`` and ``|| |C| b ||_Omega``, in units of ``unit``.
 
-        What is returned is in units of ``unit``; ``x0`` is not.
+        Of those that bound the reaching phase: one that bounds only the growth would end in infinity.
         """
-        own = Fraction(unit)
-        y0 = [(as_exact(x) - sigma) / own for x, sigma in zip(x0, self.sigma0, strict=True)]
-        half = function.rate_below / 2
-        C, B = self._drive(function)
-        knots = np.unique(np.concatenate([self._pieces, z[np.isfinite(z)]]))
-        size = self._sliding(knots) / unit
-        forcing = _column_norms(B @ size)
-        s = self._clock_at(knots)
-        step = half * np.diff(s, append=self._clock_at(np.array([np.inf])))
-        decay, share = np.exp(-step), -np.expm1(-step) / half
-        v = np.empty(knots.size + 1)
-        v[0] = self._start(function, y0)
-        for i in range(knots.size):
-            v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
-        at = np.searchsorted(knots, z)
-        last = self._clock_at(np.array([np.inf]))[0]
-        later = v[-1] * np.exp(-half * np.maximum(clock - last, 0.0))
-        sliding = np.append(_column_norms(C @ size), 0.0)
-        return np.where(np.isfinite(z), v[at], later), sliding[np.where(np.isfinite(z), at, knots.size)]
+        reaching = np.isfinite(at.z)
+        knots = np.unique(np.concatenate([self._pieces, at.z[reaching]]))
+        place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
+        size, s, last = self._sliding(knots) / unit, self._clock_at(knots), self._clock_at(np.array(np.inf))
+        later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
+        y0 = [x / Fraction(unit) for x in self._undriven(x0)]
+        for function, root in self._starts((m for m in functions if m.rate_below > 0), y0):
+            half = function.rate_below / 2
+            C, B = self._drive(function)
+            forcing, step = _column_norms(B @ size), half * np.diff(s, append=last)
+            decay, share = np.exp(-step), -np.expm1(-step) / half
+            v = np.empty(knots.size + 1)
+            v[0] = root
+            for i in range(knots.size):
+                v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
+            yield function, v[place] * np.exp(-half * later), np.append(_column_norms(C @ size), 0.0)[place]
 
     @cached_property
     def _known(self) -> dict[bytes, np.ndarray]:
@@ -284,7 +260,7 @@ class SlidingEnvelope(Envelope):
 
     def _clock_at(self, z: np.ndarray) -> np.ndarray:
         """Return ``s`` at instants ``z`` before ``T_r``, and at ``T_r`` where ``z`` is infinite."""
-        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
+        T, T_r, T_s = self._spans
         return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
     def _drive(self, function: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
@@ -296,83 +272,24 @@ class SlidingEnvelope(Envelope):
         deviation = function.coordinates_of(np.eye(L.shape[0]), L)
         return np.abs(function.scaled(deviation)), np.abs(function.scaled(deviation @ L))
 
-    def _deviation_bounds(
-        self, trajectory: Trajectory, x: np.ndarray, unit: float
-    ) -> tuple[np.ndarray, list[Fraction]]:
+    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+        return [x - sigma for x, sigma in zip(x0, self.sigma0, strict=True)]
+
+    def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:
         """Return the bounds of every agent and of the norm: those of ``y = x - sigma``, and ``|sigma|`` besides."""
         if self.direct:
-            return super()._deviation_bounds(trajectory, x, unit)
-        run = trajectory.sliding
-        assert run is not None
-        bounds, norm = self._final_state_bounds(x[:, 0], unit, self._z(run), run.clock)
-        start = [as_exact(v) - sigma for v, sigma in zip(x[:, 0], self.sigma0, strict=True)]
-        return np.vstack([bounds, norm]), start
-
-    def _final_state_bounds(
-        self, x0: Sequence[Any] | np.ndarray, unit: float, z: np.ndarray, clock: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds of ``|x_k - final_state_k|`` (N, M) and of the norm (M,) from ``x0``, in that unit."""
-        bounds = np.full((len(x0), z.size), 0.0 if self._still else np.inf)
-        norm = bounds[0].copy()
-        for function in self.functions:
-            if function.deviation is None or not self._usable(function):
-                continue
-            v = self._bounds(function, x0, unit, z, clock)[0] * (1 + 1e-12)
+            return super()._deviations(at, x0, unit)
+        own = unit or self._unit(x0)
+        bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
+        for function, v, _ in self._bounds(self._with_deviation, x0, own, at):
             with np.errstate(invalid="ignore", over="ignore"):
-                bounds = np.minimum(
-                    bounds, np.nan_to_num(np.multiply.outer(function.deviation.roots, v), posinf=np.inf)
-                )
-                norm = np.minimum(norm, np.nan_to_num(function.deviation.norm_root * v, posinf=np.inf))
-        size = self._sliding(z) / unit
-        bounds, norm = bounds + size, norm + _column_norms(size)
-        if any(m.deviation is not None for m in self.functions):
-            most = self._largest_deviation(x0) / unit * (1 + 1e-15)
-            bounds, norm = np.minimum(bounds, most), np.minimum(norm, math.sqrt(len(x0)) * (1 + 1e-15) * most)
-        return bounds, norm
-
-    def _largest_deviation(self, x0: Sequence[Any] | np.ndarray) -> float:
-        """Return ``max_k |x_k(0) - final_state_k| + sum_k |sigma_k(0)|``, rounded up: no deviation ever exceeds it.
-
-        ``x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does not
-        expand the largest entry.
-        """
-        start = [as_exact(x) for x in x0]
-        final, _ = self._influence.apply([x - sigma for x, sigma in zip(start, self.sigma0, strict=True)])
-        gaps = (abs(x - Fraction(end)) for x, end in zip(start, final, strict=True))
-        return float_up(max(gaps) + sum(map(abs, self.sigma0), Fraction(0)))
-
-    def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
-        """Bound of ``|x_k - final_state_k|`` at ``1 - t/(T_r + T_s) = remaining``, whatever the disturbance.
-
-        Parameters
-        ----------
-        remaining : float or (M,) array
-            Between 0 and 1.
-        x0 : sequence of N numbers, mapping of label to number or pandas Series
-
-        Returns
-        -------
-        (N, M) or (N,) array
-
-        Raises
-        ------
-        ParameterError
-            A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
-        """
-        if self.direct:
-            return super().deviation_bound(remaining, x0)
-        q, x0 = np.atleast_1d(remaining_part(remaining)), exact_initial_state(self.structure, x0)
-        unit = self._unit(np.array([float(x) for x in x0]))
-        z, clock = self._instants(q)
-        bounds = self._final_state_bounds(x0, unit, z, clock)[0] * unit
-        return bounds if np.ndim(remaining) else bounds[:, 0]
-
-    def _instants(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ``z`` and ``s`` where ``1 - t/(T_r + T_s)`` equals ``q``."""
-        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
-        with np.errstate(divide="ignore"):
-            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
-            return z, np.where(q > 0, self.gain.clock_at_remaining(q), np.inf)
+                found = np.multiply.outer(deviation_constants(function), v * (1 + 1e-12))
+            bounds = np.minimum(bounds, np.nan_to_num(found, posinf=np.inf))
+        size = self._sliding(np.atleast_1d(at.z)) / own
+        bounds += np.vstack([size, _column_norms(size)]).reshape(bounds.shape)
+        if self._with_deviation:
+            bounds = np.minimum(bounds.T, self._largest_deviations(x0) / own * (1 + 1e-15)).T
+        return bounds if unit else bounds * own
 
 
 def _column_norms(M: np.ndarray) -> np.ndarray:

@@ -44,9 +44,9 @@ from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.base import Obligation, RateProof, Theorem
 from ptcc_certify.theorems.claims import Claim, sliding_claim
 from ptcc_certify.theorems.table import theorem_for
+from ptcc_certify.theorems.theorem import Obligation, RateProof, Theorem
 
 #: What a simulated run meets under the sliding-mode protocol unless a file states an expression.
 WORST_CASE = "worst-case"

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.final_state import FinalState
-from ptcc_certify.bounds.final_state_enclosure import rounding_radius
+from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input import EnergyIntegral, Peak
 from ptcc_certify.certificate.content import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import effort_section, energy_witness, peak_witness, read_effort
@@ -45,7 +44,7 @@ from ptcc_certify.lyapunov.rate_upper_bound import RateBound
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.theorems.base import ExactInterval, Obligation, RateProof
+from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 
 _LIMITS = ("gain_cap", "stop_before", "sample_period")
 

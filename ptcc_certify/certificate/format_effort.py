@@ -23,7 +23,7 @@ from ptcc_certify.certificate.vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.nominal import Protocol
-from ptcc_certify.theorems.base import Obligation
+from ptcc_certify.theorems.theorem import Obligation
 
 Steps = Mapping[tuple[str, str], Obligation]
 Said = Mapping[str, Any]

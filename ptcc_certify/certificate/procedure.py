@@ -22,8 +22,15 @@ from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
-from ptcc_certify.bounds.final_state_enclosure import NotEnclosedError, enclose, enclosed_final_state
+from ptcc_certify.bounds.final_state import (
+    FinalState,
+    Influence,
+    NotEnclosedError,
+    enclose,
+    enclosed_final_state,
+    final_state,
+    influence,
+)
 from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.content import Observations
@@ -43,9 +50,9 @@ from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.base import RateProof, Theorem
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 from ptcc_certify.theorems.table import theorem_for
+from ptcc_certify.theorems.theorem import RateProof, Theorem
 
 #: What :func:`certify` does, in this order.
 STEPS = (
@@ -308,8 +315,8 @@ class Case:
         result = None
         if not matrix.exact:
             try:
-                enclosed = replace(matrix, enclosure=enclose(structure, matrix))
-                result = None if first is None else enclosed_final_state(structure, enclosed, first)
+                enclosed = enclose(matrix)
+                result = None if first is None else enclosed_final_state(enclosed, first)
                 matrix = enclosed
             except NotEnclosedError as error:
                 self.notes.append(f"the final state is floating point only: {error}")

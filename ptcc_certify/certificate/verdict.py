@@ -20,8 +20,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from lmi.exact.directed_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.content import Content
@@ -359,7 +357,7 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
 
 def _share(envelope: Envelope, clock: float) -> float:
     """Return what is left of ``||z||`` after so much of the clock, rounded up."""
-    return float(Envelope.norm_factor(envelope, np.array(clock)))
+    return float(Envelope(envelope.structure, envelope.gain, envelope.functions).norm_factor(clock))
 
 
 def _useful_rho2(envelope: Envelope, fixed: float, kappa: Fraction) -> Fraction | None:

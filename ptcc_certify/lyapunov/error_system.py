@@ -17,16 +17,15 @@ import numpy as np
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.exact.numbers import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.theorems.base import (
+from ptcc_certify.theorems.lemmas import left_vector
+from ptcc_certify.theorems.matrices import (
     Matrix,
     exact_block,
     float_block,
-    follower_nodes,
     integer_matrix,
     integer_rows,
     multiply,
 )
-from ptcc_certify.theorems.lemmas import left_vector
 
 if TYPE_CHECKING:
     import flint
@@ -54,7 +53,7 @@ class ErrorSystem:
     @cached_property
     def nodes(self) -> tuple[int, ...]:
         """The node of every row."""
-        return (*(v for c in self.leaders for v in c.nodes), *follower_nodes(self.structure))
+        return (*(v for c in self.leaders for v in c.nodes), *self.structure.followers.tolist())
 
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:

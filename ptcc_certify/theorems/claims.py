@@ -18,13 +18,11 @@ from ptcc_certify.graphs.structure import (
 
 #: What each behaviour implies besides itself (Definitions 3 to 5: each contains the one before).
 _IMPLIES: dict[str, tuple[str, ...]] = {
-    STABILITY: (),
     CONSENSUS: (BIPARTITE_CONSENSUS, CONTAINMENT),
     SIGNED_AVERAGE_CONSENSUS: (BIPARTITE_CONSENSUS,),
     BIPARTITE_CONSENSUS: (INTERVAL_BIPARTITE_CONSENSUS,),
     INTERVAL_BIPARTITE_CONSENSUS: (BIPARTITE_CONTAINMENT,),
     CONTAINMENT: (BIPARTITE_CONTAINMENT,),
-    BIPARTITE_CONTAINMENT: (),
 }
 #: Theorem and behaviour by connectivity, and by whether some closed component is balanced.
 _THEOREMS: dict[tuple[str, bool], tuple[str, str]] = {
@@ -102,13 +100,13 @@ class Claim:
         >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).holds("bipartite-consensus")
         True
         """
-        wanted, reached, todo = behaviour_name(behaviour), set(), [self.behaviour, *self.special]
-        while todo:
-            word = todo.pop()
-            if word not in reached:
-                reached.add(word)
-                todo.extend(_IMPLIES[word])
-        return wanted in reached
+        wanted = behaviour_name(behaviour)
+        return any(wanted in _implied(said) for said in (self.behaviour, *self.special))
+
+
+def _implied(behaviour: str) -> set[str]:
+    """Return a behaviour and all that it implies."""
+    return {behaviour}.union(*map(_implied, _IMPLIES.get(behaviour, ())))
 
 
 def claim_of(component: WeakComponent) -> Claim:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -92,10 +93,8 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
     balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
     values: list[np.ndarray] = []
     for nodes, block in component_blocks(structure):
-        if nodes.size > DENSE_NODES:
-            found = _nearest_eigenvalues(block)
-        else:
-            found = np.linalg.eigvals(block.toarray()).astype(complex)
+        large = nodes.size > DENSE_NODES
+        found = _nearest_eigenvalues(block) if large else np.linalg.eigvals(block.toarray()).astype(complex)
         if int(nodes[0]) in balanced:
             found = np.delete(found, np.argmin(np.abs(found)))
         values.append(found)
@@ -112,23 +111,12 @@ def component_blocks(structure: Structure) -> Iterator[tuple[np.ndarray, Any]]:
     >>> [(nodes.tolist(), block.toarray().tolist()) for nodes, block in component_blocks(analyse(g))]
     [([0, 1], [[1.0, -1.0], [-1.0, 1.0]])]
     """
-    from scipy import sparse
-
-    number, L = structure.strong_component, structure.graph.laplacian()
-    sizes = np.bincount(number)
-    entries = sparse.coo_array(L)
-    inside = np.flatnonzero((number[entries.row] == number[entries.col]) & (sizes[number[entries.row]] > 1))
-    inside = inside[np.argsort(number[entries.row[inside]], kind="stable")]
-    order = np.argsort(number, kind="stable")
-    first = np.concatenate([[0], np.cumsum(sizes)])
-    place = np.empty_like(order)
-    place[order] = np.arange(order.size) - first[number[order]]
-    begin = np.searchsorted(number[entries.row[inside]], np.arange(sizes.size + 1))
-    for k in np.flatnonzero(sizes > 1).tolist():
-        own = inside[begin[k] : begin[k + 1]]
-        where = place[entries.row[own]], place[entries.col[own]]
-        block = sparse.csr_array((entries.data[own], where), shape=(sizes[k], sizes[k]))
-        yield order[first[k] : first[k + 1]], block
+    number = structure.strong_component
+    order, ends = np.argsort(number, kind="stable"), np.cumsum(np.bincount(number)).tolist()
+    L = structure.graph.laplacian()[order][:, order].sorted_indices()  # components stand one after the other
+    for first, end in pairwise([0, *ends]):
+        if end - first > 1:
+            yield order[first:end], L[first:end, first:end]
 
 
 def single_followers(structure: Structure) -> np.ndarray:
@@ -318,10 +306,9 @@ def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
     >>> exact_left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)]))
     [Fraction(3, 4), Fraction(1, 4)]
     """
-    n = graph.n_nodes
-    M = _comparison(graph.exact_laplacian())
-    # p' M = 0 has rank n - 1; its last equation gives way to p' 1 = 1.
-    system = [[M[j][i] for j in range(n)] for i in range(n - 1)] + [[Fraction(1)] * n]
+    n, L = graph.n_nodes, graph.exact_laplacian()
+    # p' M(L) = 0 has rank n - 1; its last equation gives way to p' 1 = 1.
+    system = [[L[j][i] if i == j else -abs(L[j][i]) for j in range(n)] for i in range(n - 1)] + [[Fraction(1)] * n]
     p = solve_exact(system, [[Fraction(0)]] * (n - 1) + [[Fraction(1)]])
     if p is None or any(row[0] <= 0 for row in p):
         raise HypothesisError("the graph is not strongly connected, so no positive left vector is unique")
@@ -465,13 +452,17 @@ def containment_weights(structure: Structure) -> np.ndarray:
     """
     from scipy.sparse.linalg import splu
 
-    containment_weights, F = _gauged_weights(structure), structure.followers
-    if F.size == 0 or containment_weights.shape[1] == 0:
-        return np.zeros((F.size, containment_weights.shape[1]))
-    L_F = structure.graph.laplacian()[F][:, F]
+    balanced, F = [c for c in structure.closed_components if c.balanced], structure.followers
+    if F.size == 0 or not balanced:
+        return np.zeros((F.size, len(balanced)))
+    ends = np.zeros((structure.graph.n_nodes, len(balanced)))  # G_k 1 on each balanced closed component
+    for column, component in enumerate(balanced):
+        ends[list(component.nodes), column] = component.gauge
+    rows = structure.graph.laplacian()[F]
+    L_F = rows[:, F]
     scale = 1 / L_F.diagonal()
     factor = splu((scale[:, None] * L_F).tocsc())
-    return np.asarray(factor.solve(-scale[:, None] * (structure.graph.laplacian()[F] @ containment_weights)))
+    return np.asarray(factor.solve(-scale[:, None] * (rows @ ends)))
 
 
 def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
@@ -510,19 +501,6 @@ def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
     if solution is None:
         raise HypothesisError("the follower block is singular, which Lemma 9 excludes")
     return solution
-
-
-def _gauged_weights(structure: Structure) -> np.ndarray:
-    """Return the (N, m_b) matrix whose columns are ``G_k 1`` on each balanced closed component."""
-    balanced = [c for c in structure.closed_components if c.balanced]
-    containment_weights = np.zeros((structure.graph.n_nodes, len(balanced)))
-    for column, component in enumerate(balanced):
-        containment_weights[list(component.nodes), column] = component.gauge
-    return containment_weights
-
-
-def _comparison(L: list[list[Fraction]]) -> list[list[Fraction]]:
-    return [[abs(x) if i == j else -abs(x) for j, x in enumerate(row)] for i, row in enumerate(L)]
 
 
 def solve_exact(A: Sequence[Sequence[Fraction]], B: Sequence[Sequence[Fraction]]) -> list[list[Fraction]] | None:

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
+from lmi.definiteness_proofs import prove_generalized_margin
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
-from ptcc_certify.theorems.base import (
-    KEPT,
-    Obligation,
-    RateProof,
-    Theorem,
-    connectivity_rate,
-    floats,
-    left_vector_diagonal,
-    prove_direct,
-    prove_weighted_deviation,
-    rounded,
-)
-from ptcc_certify.theorems.lemmas import unbalanced_diagonal
+from ptcc_certify.theorems.composite import Composite, connectivity_rate, left_vector_diagonal
+from ptcc_certify.theorems.matrices import floats, multiply, without_last
+from ptcc_certify.theorems.theorem import KEPT, Obligation, RateProof, Theorem
 
 
 class BalancedStrong(Theorem):
@@ -31,13 +24,10 @@ class BalancedStrong(Theorem):
 
     number = "1.1"
     statement = "Strongly connected, structurally balanced: bipartite consensus at T."
-
-    def hypotheses(self, structure: Structure) -> dict[str, bool]:
-        """Strongly connected and balanced."""
-        return {
-            "strongly connected": structure.connectivity == "strong",
-            "structurally balanced": structure.balanced,
-        }
+    conditions = (
+        ("strongly connected", lambda s: s.connectivity == "strong"),
+        ("structurally balanced", lambda s: s.balanced),
+    )
 
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """``P`` is forced by the graph: nothing is searched."""
@@ -49,27 +39,23 @@ class BalancedStrong(Theorem):
 
     def decrease(self, structure: Structure, V: LyapunovFunction) -> np.ndarray:
         """``2 a(L) P``."""
-        if not V.blocks:
-            return np.zeros((0, 0))
         return self.rate(structure, V) * np.diag(floats(V.weights))
 
     def rate(self, structure: Structure, V: LyapunovFunction) -> float:
         """``2 a(L)``, the second-smallest generalized eigenvalue of ``(PL + L'P, P)``; infinite for one node."""
-        if not V.blocks:
-            return math.inf
-        return connectivity_rate(structure.graph, V.weights)
+        return connectivity_rate(structure.graph, V.weights) if V.blocks else math.inf
 
     def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
         """``Z L + L'Z > b Z`` modulo ``G1``, ``Z = G (P - pp'/p'1) G``."""
         if not V.blocks:
             return RateProof(None, ())
-        b = prove_weighted_deviation(structure.graph, V.gauge, V.weights, self.rate(structure, V))
+        b = _prove_weighted_deviation(structure.graph, V, self.rate(structure, V))
         if b is None:
             return RateProof(None, (), failed="2 a(L) is not proved positive")
         return RateProof(b, (Obligation("deviation-decrease", "paper", {"b": b}),))
 
 
-class UnbalancedStrong(Theorem):
+class UnbalancedStrong(Composite):
     """Theorem 1.2: strongly connected, structurally unbalanced: stability at T.
 
     ``V = E' Omega E`` with ``Omega L + L' Omega > 0``; rate ``lmin(Omega L + L' Omega) / lmax(Omega)``.
@@ -77,20 +63,22 @@ class UnbalancedStrong(Theorem):
 
     number = "1.2"
     statement = "Strongly connected, structurally unbalanced: stability at T."
+    conditions = (
+        ("strongly connected", lambda s: s.connectivity == "strong"),
+        ("structurally unbalanced", lambda s: not s.balanced),
+    )
+    leader = matrix = "Omega"
+    product = "Omega L + L' Omega"
 
-    def hypotheses(self, structure: Structure) -> dict[str, bool]:
-        """Strongly connected and unbalanced."""
-        return {
-            "strongly connected": structure.connectivity == "strong",
-            "structurally unbalanced": not structure.balanced,
-        }
 
-    def lyapunov(self, structure: Structure) -> LyapunovFunction:
-        """``Omega`` of Lemma 3.2, the one with the largest rate that the solver resolves."""
-        nodes, omega = tuple(range(structure.graph.n_nodes)), unbalanced_diagonal(structure.graph)
-        block = LyapunovBlock("Omega", nodes, rounded(omega))
-        return LyapunovFunction("paper", "E", (block,), objective="lmin(Omega L + L' Omega) / lmax(Omega)")
+def _prove_weighted_deviation(graph: SignedDigraph, V: LyapunovFunction, guess: float) -> Fraction | None:
+    """Prove ``Z L + L'Z >= b Z`` for ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``; return ``b``.
 
-    def prove(self, structure: Structure, V: LyapunovFunction) -> RateProof:
-        """``Omega L + L' Omega > m I``."""
-        return prove_direct(structure, V, "Omega L + L' Omega")
+    ``Z G1 = 0`` and ``(Z L + L'Z) G1 = 0`` exactly for any ``p > 0``; one row and column are deleted.
+    """
+    gauge, p, n = V.gauge, V.weights, len(V.weights)
+    total = sum(p)
+    Z = [[gauge[i] * gauge[j] * (p[i] * (i == j) - p[i] * p[j] / total) for j in range(n)] for i in range(n)]
+    ZL = multiply(Z, graph.exact_laplacian())
+    S = [[ZL[i][j] + ZL[j][i] for j in range(n)] for i in range(n)]
+    return prove_generalized_margin(without_last(S), without_last(Z), guess)

@@ -259,6 +259,19 @@ def test_the_residual_is_what_the_bound_leaves():
     )
 
 
+@pytest.mark.parametrize("name", ["norm_factor", "bound", "deviation", "deviation_norm"])
+def test_the_clock_alone_bounds_nothing_in_a_reaching_phase(name: str):
+    """What moves the agents until ``T_r`` is the sliding variables, of which the clock knows nothing."""
+    robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    start = () if name == "norm_factor" else ([3, 1],)
+    direct = certify(pair, robust, [3, 1], simulation=False).envelope
+    assert np.isfinite(getattr(direct, name)(1.0, *start)).all()
+    reaching = certify(pair, robust, [3, 1], sigma0=[8, -2], simulation=False).envelope
+    with pytest.raises(ParameterError, match="reaching phase"):
+        getattr(reaching, name)(1.0, *start)
+
+
 def test_more_functions_make_the_envelope_the_pointwise_best():
     envelope, _, _ = pair_envelope(1.0)
     slow = envelope.functions[0]

@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from ptcc_certify.batch import certify_many
-from ptcc_certify.bounds.final_state import (
-    final_state,
-    influence,
+from ptcc_certify.bounds.definitions import (
     is_bipartite_consensus,
     is_bipartite_containment,
     is_interval_bipartite_consensus,
     is_prescribed_time_stable,
     is_stability,
 )
+from ptcc_certify.bounds.final_state import final_state, influence
 from ptcc_certify.bounds.input import box, ellipsoid
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ptcc_certify.checker.input_formulas import InitialSet, Limits, Rows
-from ptcc_certify.theorems.base import Obligation
+from ptcc_certify.theorems.theorem import Obligation
 
 
 @dataclass(frozen=True)
