@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
@@ -15,9 +16,6 @@ from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trajectory import plot_sliding
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
 
+from ptcc_certify.gain_design import Design
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ptcc_certify.gain_design import Design
 
 
 @styled
@@ -47,6 +42,5 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     ax.axhline(float(found.asked.max_input), color=BOUND, linewidth=0.9, linestyle=":", label="asked for")
     if found.protocol is not None and found.peak:
         ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color=RUN, label="this design")
-    return finished(
-        ax, "deadline $T$", r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$"
-    )
+    norm = r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$"
+    return finished(ax, "deadline $T$", norm)
