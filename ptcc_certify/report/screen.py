@@ -88,10 +88,16 @@ def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
         steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
         more = " ..." if len(component.negative_cycle) > 12 else ""
         return f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"
+    found = camps(component)
+    text = " against ".join("{" + _listed([labels[v] for v in camp], 40) + "}" for camp in found)
+    return f"balanced, {'camps ' if len(found) > 1 else 'one camp '}{text}"
+
+
+def camps(component: ClosedComponent) -> list[list[int]]:
+    """Return the camps of a balanced leader group, the one of its first Lyapunov function first."""
     gauge = component.gauge or ()
-    camps = [[label for label, g in zip(nodes, gauge, strict=True) if g == sign] for sign in (1, -1)]
-    text = " against ".join("{" + _listed(camp, 40) + "}" for camp in camps if camp)
-    return f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"
+    both = ([v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
+    return [camp for camp in both if camp]
 
 
 def _final_state_lines(certificate: Certificate) -> Lines:
