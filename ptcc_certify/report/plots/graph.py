@@ -65,7 +65,7 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
         sign: {"color": colour, "linestyle": line, "linewidth": 0.6 if many else 1.1}
         for sign, (colour, line, _) in EDGE_STYLES.items()
     }
-    arrow = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9, "connectionstyle": "arc3,rad=0.1"}
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9, "connectionstyle": "arc3,rad=0.1"}
     for source, target, sign in zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), strict=True):
         shrunk = {"shrinkA": radius[source], "shrinkB": radius[target]}
         ax.add_artist(FancyArrowPatch(place[source], place[target], zorder=1, **arrow, **shrunk, **looks[sign]))

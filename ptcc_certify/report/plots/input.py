@@ -195,9 +195,10 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
     effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
     if effort is None or (actuator is not None and actuator.sample_period is not None):
         return None
-    for entry in effort.residual if actuator is not None else ():
+    acts = None if actuator is None else (actuator.gain_cap, actuator.stop_before, actuator.sample_period)
+    for entry in effort.residual:
         own = (entry.limits.gain_cap, entry.limits.stop_before, entry.limits.sample_period)
-        if own == (actuator.gain_cap, actuator.stop_before, None) and entry.largest is not None:
+        if own == acts and entry.largest is not None:
             return float(entry.largest)
     # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
     return None if effort.peak is None else float(effort.peak.largest)

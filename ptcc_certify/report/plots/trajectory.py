@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -149,9 +150,9 @@ def draw_agents(
     for node in np.argsort(group == "followers", kind="stable"):
         name = str(group[node])
         line, width = ("--", 0.9) if name == "followers" else ("-", 1.6)
+        looks: dict[str, Any] = {"color": CAMP_COLOURS[name], "linestyle": line, "linewidth": width}
         label = None if name in seen else name
-        looks = {"color": CAMP_COLOURS[name], "linestyle": line, "linewidth": width, "drawstyle": drawstyle}
-        ax.plot(trajectory.t, values[node], label=label, **looks)
+        ax.plot(trajectory.t, values[node], drawstyle=drawstyle, label=label, **looks)
         seen.add(name)
     draw_deadlines(trajectory, ax)
 
