@@ -15,7 +15,7 @@ import textwrap
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,8 +38,8 @@ from ptcc_certify.lyapunov.search import METHODS, search_functions
 from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.plots.style import SINGLE_COLUMN, STYLE, new_axes
-from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.report.figures import PLOTS
+from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, finished, new_axes
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 
@@ -59,7 +59,7 @@ _LARGEST, _LARGER = 3.0, {"kappa": 5.0, "mu1": 5.0}
 #: Those of each kind of protocol.
 _OWN = {"nominal": ("T", *_GAIN), "sliding-mode": tuple(name for name in _BEGIN if name != "T")}
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
-_SHOWN = {"claim", "x(T)", "sliding", "disturbed", "rate", "error", "proof", "input", "INPUT", "simulated", "note"}
+_SHOWN = ("claim", "x(T)", "sliding", "disturbed", "rate", "error", "proof", "input", "INPUT", "simulated", "note")
 _SAMPLES, _DPI = 81, 120
 #: Share of the error at the start down to which the decay is drawn: below it the integrator resolves little.
 _LEAST = 1e-8
@@ -460,12 +460,10 @@ def _disturbance(settings: Settings, protocol: ReachingProtocol, n: int) -> Dist
 
 def _shown(lines: list[str]) -> list[str]:
     """Keep the lines whose heads are shown, with those that belong to them."""
-    kept, keeps = [], False
+    kept, head = [], ""
     for line in lines:
-        head = line[:10].strip()
-        keeps = head in _SHOWN | {"verdict"} if head else keeps
-        if keeps:
-            kept.append(line)
+        head = line[:10].strip() or head
+        kept += [line] if head in (*_SHOWN, "verdict") else []
     return kept
 
 
@@ -482,12 +480,9 @@ def _unchecked_lines(certificate: Certificate) -> list[str]:
 
 def _figure(certificate: Certificate) -> Figure:
     """Draw states, sliding variables if there is a reaching phase, and decay under the bound."""
-    run: Any = certificate.trajectory
-    draw: list[Callable[[Axes], object]] = [lambda ax: plot_trajectory(run, certificate.structure, ax)]
-    if not certificate.direct:
-        draw.append(lambda ax: plot_sliding(run, certificate.reaching, ax))
-    if certificate.envelope.functions:
-        draw.append(partial(_draw_decay, certificate))
+    draw: list[Callable[..., object]] = [PLOTS["states"]]
+    draw += [] if certificate.direct else [PLOTS["sliding"]]
+    draw += [_draw_decay] if certificate.envelope.functions else []
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
         figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
@@ -496,7 +491,7 @@ def _figure(certificate: Certificate) -> Figure:
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)
         figure.subplots_adjust(left / whole, bottom / height, 1 - right / whole, 1 - top / height, gap / panel_width)
         for place, panel in enumerate(draw, start=1):
-            panel(new_axes(figure, (1, len(draw), place)))
+            panel(certificate, new_axes(figure, (1, len(draw), place)))
     return figure
 
 
@@ -508,8 +503,8 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
     function = next(m for m in envelope.functions if m.coordinates == envelope.coordinates)
     norm = np.linalg.norm(function.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
     bound, scale = certificate.norm_bound(run.remaining[before]), float(norm[0]) or 1.0
-    ax.loglog(run.remaining[before], bound / scale, color="#D55E00", linewidth=1.6, label="bound")
-    ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
+    ax.loglog(run.remaining[before], bound / scale, color=BOUND, linewidth=1.6, label="bound")
+    ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color=RUN, label="simulated (CVODES)")
     top = float(bound[0]) / scale
     ax.set_ylim(_LEAST, 3 * max(1.0, top if math.isfinite(top) else 1.0))
     ax.invert_xaxis()
@@ -518,9 +513,7 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
         axis.set_ticks([1, 1e-2, 1e-4, 1e-6, 1e-8])
         axis.set_major_formatter("{x:g}")
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    ax.set_xlabel("time left, $1 - t/T$")
-    ax.set_ylabel(rf"$\|{name}(t)\| / \|{name}(0)\|$")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+    finished(ax, "time left, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")
 
 
 def _refusal(message: str) -> Figure:

@@ -6,19 +6,17 @@ Figures 1, 3 and 5 are the graphs, 2, 4, 6, 8, 10 and 12 the states, 7, 9 and 11
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from matplotlib import style
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.report.example_results import Run
-from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.graph import plot_graph
-from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.figures import PLOTS
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes
-from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+
+#: The plots of those figures of the paper that have a name of their own.
+_PLOTS = {"graphs": "graph", "sliding_variables": "sliding"}
 
 
 def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
@@ -58,18 +56,8 @@ def _panels(runs: Sequence[Run], what: str) -> Figure:
         figure = Figure(SINGLE_COLUMN if len(runs) == 1 else DOUBLE_COLUMN, layout="constrained")
         panels = figure.subfigures(1, len(runs), squeeze=False)[0]
         for (example, graph, certificate), panel in zip(runs, panels, strict=True):
-            _DRAW[what](certificate, new_axes(panel))
+            PLOTS[_PLOTS.get(what, what)](certificate, new_axes(panel))
             claim = certificate.claim
             letter = "ab"[example.graphs.index(graph)]
             panel.suptitle(f"({letter}) {graph}: {claim.behaviour if claim else ''}")
     return figure
-
-
-#: What draws each figure; an example is simulated.
-_DRAW: dict[str, Callable[[Any, Axes], object]] = {
-    "graphs": lambda certificate, ax: plot_graph(certificate.structure, ax),
-    "states": lambda certificate, ax: plot_trajectory(certificate.trajectory, certificate.structure, ax),
-    "sliding_variables": lambda certificate, ax: plot_sliding(certificate.trajectory, certificate.reaching, ax),
-    "decay": plot_decay,
-    "input": lambda certificate, ax: plot_input(certificate.trajectory, certificate.structure, certificate, ax),
-}
