@@ -4,8 +4,8 @@ Exit codes: 0 proved and everything asked holds; 1 a bound is violated, or a cer
 usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything
 else to standard error.
 
-Each module has a group of commands. :mod:`~ptcc_certify.cli.options` are those that several share, and what becomes of
-them; :mod:`~ptcc_certify.cli.terminal` prints.
+Modules are named after their commands. :mod:`~ptcc_certify.cli.options` are those that several share, and what becomes
+of them; :mod:`~ptcc_certify.cli.terminal` prints.
 """
 
 from __future__ import annotations
@@ -15,12 +15,7 @@ import sys
 
 import click
 
-from ptcc_certify.cli.certificates import certify, check, report
-from ptcc_certify.cli.gains import design
-from ptcc_certify.cli.many import batch
-from ptcc_certify.cli.paper import cite, examples
-from ptcc_certify.cli.runs import simulate
-from ptcc_certify.cli.structures import classify
+from ptcc_certify.cli import batch, certify, check_and_report, classify, design, examples_and_cite, simulate
 from ptcc_certify.errors import ExitCode, PTCCError, explain, one_line
 
 __all__ = ["cli", "main"]
@@ -35,7 +30,7 @@ class _InOrder(click.Group):
         return list(self.commands)
 
 
-@click.group(cls=_InOrder, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=_InOrder, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(package_name="ptcc-certify", prog_name="ptcc")
 def cli() -> None:
     """Certify prescribed-time coordination control on signed digraphs.
@@ -44,7 +39,17 @@ def cli() -> None:
     """
 
 
-for command in (classify, certify, check, report, simulate, design, examples, batch, cite):
+for command in (
+    classify.classify,
+    certify.certify,
+    check_and_report.check,
+    check_and_report.report,
+    simulate.simulate,
+    design.design,
+    examples_and_cite.examples,
+    batch.batch,
+    examples_and_cite.cite,
+):
     cli.add_command(command)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,90 +26,15 @@ Options = Mapping[str, Any]
 
 READING = ("edges", "duplicates", "drop_self_loops", "undirected")
 LIMITS = ("gain_cap", "stop_before", "sample_period")
-SLIDING_DEFAULTS = {"T_r": "0.5", "T_s": "0.5", "mu1": "2", "mu2": "1", "mu3": "1", "delta": "1"}
-
-
-def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def apply(function: Any) -> Any:
-        for decorator in reversed(decorators):
-            function = decorator(function)
-        return function
-
-    return apply
-
-
-def _sliding(flag: str, text: str) -> Callable[[Any], Any]:
-    name = flag.removeprefix("--").replace("-", "_")
-    return click.option(flag, name, show_default=SLIDING_DEFAULTS[name], help=text)
-
-
-reading_options = _options(
-    click.option(
-        "--edges",
-        type=click.Choice(["information", "listens"]),
-        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
-    ),
-    click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse", show_default=True),
-    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
-    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
-)
-graph_options = _options(click.argument("graph"), reading_options)
-protocol_options = _options(
-    click.option(
-        "--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal", show_default=True
-    ),
-    click.option("--T", "T", show_default="1", help="Deadline (nominal)."),
-    click.option("--rho1", default="1", show_default=True, help="Constant part of the gain."),
-    click.option("--rho2", default="1", show_default=True, help="Factor of the growing part of the gain."),
-    click.option("--kappa", default="2", show_default=True, help="Exponent of the time scaling."),
-    _sliding("--T-r", "Sliding mode: time to reach the manifold."),
-    _sliding("--T-s", "Sliding mode: time on it; the deadline is T_r + T_s."),
-    _sliding("--mu1", "Sliding mode: switching gain, above delta."),
-    _sliding("--mu2", "Sliding mode: constant part of the reaching gain."),
-    _sliding("--mu3", "Sliding mode: factor of its growing part."),
-    _sliding("--delta", "Bound of every disturbance."),
-    click.option(
-        "--disturbance",
-        metavar="EXPR",
-        show_default="worst-case",
-        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none.",
-    ),
-    click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
-    click.option("--x0", default="random", show_default=True, help="5,2,-4 | label=value,... | FILE.csv | random"),
-    click.option(
-        "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of random initial states."
-    ),
-)
-limit_options = _options(
-    click.option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
-    click.option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
-    click.option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
-)
-method_option = click.option(
-    "--method",
-    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
-    default="best",
-    show_default=True,
-    help="Lyapunov functions searched beside the paper's.",
-)
-starts_option = click.option(
-    "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
-)
-memory_option = click.option(
-    "--memory",
-    type=click.FloatRange(min=0, min_open=True, max=1000),
-    default=1,
-    show_default=True,
-    metavar="GB",
-    help="What the check may take; a certificate that may take more is refused.",
-)
-time_limit_option = click.option(
-    "--time-limit",
-    type=float,
-    metavar="SECONDS",
-    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
+#: Parameters of the sliding-mode protocol: what they are by default, and what they are.
+_SLIDING = {
+    "T_r": ("0.5", "Sliding mode: time to reach the manifold."),
+    "T_s": ("0.5", "Sliding mode: time on it; the deadline is T_r + T_s."),
+    "mu1": ("2", "Sliding mode: switching gain, above delta."),
+    "mu2": ("1", "Sliding mode: constant part of the reaching gain."),
+    "mu3": ("1", "Sliding mode: factor of its growing part."),
+    "delta": ("1", "Bound of every disturbance."),
+}
 
 
 def flag_of(name: str) -> str:
@@ -116,11 +42,9 @@ def flag_of(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def number(options: Options, name: str) -> Fraction | None:
+def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
     """Return the exact number that an option gives, None if it was not given."""
-    if options[name] is None:
-        return None
-    return exact_number(options[name], flag_of(name))
+    return None if text is None else exact_number(text, parameter.opts[0])
 
 
 def exact_number(text: str, flag: str) -> Fraction:
@@ -133,14 +57,93 @@ def exact_number(text: str, flag: str) -> Fraction:
         raise ParameterError(f"{flag}: {error}") from None
 
 
-def expected_behaviour(options: Options) -> str | None:
+def _behaviour(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
     """Return the behaviour that ``--expect`` names."""
     from ptcc_certify.graphs.structure import behaviour_name
 
     try:
-        return None if options["expect"] is None else behaviour_name(options["expect"])
+        return None if text is None else behaviour_name(text)
     except ValueError as error:
         raise ParameterError(f"--expect: {error}") from None
+
+
+def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def apply(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+#: Options whose value is an exact number.
+number_option = partial(click.option, callback=_exact)
+
+
+def expect_option(text: str) -> Callable[[Any], Any]:
+    """Return the option that names the behaviour that is asked for."""
+    return click.option("--expect", metavar="BEHAVIOUR", callback=_behaviour, help=text)
+
+
+reading_options = _options(
+    click.option(
+        "--edges",
+        type=click.Choice(["information", "listens"]),
+        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
+    ),
+    click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse"),
+    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
+    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
+)
+graph_options = _options(click.argument("graph"), reading_options)
+protocol_options = _options(
+    click.option("--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal"),
+    click.option("--T", "T", show_default="1", help="Deadline (nominal)."),
+    click.option("--rho1", default="1", help="Constant part of the gain."),
+    click.option("--rho2", default="1", help="Factor of the growing part of the gain."),
+    click.option("--kappa", default="2", help="Exponent of the time scaling."),
+    *(click.option(flag_of(name), name, show_default=value, help=text) for name, (value, text) in _SLIDING.items()),
+    click.option(
+        "--disturbance",
+        metavar="EXPR",
+        show_default="worst-case",
+        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none.",
+    ),
+    click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
+    click.option("--x0", default="random", help="5,2,-4 | label=value,... | FILE.csv | random"),
+    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of random initial states."),
+)
+limit_options = _options(
+    number_option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
+    number_option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
+    number_option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
+)
+method_option = click.option(
+    "--method",
+    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
+    default="best",
+    help="Lyapunov functions searched beside the paper's.",
+)
+starts_option = number_option(
+    "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
+)
+memory_option = click.option(
+    "--memory",
+    type=click.FloatRange(min=0, min_open=True, max=1000),
+    default=1,
+    metavar="GB",
+    help="What the check may take; a certificate that may take more is refused.",
+)
+time_limit_option = click.option(
+    "--time-limit",
+    type=float,
+    metavar="SECONDS",
+    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
+)
+output_option = click.option(
+    "-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file."
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
 def graph_file(graph: str) -> Any:
@@ -167,7 +170,7 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     nominal = options["kind"] == "nominal"
-    others = (*SLIDING_DEFAULTS, "disturbance", "sigma0") if nominal else LIMITS
+    others = (*_SLIDING, "disturbance", "sigma0") if nominal else LIMITS
     for name in others:
         if options.get(name) is not None and not (nominal and name in disturbed):
             other = "sliding-mode" if nominal else "nominal"
@@ -176,7 +179,7 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
         return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
     if options["T"] is not None:
         raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
-    own = {name: default if options[name] is None else options[name] for name, default in SLIDING_DEFAULTS.items()}
+    own = {name: default if options[name] is None else options[name] for name, (default, _) in _SLIDING.items()}
     return SlidingModeProtocol(**own, **shared)
 
 
@@ -198,7 +201,7 @@ def actuator_of(options: Options) -> Actuator | None:
     """Return the limits of the gain; None if there are none."""
     from ptcc_certify.protocols.gain_limits import Actuator
 
-    actuator = Actuator(**{name: number(options, name) for name in LIMITS})
+    actuator = Actuator(**{name: options[name] for name in LIMITS})
     return None if actuator.ideal else actuator
 
 

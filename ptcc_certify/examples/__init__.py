@@ -1,15 +1,15 @@
-"""The paper's examples: parameters in code, graphs as package data.
+"""The paper's examples: parameters in ``examples.toml``, graphs as CSV files beside it.
 
 The paper prints its topologies as pictures only; the packaged graphs are stand-ins of the stated class.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -59,60 +59,15 @@ class Example:
         return NominalProtocol(**self.parameters) if "T" in self.parameters else SlidingModeProtocol(**self.parameters)
 
 
-_FIG1 = (("fig1a", "fig1b"), ("stability", "bipartite consensus"))
-_FIG3 = (("fig3a", "fig3b"), ("interval bipartite consensus", "stability"))
-_FIG5 = (("fig5a", "fig5b"), ("bipartite containment", "stability"))
+def _examples() -> dict[int, Example]:
+    """Read the table of the examples."""
+    table = tomllib.loads((resources.files(__name__) / "examples.toml").read_text(encoding="utf-8"))
+    pairs = ("graphs", "behaviours")
+    entries = [entry | {name: tuple(entry[name]) for name in pairs} for entry in table["example"]]
+    return {entry["number"]: Example(**entry) for entry in entries}
 
 
-def _example(
-    number: int, figure: tuple[tuple[str, str], tuple[str, str]], numbers: str, x0: str, **more: Any
-) -> Example:
-    graphs, behaviours = figure
-    parameters = dict(entry.split("=") for entry in numbers.split())
-    return Example(number, graphs, parameters, x0, behaviours, **more)
-
-
-EXAMPLES: dict[int, Example] = {
-    example.number: example
-    for example in (
-        _example(1, _FIG1, "T=0.6 rho1=0.1 rho2=0.3 kappa=1", "5,2,-4,3,-2,1", figures={"graphs": 1, "states": 2}),
-        _example(2, _FIG3, "T=0.6 rho1=0.2 rho2=0.5 kappa=1", "-4,3,-1,2,-2,5", figures={"graphs": 3, "states": 4}),
-        _example(
-            3,
-            _FIG5,
-            "T=0.2 rho1=0.1 rho2=0.3 kappa=1",
-            "-6,4,5,-7,8,-5,-3,7,-5,6,4,2,-5,3,-8,1",
-            figures={"graphs": 5, "states": 6},
-        ),
-        _example(
-            4,
-            _FIG1,
-            "T_r=0.5 T_s=1 rho1=0.1 rho2=0.3 kappa=2 mu1=1.2 mu2=0.6 mu3=0.9 delta=1",
-            "-4,3,-1,2,-2,5",
-            sigma0="-9,1,-5,8,-4,6",
-            disturbance="sin(2*k*t + pi/3)",
-            figures={"sliding_variables": 7, "states": 8},
-        ),
-        _example(
-            5,
-            _FIG3,
-            "T_r=1 T_s=0.5 rho1=0.25 rho2=0.3 kappa=3 mu1=2 mu2=0.4 mu3=0.5 delta=1",
-            "-4,4,5,-7,8,1",
-            sigma0="-10,10,9,-5,5,4",
-            disturbance="sin(2*k*t + pi/2)",
-            figures={"sliding_variables": 9, "states": 10},
-        ),
-        _example(
-            6,
-            _FIG5,
-            "T_r=0.4 T_s=0.6 rho1=0.2 rho2=0.1 kappa=3 mu1=2 mu2=0.1 mu3=0.5 delta=1",
-            "2.6,-1.2,-1.2,-1,-0.2,0.9,-2.9,2,0.3,2.1,-1,-0.3,-2.7,-2,1,-1",
-            sigma0="2.9,-3,0.5,0,0.75,-0.8,-1.5,3.8,2.3,3.6,0.2,-0.27,-4,-2.3,-0.5,-2.9",
-            disturbance="cos(k*t - pi/3)",
-            figures={"sliding_variables": 11, "states": 12},
-        ),
-    )
-}
+EXAMPLES = _examples()
 
 
 def graph_path(name: str) -> Path:

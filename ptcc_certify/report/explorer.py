@@ -10,14 +10,19 @@ from __future__ import annotations
 import html
 import io
 import math
+import sys
 import textwrap
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import style
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from lmi.exact.directed_rounding import down
 from ptcc_certify.bounds.final_state import exact_initial_state, final_state
@@ -25,6 +30,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.graphs.size_limits import CHECKED_NODES, EXPLORED_NODES
 from ptcc_certify.lyapunov.error_system import ErrorSystem
@@ -32,40 +38,26 @@ from ptcc_certify.lyapunov.search import METHODS, search_functions
 from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.plots.style import SINGLE_COLUMN, STYLE, new_axes
-from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.report.figures import PLOTS
+from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, finished, new_axes
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
     from ipywidgets import VBox
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ptcc_certify.graphs.digraph import SignedDigraph
 
 KINDS = ("nominal", "sliding-mode")
 DISTURBANCES = ("none", "worst-case", "sin", "telegraph")
 #: The name of a graph that is given, among those of the packaged ones.
 GIVEN = "given graph"
-#: Values of ``s`` times the largest rate that is possible, at which the bound should be small, whatever the gains.
-_CLOCKS = (4.0,)
+#: The value of ``s`` times the largest rate that is possible, at which the bound should be small, whatever the gains.
+_CLOCK = 4.0
 #: Parameters of the protocols with what they begin with; their sliders go up to 3, but for some.
-_BEGIN = {
-    "T": 1,
-    "T_r": 0.5,
-    "T_s": 0.5,
-    "rho1": 0.2,
-    "rho2": 0.5,
-    "kappa": 1,
-    "mu1": 2,
-    "mu2": 1,
-    "mu3": 1,
-    "delta": 1,
-}
+_GAIN = {"rho1": 0.2, "rho2": 0.5, "kappa": 1}
+_BEGIN = {"T": 1, "T_r": 0.5, "T_s": 0.5, **_GAIN, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
 _LARGEST, _LARGER = 3.0, {"kappa": 5.0, "mu1": 5.0}
-_NOMINAL = ("T", "rho1", "rho2", "kappa")
-_SLIDING = tuple(name for name in _BEGIN if name != "T")
+#: Those of each kind of protocol.
+_OWN = {"nominal": ("T", *_GAIN), "sliding-mode": tuple(name for name in _BEGIN if name != "T")}
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
 _SHOWN = ("claim", "x(T)", "sliding", "disturbed", "rate", "error", "proof", "input", "INPUT", "simulated", "note")
 _SAMPLES, _DPI = 81, 120
@@ -118,18 +110,14 @@ class Settings:
         method: str = "best",
         **parameters: Any,
     ):
-        for name, value, known in (
-            ("kind", kind, KINDS),
-            ("disturbance", disturbance, DISTURBANCES),
-            ("method", method, METHODS),
-            *(("parameter", name, _BEGIN) for name in parameters),
-        ):
-            _refuse_unknown(name, value, known)
+        self.graph, self.kind, self.reaching, self.disturbance = graph, kind, reaching, disturbance
+        self.seed, self.method, self.parameters = seed, method, _BEGIN | parameters
+        for name, known in (("kind", KINDS), ("disturbance", DISTURBANCES), ("method", METHODS)):
+            _refuse_unknown(name, getattr(self, name), known)
+        for name in parameters:
+            _refuse_unknown("parameter", name, _BEGIN)
         if seed < 0:
             raise ParameterError(f"seed = {seed} is outside its domain; seed must be >= 0")
-        self.graph, self.kind, self.reaching, self.disturbance = graph, kind, reaching, disturbance
-        self.seed, self.method = seed, method
-        self.parameters = _BEGIN | parameters
 
     def to_dict(self) -> dict[str, Any]:
         """Return all settings by their names, the parameters of the protocol among them."""
@@ -154,8 +142,7 @@ class Settings:
         ParameterError
             A parameter is outside its domain.
         """
-        names = _NOMINAL if self.kind == "nominal" else _SLIDING
-        return Protocol.from_dict({"kind": self.kind, **{name: _decimal(self.parameters[name]) for name in names}})
+        return Protocol.from_dict({"kind": self.kind} | {k: _decimal(self.parameters[k]) for k in _OWN[self.kind]})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,12 +165,11 @@ class View:
     @cached_property
     def text(self) -> str:
         """Claim, rate, run and verdict, or the refusal. The independent check is made when this is asked for."""
-        certificate = self.certificate
-        if certificate is None or certificate.trajectory is None:
+        if self.certificate is None:
             return self.refusal
-        return "\n".join(_shown(certificate_lines(certificate, self.settings.graph)))
+        return "\n".join(_shown(certificate_lines(self.certificate, self.settings.graph)))
 
-    @cached_property
+    @property
     def unchecked(self) -> str:
         """Claim and rate, or the refusal, before the independent check: nothing is called certified."""
         if self.certificate is None:
@@ -198,8 +184,6 @@ class View:
     @cached_property
     def png(self) -> bytes:
         """The figure as PNG."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
         buffer = io.BytesIO()
         FigureCanvasAgg(self.figure).print_png(buffer)
         return buffer.getvalue()
@@ -311,7 +295,7 @@ class Explorer:
         if (graph, method) not in self._proved:
             base = self._proved[graph, "paper"]
             unit = float(base.upper_bound or 1)
-            found = search_functions(ErrorSystem(base.structure), method, [x / unit for x in _CLOCKS])
+            found = search_functions(ErrorSystem(base.structure), method, [_CLOCK / unit])
             notes = (*base.notes, *found.notes)
             self._proved[graph, method] = base.changed(search=found, method=method, notes=notes)
         return self._proved[graph, method]
@@ -400,8 +384,9 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
     def update(_: object = None) -> None:
         tell("verdict    none: not computed yet")  # nothing of the settings before may stay
         settings = wanted()
-        own = _NOMINAL if settings.kind == "nominal" else (*_SLIDING, "reaching", "disturbance")
-        shown = tuple(panel[name] for name in ("graph", "kind", "method", "seed", *own))
+        names = ("graph", "kind", "method", "seed", *_OWN[settings.kind])
+        names += ("reaching", "disturbance") if settings.kind == "sliding-mode" else ()
+        shown = tuple(panel[name] for name in names)
         if box.children != shown:
             box.children = shown
         cheap = explorer.graphs[settings.graph].n_nodes <= CHECKED_NODES
@@ -449,11 +434,8 @@ def _panel(explorer: Explorer, begin: dict[str, Any]) -> dict[str, Any]:
 
 def _in_notebook() -> bool:
     """Tell whether a kernel that shows widgets runs this."""
-    try:
-        from IPython import get_ipython
-    except ImportError:
-        return False
-    return getattr(get_ipython(), "kernel", None) is not None
+    shell = sys.modules.get("IPython")  # which a kernel has loaded
+    return shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None
 
 
 def _refuse_unknown(name: str, value: str, known: Iterable[str]) -> None:
@@ -478,21 +460,19 @@ def _disturbance(settings: Settings, protocol: ReachingProtocol, n: int) -> Dist
 
 def _shown(lines: list[str]) -> list[str]:
     """Keep the lines whose heads are shown, with those that belong to them."""
-    kept, keeps = [], False
+    kept, head = [], ""
     for line in lines:
-        head = line[:10].strip()
-        keeps = head in (*_SHOWN, "verdict") if head else keeps
-        if keeps:
-            kept.append(line)
+        head = line[:10].strip() or head
+        kept += [line] if head in (*_SHOWN, "verdict") else []
     return kept
 
 
 def _unchecked_lines(certificate: Certificate) -> list[str]:
     """Tell claim and rate of a certificate that the independent check has not seen."""
-    said, deadline = [claim.behaviour for claim in certificate.claims[:4]], float(certificate.protocol.T)
+    behaviours = ", ".join(claim.behaviour for claim in certificate.claims[:4])
     rate = "none" if certificate.rate is None else down(certificate.rate)
     return [
-        f"claim      {', '.join(said)} at T = {deadline:.12g} (Theorem {certificate.theorem.number})",
+        f"claim      {behaviours} at T = {float(certificate.protocol.T):.12g} (Theorem {certificate.theorem.number})",
         f"rate       {rate} per unit of s, as found",
         "verdict    none: not checked yet",
     ]
@@ -500,15 +480,9 @@ def _unchecked_lines(certificate: Certificate) -> list[str]:
 
 def _figure(certificate: Certificate) -> Figure:
     """Draw states, sliding variables if there is a reaching phase, and decay under the bound."""
-    from matplotlib import style
-    from matplotlib.figure import Figure
-
-    run: Any = certificate.trajectory
-    draw: list[Callable[[Axes], object]] = [lambda ax: plot_trajectory(run, certificate.structure, ax)]
-    if not certificate.direct:
-        draw.append(lambda ax: plot_sliding(run, certificate.reaching, ax))
-    if certificate.envelope.functions:
-        draw.append(partial(_draw_decay, certificate))
+    draw: list[Callable[..., object]] = [PLOTS["states"]]
+    draw += [] if certificate.direct else [PLOTS["sliding"]]
+    draw += [_draw_decay] if certificate.envelope.functions else []
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
         figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
@@ -517,7 +491,7 @@ def _figure(certificate: Certificate) -> Figure:
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)
         figure.subplots_adjust(left / whole, bottom / height, 1 - right / whole, 1 - top / height, gap / panel_width)
         for place, panel in enumerate(draw, start=1):
-            panel(new_axes(figure, (1, len(draw), place)))
+            panel(certificate, new_axes(figure, (1, len(draw), place)))
     return figure
 
 
@@ -529,8 +503,8 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
     function = next(m for m in envelope.functions if m.coordinates == envelope.coordinates)
     norm = np.linalg.norm(function.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
     bound, scale = certificate.norm_bound(run.remaining[before]), float(norm[0]) or 1.0
-    ax.loglog(run.remaining[before], bound / scale, color="#D55E00", linewidth=1.6, label="bound")
-    ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color="#0072B2", label="simulated (CVODES)")
+    ax.loglog(run.remaining[before], bound / scale, color=BOUND, linewidth=1.6, label="bound")
+    ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color=RUN, label="simulated (CVODES)")
     top = float(bound[0]) / scale
     ax.set_ylim(_LEAST, 3 * max(1.0, top if math.isfinite(top) else 1.0))
     ax.invert_xaxis()
@@ -539,15 +513,11 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
         axis.set_ticks([1, 1e-2, 1e-4, 1e-6, 1e-8])
         axis.set_major_formatter("{x:g}")
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    ax.set_xlabel("time left, $1 - t/T$")
-    ax.set_ylabel(rf"$\|{name}(t)\| / \|{name}(0)\|$")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+    finished(ax, "time left, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")
 
 
 def _refusal(message: str) -> Figure:
     """Return a figure that holds nothing but a message."""
-    from matplotlib.figure import Figure
-
     figure = Figure((2 * SINGLE_COLUMN[0], SINGLE_COLUMN[1]), dpi=_DPI)
     figure.text(0.5, 0.5, textwrap.fill(message, 90), ha="center", va="center", parse_math=False)
     return figure

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
@@ -14,27 +16,28 @@ from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.style import figure_bytes
-from ptcc_certify.report.plots.trajectory import plot_sliding
+from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+#: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
+PLOTS: dict[str, Callable[..., Axes]] = {
+    "graph": lambda certificate, ax=None: plot_graph(certificate.structure, ax),
+    "states": lambda certificate, ax=None: plot_trajectory(certificate.trajectory, certificate.structure, ax),
+    "sliding": lambda certificate, ax=None: plot_sliding(certificate.trajectory.sliding, certificate.reaching, ax),
+    "decay": plot_decay,
+    "input": lambda certificate, ax=None: plot_input(certificate.trajectory, certificate.structure, certificate, ax),
+}
 
 
-def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Figure]:
+def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
     """Draw those of the wanted figures for which there is something to draw."""
     run, n = saved.trajectory, saved.graph.n_nodes
-    figures: dict[str, Any] = {}
-    if "graph" in wanted and n <= DRAWN_NODES:
-        figures["graph"] = plot_graph(saved.structure).figure
-    if run is None:
-        return figures
-    if "decay" in wanted and saved.comparison is not None and saved.envelope.functions and run.error.any():
-        figures["decay"] = plot_decay(saved).figure
-    if "sliding" in wanted and (slid := run.sliding) is not None and not saved.direct and n <= INPUT_NODES:
-        figures["sliding"] = plot_sliding(slid, saved.reaching).figure
-    if "input" in wanted and n <= INPUT_NODES and (not saved.constant or run.sliding):
-        figures["input"] = plot_input(run, saved.structure, saved).figure  # type: ignore[arg-type]
-    return figures
+    there = {"graph": n <= DRAWN_NODES}
+    if run is not None:
+        slid = run.sliding is not None
+        there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
+        there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
+        there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
+    return {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
 
 
 def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:

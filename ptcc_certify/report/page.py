@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from importlib import resources
@@ -20,15 +19,13 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
-from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES
-from ptcc_certify.graphs.structure import ClosedComponent
 from ptcc_certify.report import texts
 from ptcc_certify.report.figures import draw, inline_figure
-from ptcc_certify.report.screen import remarks_on, structure_text
-from ptcc_certify.report.texts import LISTED, above, agent_parts, enclosed, printable, rational
+from ptcc_certify.report.screen import camps, remarks_on
+from ptcc_certify.report.texts import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.theorems.table import THEOREMS
 
 #: Rows of agents, and of leader groups, that are written out.
@@ -105,75 +102,52 @@ def rejected_html(error: RejectedCertificate) -> str:
 @cache
 def _environment() -> jinja2.Environment:
     """Return the templates with what they may use; what is printed is escaped, and an unknown name is an error."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ptcc_certify.report"),
-        autoescape=True,
-        finalize=lambda value: value if isinstance(value, Markup) else printable(str(value), 2000),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = texts.environment(lambda text: printable(text, 2000), autoescape=True)
     named = ("above", "below", "indexed", "label", "labels", "plural", "power", "printable", "rational", "symbol")
     environment.filters |= {name: getattr(texts, name) for name in named}
-    environment.filters |= {"camps": _camps, "grouped": "{:,}".format}
+    environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags}
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
-    environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "producer": producer()}
-    environment.globals |= {"ROWS": ROWS, "GROUPS": GROUPS, "LISTED": LISTED, "DRAWN_NODES": DRAWN_NODES}
-    environment.globals |= {"AUTHORS": texts.AUTHORS, "TITLE": texts.TITLE, "newline": Markup("\n")}
+    environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
+    environment.globals |= {"ROWS": ROWS, "GROUPS": GROUPS, "DRAWN_NODES": DRAWN_NODES}
     return environment
 
 
 def _view(saved: Certificate) -> dict[str, Any]:
     """Return everything that the template shows."""
-    effort, report, graph = saved.effort, saved.report, saved.graph
-    sliding = saved.protocol.reaching is not None
+    effort, report, labels = saved.effort, saved.report, saved.graph.labels
     kept = "its state" if saved.direct else "x \u2212 \u03c3"
-    title = _title(saved, "T_r + T_s" if sliding else "T", kept)
+    title = _title(saved, kept)
     name = shlex.quote(saved.path.name)
     name = f"./{name}" if name.startswith("-") else name
     more = f" --memory {math.ceil(report.memory)}" if report.memory > 1 else ""
     commands = [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]
     notes = saved.document["unverified"].get("notes")
-    camps = Counter(part.partition(", ")[2] for part in agent_parts(saved))
+    sizes = Counter(part.partition(", ")[2] for part in agent_parts(saved))
     named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "unbalanced": "unbalanced"}
-    run = saved.trajectory
-    return {
-        **{"saved": saved, "graph": graph, "structure": saved.structure, "protocol": saved.protocol},
-        **{"sliding": sliding, "certified": saved.verdict == "certified", "kept": kept},
+    peaks = effort.peak.agents if effort and effort.peak else ()
+    return texts.facts(saved) | {
+        **{"structure": saved.structure, "protocol": saved.protocol, "kept": kept},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
-        "missing": _missing(saved),
-        "negative": int((graph.sign < 0).sum()),
         "remarks": remarks_on(saved.structure),
-        "structure_words": structure_text(saved.structure),
-        "common_bound": texts.common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
         "equations": texts.equations(saved.protocol),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
-        "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),
-        "claims_in_all": len(saved.claims),
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
-        "exact": saved.final_state is None or saved.final_state.radius is None,
         **dict(zip(("states_head", "states"), _states(saved), strict=True)),
-        "z": texts.coordinates(saved),
-        "overshoot_of": "E"
-        if saved.overshoot is not None and saved.document["overshoot"]["of"] == "||E||^2"
-        else "\u03b5",
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
-        "reaching": list(islice(zip(graph.labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
+        "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
         "figures": draw(saved, ("graph", "decay", "sliding", "input")),
-        "camp_counts": [(word, camps[camp]) for camp, word in named.items() if camps[camp]],
-        "met": f"d = {run.sliding.source}" if run is not None and run.sliding is not None else "none",
+        "camp_counts": [(word, sizes[camp]) for camp, word in named.items() if sizes[camp]],
         "gap": _gap(saved),
-        "largest_input": None if run is None else float(abs(run.input).max()),
-        "peak_agent": None if effort is None or effort.peak is None else _largest(graph.labels, effort.peak.agents),
-        **{"reading": reading_flags(saved.document["graph"]["read"]), "commands": commands},
+        "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
+        "commands": commands,
         "notes": [note for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else [],
     }
 
 
-def _title(saved: Certificate, deadline: str, kept: str) -> Markup:
+def _title(saved: Certificate, kept: str) -> Markup:
     """Say what the certificate is about."""
-    claims = saved.claims
+    claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
     told = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
     text = Markup("{} at {} = {}").format(told, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
@@ -181,23 +155,12 @@ def _title(saved: Certificate, deadline: str, kept: str) -> Markup:
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
-def _missing(saved: Certificate) -> str:
-    """Say what keeps a certificate from being certified."""
-    lacks = ["no decay was proved"] if saved.rate is None and not saved.constant else []
-    lacks += ["no final state was proved"] if saved.document["influence"] is None else []
-    return " and ".join(lacks) or "not everything was proved"
-
-
 def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
     """Return head and rows of the table of initial and final states."""
     if saved.start is None:
         return [], []
-    numbers: dict[str, list[str]] = {"Initial state": [rational(x) for x in saved.start[:ROWS]]}
-    if not saved.direct:
-        numbers["\u03c3(0)"] = [rational(x) for x in (saved.sigma0 or ())[:ROWS]]
-    if saved.final_state is not None:
-        ends = "State at the deadline" if saved.verdict == "certified" else "Limit, if it settles"
-        numbers[ends] = [enclosed(x) for x in (saved.final_state.intervals or ())[:ROWS]]
+    heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
+    numbers = texts.state_columns(saved, heads, ROWS, enclosed)
     labels = [texts.label(name) for name in saved.graph.labels[:ROWS]]
     rows = zip(labels, agent_parts(saved)[:ROWS], *numbers.values(), strict=True)
     return ["Agent", "Part", *numbers], [list(row) for row in rows]
@@ -225,14 +188,3 @@ def _gap(saved: Certificate) -> Fraction | None:
         return None
     pairs = zip(saved.trajectory.final_state.tolist(), saved.final_state.intervals or (), strict=True)
     return Fraction(max(abs(float(x) - nearest_float(middle)) for x, (middle, _) in pairs))
-
-
-def _largest(labels: Sequence[str], values: Sequence[Any]) -> str:
-    return labels[max(range(len(values)), key=values.__getitem__)]
-
-
-def _camps(component: ClosedComponent) -> list[list[int]]:
-    """Return the camps of a balanced leader group, the one of its first Lyapunov function first."""
-    gauge = component.gauge or ()
-    camps = [[v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1)]
-    return [camp for camp in camps if camp]

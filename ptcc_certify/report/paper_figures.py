@@ -6,55 +6,17 @@ Figures 1, 3 and 5 are the graphs, 2, 4, 6, 8, 10 and 12 the states, 7, 9 and 11
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Sequence
-from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
 
-from lmi.exact.directed_rounding import down, float_down, near, up
-from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.examples import Example, load_graph
-from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.graph import plot_graph
-from ptcc_certify.report.plots.input import plot_input
+from matplotlib import style
+from matplotlib.figure import Figure
+
+from ptcc_certify.report.example_results import Run
+from ptcc_certify.report.figures import PLOTS
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes
-from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-#: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_line`.
-RESULTS_HEAD = (
-    f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'optimality':>12}{'worst':>8}"
-    f"{'reached':>10}{'proved by':>11}{'T_r':>5}  {'final state':<14}verdict"
-)
-
-
-class Run(NamedTuple):
-    """An example on one of its graphs, certified."""
-
-    example: Example
-    graph: str
-    certificate: Certificate
-
-
-def certified(chosen: tuple[Example, str, str]) -> Run:
-    """Certify an example on a graph, as :func:`ptcc_certify.examples.select` returns both, and what is expected."""
-    example, graph, reported = chosen
-    certificate = certify(
-        load_graph(graph),
-        example.protocol(),
-        example.x0.split(","),
-        sigma0=example.sigma0 and example.sigma0.split(","),
-        disturbance=example.disturbance,
-        expectations=Expectations(reported),
-    )
-    return Run(example, graph, certificate)
+#: The plots of those figures of the paper that have a name of their own.
+_PLOTS = {"graphs": "graph", "sliding_variables": "sliding"}
 
 
 def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
@@ -89,95 +51,13 @@ def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
     return figures
 
 
-def results_csv(runs: Sequence[Run]) -> str:
-    """Return what came of the examples as CSV: claim, theorem, rates, reaching times, final state, verdict.
-
-    Rates are per unit of the stretched clock, and the optimality ratio is the proved rate over its proved upper bound,
-    all rounded down; ``reached_by`` is when each sliding variable is proved to be 0; the final state is written in
-    full, exactly. What the simulated run showed is called so.
-    """
-    table = []
-    for example, graph, certificate in runs:
-        claim, paper, seen = certificate.claim, certificate.proof.rate, certificate.comparison
-        ends, (last, proved, deadline) = certificate.final_state, _reaching_times(certificate)
-        final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.states, strict=True)]
-        row = {
-            "example": example.number,
-            "graph": graph,
-            "claim": claim and claim.behaviour,
-            "theorem": claim and claim.theorem,
-            "certified_rate": None if certificate.rate is None else float_down(certificate.rate),
-            "paper_rate": None if paper is None else float_down(paper),
-            "optimality_ratio": certificate.optimality_ratio,
-            "reached_by": proved,
-            "T_r": deadline,
-            "final_state": "; ".join(final),
-            "verdict": certificate.verdict,
-            "simulated_worst_ratio": seen and seen.worst_ratio,
-            "simulated_reached": last,
-        }
-        table.append(row)
-    text = io.StringIO()
-    writer = csv.DictWriter(text, table[0] if table else (), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(table)  # None is an empty field
-    return text.getvalue()
-
-
-def result_line(run: Run) -> str:
-    """Return the row of an example under :data:`RESULTS_HEAD`; what was proved is rounded to the safe side."""
-    certificate = run.certificate
-    claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
-    assert claim is not None
-    last, proved, deadline = _reaching_times(certificate)
-    reached = f"{'-':>10}{'-':>11}{'-':>5}"
-    if last is not None and proved is not None:
-        reached = f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
-    return (
-        f"{run.example.number} {run.graph:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-        f"{down(rate or Fraction(0)):>9}{down(certificate.optimality_ratio or 0.0, 4):>12}"
-        f"{seen.worst_ratio if seen else 0:>8.3f}{reached}  {_ends(certificate):<14}{certificate.assessment.word}"
-    )
-
-
-def _reaching_times(certificate: Certificate) -> tuple[float | None, float | None, float | None]:
-    """Return when the last sliding variable was 0 in the run, when each is proved to be, and ``T_r``; None if none."""
-    reaching, run = certificate.reaching, None if certificate.trajectory is None else certificate.trajectory.sliding
-    if reaching is None or run is None:
-        return None, None, None
-    return float(run.reaching_times.max()), max(r.time for r in reaching), float(run.protocol.T_r)
-
-
-def _ends(certificate: Certificate) -> str:
-    """Return the final state in a few letters: 0, a common size, or the largest, rounded up."""
-    if certificate.final_state is None:
-        return "-"
-    sizes = {abs(Fraction(x)) for x in certificate.final_state.states}
-    largest = max(sizes)
-    common = near(largest, 5) if sizes == {0} else f"+-{near(largest, 5)}"
-    return common if len(sizes) == 1 else f"|x| <= {up(largest, 5)}"
-
-
 def _panels(runs: Sequence[Run], what: str) -> Figure:
-    from matplotlib import style
-    from matplotlib.figure import Figure
-
     with style.context(STYLE):
         figure = Figure(SINGLE_COLUMN if len(runs) == 1 else DOUBLE_COLUMN, layout="constrained")
         panels = figure.subfigures(1, len(runs), squeeze=False)[0]
         for (example, graph, certificate), panel in zip(runs, panels, strict=True):
-            _DRAW[what](certificate, new_axes(panel))
+            PLOTS[_PLOTS.get(what, what)](certificate, new_axes(panel))
             claim = certificate.claim
             letter = "ab"[example.graphs.index(graph)]
             panel.suptitle(f"({letter}) {graph}: {claim.behaviour if claim else ''}")
     return figure
-
-
-#: What draws each figure; an example is simulated.
-_DRAW: dict[str, Callable[[Any, Axes], object]] = {
-    "graphs": lambda certificate, ax: plot_graph(certificate.structure, ax),
-    "states": lambda certificate, ax: plot_trajectory(certificate.trajectory, certificate.structure, ax),
-    "sliding_variables": lambda certificate, ax: plot_sliding(certificate.trajectory, certificate.reaching, ax),
-    "decay": plot_decay,
-    "input": lambda certificate, ax: plot_input(certificate.trajectory, certificate.structure, certificate, ax),
-}

@@ -6,9 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from itertools import chain, repeat
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from lmi.exact.directed_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
@@ -55,17 +54,19 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
 def certificate_lines(certificate: Certificate, name: str) -> list[str]:
     """Return the lines of ``ptcc certify``: at most 28 for a connected graph."""
     structure, p = certificate.structure, certificate.protocol
+    when = f"at T = {near(p.T)}" if p.reaching is None else f"at T_r + T_s = {near(p.T)} whatever the disturbance"
 
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(certificate.claims, _deadline(certificate))
+        yield from _claim_lines(certificate.claims, f" {when}")
         names = [name for name in p.to_dict() if name != "kind"]
         yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
         if certificate.start is not None:
             yield "x(0)", _pairs(structure.graph.labels, certificate.start)
-        for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines, _simulation_lines):
+        for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines):
             yield from part(certificate)
+        yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
         if certificate.cut_off:
             named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
             yield "cut off", f"{named}; what was proved by then stands"
@@ -88,10 +89,16 @@ def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
         steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
         more = " ..." if len(component.negative_cycle) > 12 else ""
         return f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"
+    found = camps(component)
+    text = " against ".join("{" + _listed([labels[v] for v in camp], 40) + "}" for camp in found)
+    return f"balanced, {'camps ' if len(found) > 1 else 'one camp '}{text}"
+
+
+def camps(component: ClosedComponent) -> list[list[int]]:
+    """Return the camps of a balanced leader group, the one of its first Lyapunov function first."""
     gauge = component.gauge or ()
-    camps = [[label for label, g in zip(nodes, gauge, strict=True) if g == sign] for sign in (1, -1)]
-    text = " against ".join("{" + _listed(camp, 40) + "}" for camp in camps if camp)
-    return f"balanced, {'camps ' if camps[1] else 'one camp '}{text}"
+    both = ([v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
+    return [camp for camp in both if camp]
 
 
 def _final_state_lines(certificate: Certificate) -> Lines:
@@ -186,7 +193,8 @@ def _effort_lines(certificate: Certificate) -> Lines:
     elif effort.bounded is False:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
-        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: {_remedy(certificate)}"
+        enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
+        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: raise rho2 * kappa{enough}"
     else:
         yield "input", f"bounded or not is undecided: {product}, it takes 1"
     sizes = []
@@ -238,13 +246,6 @@ def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
         yield "limited", "nothing is certified under these limits"
 
 
-def _remedy(certificate: Certificate) -> str:
-    """Say what makes the input bounded."""
-    if certificate.rate is None:
-        return "raise rho2 * kappa"
-    return f"raise rho2 * kappa to {up(2 / certificate.rate, 5)} or more"
-
-
 def _sliding_share(certificate: Certificate) -> float:
     """Return ``1 - t/T`` at ``T_r``."""
     p = certificate.protocol
@@ -265,25 +266,17 @@ def _residual_lines(certificate: Certificate) -> Lines:
 
 def _reaching_lines(certificate: Certificate) -> Lines:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
-    from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
-
-    envelope = certificate.envelope
-    if certificate.start is None or not isinstance(envelope, SlidingEnvelope):
+    if certificate.start is None:
         return
     share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
-    bounds = envelope.state_bound(np.array([q for q, _ in chosen]), certificate.start)
-    said = _at_instants(bounds, (name for _, name in chosen))
-    yield "error", f"||{envelope.coordinates}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
-
-
-def _simulation_lines(certificate: Certificate) -> Lines:
-    """Tell what the run showed, under one head."""
-    for number, text in enumerate(_simulated(certificate)):
-        yield "" if number else "simulated", text
+    said = _at_instants(certificate.norm_bound([q for q, _ in chosen]), (name for _, name in chosen))
+    z = certificate.envelope.coordinates
+    yield "error", f"||{z}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
 
 
 def _simulated(certificate: Certificate) -> Iterator[str]:
+    """Tell what the run showed."""
     run, seen = certificate.trajectory, certificate.comparison
     if run is None:
         return
@@ -307,19 +300,9 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
 
 
 def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:
-    if len(claims) == 1:
-        yield "claim", _claim_text(claims[0], when)
-        return
     counts = sorted(Counter(claims).items(), key=lambda item: item[0].theorem)
-    for i, (claim, count) in enumerate(counts):
-        yield "" if i else "claim", f"{count} component(s): {_claim_text(claim, when)}"
-
-
-def _deadline(certificate: Certificate) -> str:
-    p = certificate.protocol
-    if certificate.reaching is None:
-        return f" at T = {near(p.T)}"
-    return f" at T_r + T_s = {near(p.T)} whatever the disturbance"
+    for head, (claim, count) in zip(chain(["claim"], repeat("")), counts, strict=False):
+        yield head, f"{count} component(s): " * (len(claims) > 1) + _claim_text(claim, when)
 
 
 def _sliding_lines(certificate: Certificate) -> Lines:
@@ -372,15 +355,16 @@ def structure_text(structure: Structure) -> str:
 
 def remarks_on(structure: Structure) -> list[str]:
     """Return what is particular about a graph and about how it was read."""
-    read = structure.graph.read
-    some = structure.graph.n_edges > 0
-    remarks = ["undirected"] if structure.undirected and some else []
-    remarks += ["all weights positive"] if structure.all_positive and some else []
-    remarks += [] if structure.sign_symmetric else ["sign-asymmetric"]
-    remarks += [] if some else ["no edges, is this the right file?"]
-    for name, word in (("duplicates", "duplicates"), ("self_loops", "self-loops")):
-        remarks += [] if read[name] == "refused" else [f"{word} {read[name]}"]
-    return [*remarks, *read["notes"]]
+    read, some = structure.graph.read, structure.graph.n_edges > 0
+    remarks = (
+        (structure.undirected and some, "undirected"),
+        (structure.all_positive and some, "all weights positive"),
+        (not structure.sign_symmetric, "sign-asymmetric"),
+        (not some, "no edges, is this the right file?"),
+        (read["duplicates"] != "refused", f"duplicates {read['duplicates']}"),
+        (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
+    )
+    return [*(text for holds, text in remarks if holds), *read["notes"]]
 
 
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:

@@ -6,8 +6,6 @@ Its sentences are in ``templates/statement.tex``; what is not LaTeX already is e
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterable
 from fractions import Fraction
 from functools import cache
 
@@ -16,10 +14,8 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.format import producer
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import texts
-from ptcc_certify.report.screen import structure_text
 
 _CAPTIONS = {
     "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",
@@ -53,19 +49,13 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     >>> print(next(line for line in text.splitlines() if line.startswith("{}a")))
     {}a\_1 & leader, camp 1 & $3$ & $-1$ \\
     """
-    effort, graph, protocol = saved.effort, saved.graph, saved.protocol
-    view = {
-        **{"saved": saved, "graph": graph, "effort": effort, "certified": saved.verdict == "certified"},
-        **{"sliding": protocol.reaching is not None, "negative": int((graph.sign < 0).sum())},
+    names = texts.parameter_names(saved.protocol)
+    view = texts.facts(saved) | {
         # nothing but ASCII is safe in a comment
         "comment": Markup("".join(c if " " <= c <= "~" else "?" for c in saved.path.name)),
-        "structure_words": structure_text(saved.structure),
-        "parameters": [(Markup(symbol_latex(key)), getattr(protocol, key)) for key in texts.parameter_names(protocol)],
-        "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),
-        "claims_in_all": len(saved.claims),
+        "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         "shares": _shares(saved),
         "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
-        "common_bound": texts.common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
         **{"figures": figures or {}, "stem": re.sub("[^A-Za-z0-9]+", "-", saved.path.stem)},
         "sha256": Markup(r"\allowbreak{}".join(saved.sha256[i : i + 8] for i in range(0, 64, 8))),
@@ -80,48 +70,38 @@ def _shares(saved: Certificate) -> list[tuple[float, float]]:
     return [(f, saved.envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS]
 
 
-def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, list[Markup]]]]:
+def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:
     """Return heads and rows of the table of initial and final states."""
     if saved.start is None:
         return [], []
-    numbers: dict[str, Iterable[Markup]] = {"$x_{k}(0)$": map(_rational, saved.start)}
-    if not saved.direct:
-        numbers[r"$\sigma_{k}(0)$"] = map(_rational, saved.sigma0 or ())
-    if saved.final_state is not None:
-        ends = "at the deadline" if saved.verdict == "certified" else "limit, if it settles"
-        numbers[ends] = (
-            _number(texts.enclosed(x)) if x[1] else _rational(x[0]) for x in saved.final_state.intervals or ()
-        )
+    heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
+    numbers = texts.state_columns(
+        saved, heads, texts.LISTED, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
+    )
     labels = [texts.printable(label, texts.CHARACTERS // 2) for label in saved.graph.labels[: texts.LISTED]]
-    rows = zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False)
-    return list(numbers), [(label, part, list(row)) for label, part, row in rows]
+    return list(numbers), list(zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False))
 
 
 @cache
 def _environment() -> jinja2.Environment:
     """Return the template with what it may use; an unknown name is an error."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ptcc_certify.report"),
-        finalize=lambda value: value if isinstance(value, Markup) else _tex(str(value)),
-        undefined=jinja2.StrictUndefined,
+    environment = texts.environment(
+        _tex,
         block_start_string="<%",
         block_end_string="%>",
         variable_start_string="<<",
         variable_end_string=">>",
         comment_start_string="<#",
         comment_end_string="#>",
-        trim_blocks=True,
-        lstrip_blocks=True,
         keep_trailing_newline=True,
     )
     environment.filters |= {
-        **{"latex": Markup, "rational": _rational, "coordinate": _coordinate},
+        **{"latex": Markup, "rational": _rational, "coordinate": _coordinate, "number": _number},
         "above": lambda x, digits: _number(texts.above(x, digits)),
         "below": lambda x, digits: _number(texts.below(x, digits)),
         "equals": lambda x: ("= " + _rational(x)).replace(r"= \approx", r"\approx"),
     }
-    environment.globals |= {"AUTHORS": texts.AUTHORS, "TITLE": texts.TITLE, "LISTED": texts.LISTED}
-    environment.globals |= {"captions": _CAPTIONS, "producer": producer()}
+    environment.globals["captions"] = _CAPTIONS
     return environment
 
 

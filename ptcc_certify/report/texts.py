@@ -6,19 +6,23 @@ What holds HTML is :class:`markupsafe.Markup`, which the templates print as it i
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
+import jinja2
 from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
 from lmi.exact.directed_rounding import down, up
 from ptcc_certify.bounds.input import InitialSet
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.format import producer
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.report.screen import structure_text
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
@@ -133,11 +137,6 @@ def equations(protocol: Protocol) -> Markup:
 # ---------------------------------------------------------------------- words
 
 
-def coordinates(saved: Certificate) -> str:
-    """Return the letter of what decays: the error, or the deviation from the weighted signed mean."""
-    return "E" if saved.envelope.coordinates == "E" else "\u03b5"
-
-
 def parameter_names(protocol: Protocol) -> list[str]:
     """Return the names of a protocol's parameters, in their order."""
     return [name for name in protocol.to_dict() if name != "kind"]
@@ -154,7 +153,54 @@ def agent_parts(saved: Certificate) -> list[str]:
     return parts
 
 
-def common_bound(initial_set: InitialSet) -> Fraction | None:
+def state_columns(
+    saved: Certificate, heads: tuple[str, str, str, str], rows: int, written: Callable[[tuple[Fraction, Fraction]], str]
+) -> dict[str, list[str]]:
+    """Return initial state, ``sigma(0)`` and final state of the first agents, as far as there are, by their heads.
+
+    The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
+    """
+    columns = {heads[0]: [rational(x) for x in (saved.start or ())[:rows]]}
+    if not saved.direct:
+        columns[heads[1]] = [rational(x) for x in (saved.sigma0 or ())[:rows]]
+    if saved.final_state is not None:
+        ends = heads[2] if saved.verdict == "certified" else heads[3]
+        columns[ends] = [written(x) for x in (saved.final_state.intervals or ())[:rows]]
+    return columns
+
+
+def _common_bound(initial_set: InitialSet) -> Fraction | None:
     """Return ``R`` of a set that is all initial states with ``|x_k(0)| <= R``; None of another one."""
     same = len(set(initial_set.radius)) == 1 and not any(initial_set.center) and not initial_set.axes
     return initial_set.radius[0] if same else None
+
+
+# ---------------------------------------------------------------------- templates
+
+
+def environment(finalize: Callable[[str], str], **syntax: Any) -> jinja2.Environment:
+    """Return the templates; what is printed is finalized unless it is Markup, and an unknown name is an error."""
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("ptcc_certify.report"),
+        finalize=lambda value: value if isinstance(value, Markup) else finalize(str(value)),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        **syntax,
+    )
+    made.globals |= {"AUTHORS": AUTHORS, "TITLE": TITLE, "LISTED": LISTED, "producer": producer()}
+    return made
+
+
+def facts(saved: Certificate) -> dict[str, Any]:
+    """Return what the templates of page and statement show both."""
+    effort = saved.effort
+    return {
+        **{"saved": saved, "graph": saved.graph, "effort": effort, "certified": saved.verdict == "certified"},
+        "sliding": saved.protocol.reaching is not None,
+        "negative": int((saved.graph.sign < 0).sum()),
+        "structure_words": structure_text(saved.structure),
+        "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),
+        "claims_in_all": len(saved.claims),
+        "common_bound": _common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
+    }

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels.
 _DECAY_AXES = {"left": "time left, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
@@ -60,7 +55,8 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
     if run is None or start is None or certificate.comparison is None or not envelope.functions:
         raise ValueError("the certificate holds no simulated run with a proved bound")
-    ax, before, unit = axes_of(ax), run.remaining > 0, _unit(run)
+    ax, before = axes_of(ax), run.remaining > 0
+    unit = float(np.abs(run.states).max(initial=0)) or 1.0  # in which squares neither overflow nor vanish
     remaining, states = run.remaining[before], run.states[:, before] / unit
     place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
     shown = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
@@ -96,8 +92,3 @@ def _row_sum(certificate: Certificate) -> float:
     if certificate.envelope.coordinates == "eps":
         return 2 * math.sqrt(certificate.graph.n_nodes)
     return float(np.linalg.norm(abs(certificate.graph.laplacian()).sum(axis=1)))
-
-
-def _unit(trajectory: Trajectory) -> float:
-    """Return the size of the largest state, in which squares neither overflow nor vanish."""
-    return float(np.abs(trajectory.states).max(initial=0)) or 1.0

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import networkx as nx
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch
 
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import CAMP_COLOURS, SINGLE_COLUMN, axes_of, camp_groups, finished, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: Colour and line of an edge from an ally (+1) or an opponent (-1).
 EDGE_STYLES = {1: ("#4477AA", "-", "ally"), -1: ("#AA3344", "--", "opponent")}
@@ -52,8 +51,6 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
     >>> len(ax.patches), [text.get_text() for text in ax.texts]
     (3, ['a', 'b', 'c'])
     """
-    from matplotlib.patches import FancyArrowPatch
-
     graph = structure.graph
     n = graph.n_nodes
     if n > DRAWN_NODES:
@@ -68,14 +65,10 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
         sign: {"color": colour, "linestyle": line, "linewidth": 0.6 if many else 1.1}
         for sign, (colour, line, _) in EDGE_STYLES.items()
     }
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9, "connectionstyle": "arc3,rad=0.1"}
     for source, target, sign in zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), strict=True):
-        apart: dict[str, Any] = {
-            "shrinkA": radius[source],
-            "shrinkB": radius[target],
-            "connectionstyle": "arc3,rad=0.1",
-        }
-        head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9}
-        ax.add_artist(FancyArrowPatch(place[source], place[target], zorder=1, **head, **apart, **looks[sign]))
+        shrunk = {"shrinkA": radius[source], "shrinkB": radius[target]}
+        ax.add_artist(FancyArrowPatch(place[source], place[target], zorder=1, **arrow, **shrunk, **looks[sign]))
     for sign, (_, _, name) in EDGE_STYLES.items():
         if (graph.sign == sign).any():
             ax.plot([], [], label=name, **looks[sign])
@@ -83,11 +76,9 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
         _draw_labels(ax, graph.labels, place, radius)
     ax.set_aspect("equal")
     low, high = place.min(axis=0), place.max(axis=0)
-    span = max(high - low) or 1.0
-    half = 0.62 * np.maximum(high - low, 0.6 * span)  # a path is drawn as a line, in axes that are none
+    half = 0.62 * np.maximum(high - low, 0.6 * (max(high - low) or 1.0))  # a path is a line, in axes that are none
     (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
-    ax.set_xlim(left, right)
-    ax.set_ylim(bottom, top)
+    ax.axis((left, right, bottom, top))
     ax.set_axis_off()
     return finished(ax, "", "")
 
@@ -109,12 +100,11 @@ def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray) -> np.ndarray
 def _draw_labels(ax: Axes, labels: Sequence[str], place: np.ndarray, radius: np.ndarray) -> None:
     """Write short labels into the nodes, others above them."""
     inside = max(map(len, labels)) <= 2
-    looks: dict[str, Any] = (
-        {"color": "white", "va": "center_baseline"} if inside else {"color": "black", "va": "bottom"}
-    )
-    looks |= {"textcoords": "offset points", "ha": "center", "fontsize": 8, "parse_math": False}
+    colour, va = ("white", "center_baseline") if inside else ("black", "bottom")
+    looks: dict[str, Any] = {"color": colour, "va": va, "ha": "center", "fontsize": 8, "parse_math": False}
     for v, label in enumerate(labels):
-        ax.annotate(shorten(label, 12), place[v], (0, 0 if inside else radius[v] + 2), **looks)
+        offset = (0, 0 if inside else radius[v] + 2)
+        ax.annotate(shorten(label, 12), place[v], offset, textcoords="offset points", **looks)
 
 
 def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int]) -> None:
@@ -131,8 +121,6 @@ def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Seque
 
 def _layout(graph: SignedDigraph) -> np.ndarray:
     """Return places of the nodes, (N, 2), the same in every run."""
-    import networkx as nx
-
     plain = nx.Graph(zip(graph.source.tolist(), graph.target.tolist(), strict=True))
     plain.add_nodes_from(range(graph.n_nodes))
     if graph.n_nodes > KAMADA_NODES:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
 
+from ptcc_certify.bounds.input import Effort
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled
 from ptcc_certify.report.plots.trajectory import draw_agents, draw_deadlines
 from ptcc_certify.simulation.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ptcc_certify.bounds.input import Effort
-    from ptcc_certify.certificate.certificate import Certificate
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
 RESOLVED_ERROR = 10
@@ -114,10 +109,9 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     ['simulated (CVODES)', 'certified bound', 'deadline']
     """
     _need_one_start(trajectory)
-    proved = None if certificate is None else _certified_effort(trajectory, certificate)
-    bound = None
-    if proved is not None and proved.energy is not None and trajectory.actuator is None:
-        bound = None if trajectory.sliding else float(proved.energy.value)
+    proved, bound = None if certificate is None else _certified_effort(trajectory, certificate), None
+    if proved is not None and proved.energy is not None and not (trajectory.actuator or trajectory.sliding):
+        bound = float(proved.energy.value)
     ax, spent = axes_of(ax), _energy(trajectory)
     ax.plot(trajectory.t, spent, color=RUN, label="simulated (CVODES)")
     if bound is not None:
@@ -199,15 +193,12 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
         The certificate is of another graph, protocol or start.
     """
     effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
-    if effort is None:
+    if effort is None or (actuator is not None and actuator.sample_period is not None):
         return None
-    if actuator is None:
-        return None if effort.peak is None else float(effort.peak.largest)
-    if actuator.sample_period is not None:
-        return None
+    acts = None if actuator is None else (actuator.gain_cap, actuator.stop_before, actuator.sample_period)
     for entry in effort.residual:
-        same = (entry.limits.gain_cap, entry.limits.stop_before) == (actuator.gain_cap, actuator.stop_before)
-        if same and entry.limits.sample_period is None and entry.largest is not None:
+        own = (entry.limits.gain_cap, entry.limits.stop_before, entry.limits.sample_period)
+        if own == acts and entry.largest is not None:
             return float(entry.largest)
     # A smaller gain at the same state: what bounds the input of the ideal actuator bounds it too.
     return None if effort.peak is None else float(effort.peak.largest)
@@ -237,6 +228,5 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
-    if effort is None or effort.initial_set is not None or certificate.start is None or unproved:
-        return None
-    return effort
+    unproved = unproved or effort is None or effort.initial_set is not None or certificate.start is None
+    return None if unproved else effort

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from matplotlib.axes import Axes
 
 from lmi.exact.directed_rounding import float_up
+from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.protocols import Protocol
 
 #: Colour and marker of the classes of certificates.
 CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#009E73", "^"), "lmi": (RUN, "o"), "full": (BOUND, "D")}

@@ -7,17 +7,16 @@ import io
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import rcParams, style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, FigureBase
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.structure import Structure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, FigureBase
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
@@ -36,9 +35,6 @@ def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(plot)
     def drawn(*args: Any, **options: Any) -> Any:
-        from matplotlib import style
-        from matplotlib.axes import Axes
-
         if any(isinstance(value, Axes) for value in (*args, *options.values())):
             return plot(*args, **options)
         with style.context(STYLE):
@@ -80,8 +76,6 @@ def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
 
     Letters of scripts that the font does not have become boxes, without a word about each.
     """
-    from matplotlib import style
-
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix)
     buffer = io.BytesIO()
     with style.context(STYLE), warnings.catch_warnings():
@@ -92,24 +86,20 @@ def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
 
 def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
     """Add axes to a figure in the style that is in force; ``place`` is rows, columns and number, from 1."""
-    from matplotlib import rcParams
-
     ax = figure.add_subplot(*place)
-    style: Any = rcParams  # whose stubs know literal names only
+    given: Any = rcParams  # whose stubs know literal names only
     # Ticks and grid are made when they are drawn, after the style has gone: fix them now.
     for which in ("x", "y"):
-        ax.tick_params(axis=which, labelsize=style[f"{which}tick.labelsize"])
+        ax.tick_params(axis=which, labelsize=given[f"{which}tick.labelsize"])
         for kind in ("major", "minor"):
-            ax.tick_params(axis=which, which=kind, width=style[f"{which}tick.{kind}.width"])
-    if style["axes.grid"]:
-        ax.grid(True, color=style["grid.color"], linewidth=style["grid.linewidth"])
+            ax.tick_params(axis=which, which=kind, width=given[f"{which}tick.{kind}.width"])
+    if given["axes.grid"]:
+        ax.grid(True, color=given["grid.color"], linewidth=given["grid.linewidth"])
     return ax
 
 
 def axes_of(ax: Axes | None, size: tuple[float, float] = SINGLE_COLUMN) -> Axes:
     """Return axes as they are given, or make new ones of a figure of their own."""
-    from matplotlib.figure import Figure
-
     return new_axes(Figure(size, layout="constrained")) if ax is None else ax
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report.plots.style import (
     BEHIND,
     BOUND,
@@ -22,12 +25,6 @@ from ptcc_certify.report.plots.style import (
     styled,
 )
 from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from ptcc_certify.protocols.reaching_time import ReachingTime
 
 
 @styled
@@ -92,8 +89,6 @@ def plot_run(
     >>> len(plot_run(simulate(pair, p, [3, 5], sigma0=[1, 0]), analyse(pair)).axes)
     2
     """
-    from matplotlib.figure import Figure
-
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
     slid = trajectory.sliding
     if slid is None or not slid.sigma0.any():
@@ -154,15 +149,10 @@ def draw_agents(
     seen: set[str] = set()
     for node in np.argsort(group == "followers", kind="stable"):
         name = str(group[node])
-        ax.plot(
-            trajectory.t,
-            values[node],
-            color=CAMP_COLOURS[name],
-            linewidth=0.9 if name == "followers" else 1.6,
-            linestyle="--" if name == "followers" else "-",
-            drawstyle=drawstyle,
-            label=None if name in seen else name,
-        )
+        line, width = ("--", 0.9) if name == "followers" else ("-", 1.6)
+        looks: dict[str, Any] = {"color": CAMP_COLOURS[name], "linestyle": line, "linewidth": width}
+        label = None if name in seen else name
+        ax.plot(trajectory.t, values[node], drawstyle=drawstyle, label=label, **looks)
         seen.add(name)
     draw_deadlines(trajectory, ax)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.cli.options import Options, flag_of, graph_options, json_option, number, read
+from ptcc_certify.cli.options import Options, flag_of, graph_options, json_option, number_option, output_option, read
 from ptcc_certify.cli.terminal import FIGURES, print_json, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @click.command()
 @graph_options
-@click.option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all initial states.")
-@click.option("--initial-bound", metavar="R", required=True, help="All initial states with |x_k(0)| <= R.")
-@click.option("--deadline", metavar="T", help="Ask for this deadline.")
+@number_option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all initial states.")
+@number_option("--initial-bound", metavar="R", required=True, help="All initial states with |x_k(0)| <= R.")
+@number_option("--deadline", metavar="T", help="Ask for this deadline.")
 @click.option("--shortest-deadline", is_flag=True, help="Ask for the shortest deadline.")
-@click.option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
+@number_option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
 @click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
 @click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
+@output_option
 @json_option
 def design(graph: str, curve: str | None, output: str | None, as_json: bool, **options: Any) -> int:
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
@@ -43,7 +43,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, **o
         refuse_output(path, graph)
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
-    asked: Any = {name: number(options, name) for name in ("max_input", "initial_bound", "deadline", "residual")}
+    asked: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}
     found = run(read(graph, options), input_norm=2 if options["input_norm"] else None, **asked)
     if output and found.certificate is not None:
         found.certificate.save(output)
@@ -72,10 +72,9 @@ def _certify_command(found: Design, graph: str, options: Options) -> str | None:
     flags = [] if options["edges"] is None else ["--edges", options["edges"]]
     flags += [] if options["duplicates"] == "refuse" else ["--duplicates", options["duplicates"]]
     flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
-    given = [*flags, *found.certify_options]
-    if graph.startswith("-") and graph != "-":
-        return shlex.join(["ptcc", "certify", *given, "--", graph])
-    return shlex.join(["ptcc", "certify", graph, *given])
+    flags += found.certify_options
+    words = [*flags, "--", graph] if graph.startswith("-") and graph != "-" else [graph, *flags]
+    return shlex.join(["ptcc", "certify", *words])
 
 
 def _save_curve(found: Design, path: str) -> None:

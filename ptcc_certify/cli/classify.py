@@ -6,21 +6,20 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.options import expected_behaviour, graph_options, json_option, read
+from ptcc_certify.cli.options import expect_option, graph_options, json_option, read
 from ptcc_certify.cli.terminal import print_json, print_lines
 from ptcc_certify.errors import ExitCode
 
 
 @click.command()
 @graph_options
-@click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
+@expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @json_option
-def classify(graph: str, as_json: bool, **options: Any) -> int:
+def classify(graph: str, expect: str | None, as_json: bool, **options: Any) -> int:
     """Tell the structure of GRAPH and the theorem that applies; no computation in floating point."""
     from ptcc_certify.graphs.structure import analyse
     from ptcc_certify.report.screen import structure_lines
 
-    expected = expected_behaviour(options)
     structure = analyse(read(graph, options))
     if as_json:
         from ptcc_certify.certificate.format_graph import structure_document
@@ -28,14 +27,14 @@ def classify(graph: str, as_json: bool, **options: Any) -> int:
         print_json(structure_document(structure))
     else:
         print_lines(structure_lines(structure, graph))
-    if expected is None:
+    if expect is None:
         return ExitCode.OK
     from ptcc_certify.certificate.verdict import MET, judge_behaviour
 
-    answer = judge_behaviour(structure, expected)
+    answer = judge_behaviour(structure, expect)
     if answer.status != MET:
         click.echo(f"{answer.status}: {answer}", err=True)
         return ExitCode.REFUTED
     if len(structure.components) > 1:
-        click.echo(f"note: {expected} holds in each of the components by itself", err=True)
+        click.echo(f"note: {expect} holds in each of the components by itself", err=True)
     return ExitCode.OK

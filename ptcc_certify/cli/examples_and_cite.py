@@ -12,9 +12,7 @@ from ptcc_certify.errors import ParameterError
 @click.command()
 @click.argument("name", default="all")
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
-@click.option(
-    "--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", show_default=True, help="Of figures."
-)
+@click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:
     """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each.
 
@@ -23,7 +21,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     """
     from ptcc_certify.certificate.verdict import worst_code
     from ptcc_certify.examples import select
-    from ptcc_certify.report.paper_figures import RESULTS_HEAD, certified, paper_figures, result_line, results_csv
+    from ptcc_certify.report.example_results import RESULTS_HEAD, certified, result_line, results_csv
 
     chosen, runs = select(name), []
     if output:
@@ -40,6 +38,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             run.certificate.save(Path(output) / f"{stem}.json")
     if output:
         from ptcc_certify.graphs.io import write_atomically
+        from ptcc_certify.report.paper_figures import paper_figures
         from ptcc_certify.report.plots.style import save_figure
 
         for title, figure in paper_figures(runs).items():

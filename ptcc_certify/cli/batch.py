@@ -11,23 +11,23 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.options import READING, number
+from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting
 from ptcc_certify.errors import ExitCode, ParameterError
 
 #: Options that are settings of a row by the same name.
-_SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", *READING[1:])
+_SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", "min_rate", "initial_bound")
 
 
 @click.command()
 @click.argument("pattern", nargs=-1, required=True)
 @shared.reading_options
 @shared.protocol_options
-@click.option("--expect", metavar="BEHAVIOUR", help="E.g. stability; exit code 3 if it does not follow for some graph.")
-@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
+@shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")
+@shared.number_option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
 @shared.method_option
 @shared.starts_option
-@click.option("--simulation/--no-simulation", default=False, show_default=True, help="Compare with CVODES runs.")
+@click.option("--simulation/--no-simulation", default=False, help="Compare with CVODES runs.")
 @shared.time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
@@ -53,9 +53,8 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
     """
     from ptcc_certify import batch as many
 
-    settings = {name: options[name] for name in _SETTINGS} | {"orientation": options["edges"]}
-    settings |= {name: number(options, name) for name in ("min_rate", "initial_bound")}
-    settings |= {"expect": shared.expected_behaviour(options)}
+    settings = {name: options[name] for name in (*_SETTINGS, "expect", *READING[1:])}
+    settings["orientation"] = options["edges"]
     workers, scheduler = options["workers"], options["scheduler"]
     if write_graphs is not None:
         for flag, value in (("-o", output), ("--scheduler", scheduler), ("--workers", workers)):
@@ -135,10 +134,8 @@ def _exit_code(rows: Sequence[dict[str, Any]]) -> int:
     violated = sum(row["bound_kept"] is False for row in rows)
     refuted = sum(row["asked"] == REFUTED for row in rows)
     undecided = sum(row["verdict"] == "undecided" or row["asked"] == OPEN for row in rows)
-    cut_off = sum(row["cut_off"] is not None for row in rows)
-    if cut_off:
-        click.echo(f"note: {cut_off} of {len(rows)} graphs: the time limit ended searches, column cut_off", err=True)
     said = (
+        (sum(row["cut_off"] is not None for row in rows), "the time limit ended searches, column cut_off"),
         (violated, "violated: the simulated run exceeds the proved bound; please report"),
         (refuted, "refuted: what was asked does not hold"),
         (undecided, "undecided, or what was asked is left open"),

@@ -18,10 +18,8 @@ _TABLES = ("", ".csv", ".txt")
 @shared.graph_options
 @shared.protocol_options
 @shared.limit_options
-@click.option(
-    "--dimension", type=click.IntRange(1, 1000), default=1, show_default=True, help="State components per agent."
-)
-@click.option("--samples", type=click.IntRange(2, 100_000), default=201, show_default=True, help="Instants up to T.")
+@click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
+@click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T.")
 @click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
@@ -47,11 +45,7 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
     signed = shared.read(graph, options)
     more = shared.sliding_keywords(protocol, options, signed)
     if nominal:
-        more = {
-            "actuator": shared.actuator_of(options),
-            "delta": options["delta"],
-            "disturbance": options["disturbance"],
-        }
+        more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
     more |= {name: options[name] for name in ("samples", "boundary_layer")}
     trajectory = run(signed, protocol, shared.start_columns(options, signed), **more)
     if output and suffix in FIGURES:

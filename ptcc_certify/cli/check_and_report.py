@@ -1,4 +1,4 @@
-"""``ptcc certify``, ``check`` and ``report``: make a certificate, check it, and write it for somebody to read."""
+"""``ptcc check`` and ``report``: check a certificate, and write it for somebody to read."""
 
 from __future__ import annotations
 
@@ -10,69 +10,11 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.terminal import print_json, print_lines, progress, refuse_output
-from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.cli.terminal import print_json, print_lines, progress
+from ptcc_certify.errors import ExitCode
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
-
-
-@click.command()
-@shared.graph_options
-@shared.protocol_options
-@click.option("--expect", metavar="BEHAVIOUR", help="E.g. bipartite-consensus; exit code 3 if it does not follow.")
-@click.option("--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock.")
-@shared.method_option
-@shared.limit_options
-@shared.starts_option
-@click.option("--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.")
-@click.option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
-@click.option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
-@click.option(
-    "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
-)
-@shared.time_limit_option
-@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file.")
-@shared.json_option
-def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> int:
-    """Certify what the protocol does on GRAPH: behaviour, rate, final state; compare with a CVODES run."""
-    from ptcc_certify.certificate.procedure import STEPS
-    from ptcc_certify.certificate.procedure import certify as run
-    from ptcc_certify.certificate.request import Expectations
-    from ptcc_certify.report.screen import certificate_lines
-
-    at, bound, most = (shared.number(options, name) for name in ("at", "initial_bound", "max_input"))
-    if most is not None and most <= 0:
-        raise ParameterError("--max-input is outside its domain; it must be > 0")
-    expected = Expectations(shared.expected_behaviour(options), shared.number(options, "min_rate"), most)
-    refuse_output(output, graph)
-    protocol = shared.protocol_of(options)
-    signed = shared.read(graph, options)
-    start = shared.start_of(options["x0"], options["seed"], signed)
-    more = shared.sliding_keywords(protocol, options, signed)
-    if options["kind"] == "nominal":
-        actuator = shared.actuator_of(options)
-        more = {"limits": [] if actuator is None else [actuator]}
-        more |= {name: shared.number(options, name) for name in ("delta", "noise")}
-    elif options["noise"] is not None:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
-    more |= {name: options[name] for name in ("method", "simulation", "time_limit")}
-    with progress(STEPS) as begin:
-        certificate = run(
-            signed, protocol, start, at=at, initial_set=bound, expectations=expected, progress=begin, **more
-        )
-    if output:
-        certificate.save(output)
-    found = certificate.assessment
-    if as_json:
-        print_json(certificate.to_dict())
-        if found.exit_code:
-            click.echo(f"verdict    {found.text}", err=True)
-    else:
-        print_lines(certificate_lines(certificate, graph))
-        if output:
-            click.echo(f"written    {output}")
-    return found.exit_code
 
 
 @click.command()
