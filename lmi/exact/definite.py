@@ -3,8 +3,7 @@
 One proof for all sizes: a rounded Cholesky factor ``R`` with ``S = R R' + E``, the remainder ``E`` known in integers.
 Where the diagonal of ``E`` exceeds the sum of the other entries of each row, ``E > 0`` and ``S > 0``. A
 :class:`Factor` is computed here, for a dense matrix; a :class:`SparseFactor` comes from whoever searched it, and its
-remainder is formed by :func:`remainder`. Elimination decides what the factor cannot: matrices that are not definite, or
-hardly.
+remainder is formed by :func:`remainder`.
 
 References
 ----------
@@ -14,14 +13,13 @@ Rump, Verification of positive definiteness, BIT 46 (2006).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from math import isqrt
 from operator import mul
 from typing import Any, NamedTuple
 
-from lmi.exact import row_dominance as dominance
 from lmi.exact.polynomials import characteristic
 from lmi.exact.work import affordable, fits, spend
 
@@ -48,57 +46,6 @@ def symmetric(S: Rows) -> bool:
     if not all(len(row) == n and set(map(type, row)) <= {int} and row[i] > 0 for i, row in enumerate(S)):
         return False
     return all(tuple(row) == column for row, column in zip(S, zip(*S, strict=True), strict=True))
-
-
-# ---------------------------------------------------------------------- elimination
-
-
-def eliminate(S: Rows, step: Callable[[], object] = int) -> int | None:
-    """Return the first ``k`` for which the leading minor of ``k + 1`` rows is not positive; None: ``S > 0``.
-
-    Fraction-free symmetric elimination: every pivot is a leading principal minor (Sylvester). Always decides; seconds
-    at 100 rows, minutes at 300.
-
-    Parameters
-    ----------
-    S : n rows of n integers
-        Symmetric; only the lower triangle is read.
-    step : callable
-        Called before each pivot; it may raise.
-
-    References
-    ----------
-    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
-
-    Examples
-    --------
-    >>> eliminate([[2, 1], [1, 1]]), eliminate([[1, 1], [1, 1]])
-    (None, 1)
-    """
-    rows, previous = [list(row[: i + 1]) for i, row in enumerate(S)], 1
-    for k in range(len(rows)):
-        step()
-        pivot = rows[k][k]
-        if pivot <= 0:
-            return k
-        column = [row[k] for row in rows[k + 1 :]]
-        for i, (row, head) in enumerate(zip(rows[k + 1 :], column, strict=True)):
-            row[k + 1 :] = [
-                (x * pivot - head * y) // previous for x, y in zip(row[k + 1 :], column[: i + 1], strict=True)
-            ]
-        previous = pivot
-    return None
-
-
-def refutes(S: Rows, x: Sequence[int]) -> bool:
-    """Tell whether ``x' S x <= 0`` for an ``x`` that is not 0: then ``S`` is not positive definite.
-
-    Examples
-    --------
-    >>> refutes([[1, 2], [2, 1]], [1, -1]), refutes([[1, 2], [2, 1]], [0, 0])
-    (True, False)
-    """
-    return any(x) and sum(a * sum(map(mul, row, x)) for a, row in zip(x, S, strict=True) if a) <= 0
 
 
 # ---------------------------------------------------------------------- the dense factor
@@ -361,14 +308,6 @@ class Arithmetic:
         """Return by how much each row of the remainder dominates, None if that is too much work."""
         E = remainder(S)
         return None if E is None else spare(E, S.weights)
-
-    def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.row_dominance.dominates`."""
-        return dominance.dominates(n, edges, diagonal, u, v, rate)
-
-    def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.row_dominance.largest_rate`."""
-        return dominance.largest_rate(n, edges, diagonal, u, v)
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
         """Return ``A B``.

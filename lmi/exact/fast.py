@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import flint
 import numpy as np
 
-from lmi.exact import row_dominance as dominance
 from lmi.exact.definite import BITS, LARGEST_BITS, Arithmetic, Rows, Scaled, symmetric
 from lmi.exact.numbers import longest
 from lmi.exact.work import fits, spend
@@ -80,27 +79,6 @@ class FastArithmetic(Arithmetic):
             return super().spare(S)
         E = remainder(S)
         return None if E is None else E.spare(S.weights)
-
-    def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.row_dominance.dominates`."""
-        pairs, ratio = _pairs(n, edges, diagonal, u, v), dominance.ratio_of(rate)
-        return pairs is not None and ratio is not None and _at_least(*pairs, *ratio)
-
-    def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.row_dominance.largest_rate`."""
-        pairs = _pairs(n, edges, diagonal, u, v)
-        if pairs is None or n == 0:
-            return None
-        x, y = pairs
-        try:  # floats tell which rows may be the least
-            ratios = x.astype(float) / y.astype(float)
-            near = np.flatnonzero(~(ratios > ratios.min() + 2.0**-48 * abs(ratios.min())))
-        except OverflowError:
-            near = np.arange(n)
-        least = dominance.least_ratio(list(zip(x[near].tolist(), y[near].tolist(), strict=True)))
-        if least is None or _at_least(x, y, *least.as_integer_ratio()):
-            return least
-        return dominance.least_ratio(list(zip(x.tolist(), y.tolist(), strict=True)))
 
     def above(self, S: Rows, D: Rows, bits: int = BITS[0]) -> list[Fraction] | None:
         """Bound ``d'S^-1 d`` from above for every row ``d`` of ``D``; see :meth:`Arithmetic.above`.
@@ -430,58 +408,3 @@ def _pair_products(
                 waiting, size = [], 0
     keys, limbs = gathered()
     return keys, _joined(limbs, width)
-
-
-# ---------------------------------------------------------------------- dominance
-
-
-def _pairs(n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return numerators and denominators of the rates of the rows; see :mod:`lmi.exact.row_dominance`."""
-    try:
-        sources, targets, weights, diagonal, u, v = map(_integers, (*edges, diagonal, u, v))
-    except (TypeError, ValueError):
-        return None
-    if not len(sources) == len(targets) == len(weights) or not len(diagonal) == len(u) == len(v) == n:
-        return None
-    if not all((x > 0).all() for x in (diagonal, u, v)):
-        return None
-    if len(sources) and (min(sources.min(), targets.min()) < 0 or max(sources.max(), targets.max()) >= n):
-        return None
-    sources, targets = sources.astype(np.int64), targets.astype(np.int64)
-    sums = []
-    for to, of, x in ((targets, sources, u), (sources, targets, v)):
-        degree = int(np.bincount(to, minlength=1).max())
-        safe = max(degree, 2) * _largest(weights) * _largest(x) < INT64_SAFE
-        a, b = (weights, x) if safe else (weights.astype(object), x.astype(object))
-        total = np.zeros(n, dtype=a.dtype)
-        np.add.at(total, to, np.abs(a) * b[of])
-        sums.append(total)
-    sizes = [_largest(x) for x in (u, v, diagonal, *sums)]
-    # Everything below is at most this in size.
-    if 2 * sizes[0] * sizes[1] * sizes[2] + sizes[1] * sizes[3] + sizes[0] * sizes[4] >= INT64_SAFE:
-        u, v, diagonal, *sums = (x.astype(object) for x in (u, v, diagonal, *sums))
-    return 2 * diagonal * u * v - v * sums[0] - u * sums[1], u * v
-
-
-def _at_least(x: np.ndarray, y: np.ndarray, p: int, q: int) -> bool:
-    """Tell whether ``q x >= p y`` everywhere, ``y`` and ``q`` positive."""
-    if max(q, abs(p)) * max(_largest(x), _largest(y), 1) >= INT64_SAFE:
-        x, y = x.astype(object), y.astype(object)
-    return bool((q * x >= p * y).all())
-
-
-def _integers(column: Any) -> np.ndarray:
-    """Return an int64 array, or one of Python integers where those do not fit.
-
-    Raises
-    ------
-    TypeError
-        There is anything else.
-    """
-    x = column if isinstance(column, np.ndarray) else np.array(list(column), dtype=object)
-    if x.ndim == 1 and x.dtype.kind in "iu" and x.dtype != np.uint64:
-        return x.astype(np.int64, copy=False)
-    listed = x.tolist()
-    if x.ndim != 1 or x.dtype.kind not in "Ou" or not set(map(type, listed)) <= {int}:
-        raise TypeError("not a vector of integers")
-    return np.array(listed, dtype=np.int64 if longest(listed) < 63 else object)

@@ -18,7 +18,6 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
 
 from lmi.exact.work import WorkError, fits, spend
 
@@ -145,52 +144,3 @@ def sized(count: int, bits: int, what: str = "the numbers") -> None:
     """
     if not fits(count * bits, MAX_TOTAL_BITS):
         raise WorkError(f"{what} are too long over one denominator")
-
-
-def round_to_bits(value: float, bits: int) -> Fraction:
-    """Round a finite float to the nearest dyadic rational with ``bits`` significant bits.
-
-    Parameters
-    ----------
-    value : float
-        Finite.
-    bits : int
-        Positive.
-
-    Returns
-    -------
-    Fraction
-
-    Examples
-    --------
-    >>> round_to_bits(0.1, 4)
-    Fraction(13, 128)
-    """
-    p, q = value.as_integer_ratio()
-    drop = p.bit_length() - bits
-    return Fraction(p, q) if drop <= 0 else Fraction(round(Fraction(p, 1 << drop)) << drop, q)
-
-
-def dyadic_integers(values: Any) -> tuple[list[int], int]:
-    """Return floats or ints as integers over one power of two: ``values = integers * 2^power``, exactly.
-
-    So a matrix of floats is handed to whoever checks its proof in integers.
-
-    Parameters
-    ----------
-    values : (n,) sequence of float or int
-        Finite.
-
-    Returns
-    -------
-    integers : list of n ints
-    power : int
-
-    Examples
-    --------
-    >>> dyadic_integers([0.75, -2.0, 3])
-    ([3, -8, 12], -2)
-    """
-    ratios = [value.as_integer_ratio() for value in (values.tolist() if hasattr(values, "tolist") else values)]
-    places = max((q.bit_length() for _, q in ratios), default=1)
-    return [p << (places - q.bit_length()) for p, q in ratios], 1 - places

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin, prove_margin, prove_positive_definite
-from lmi.exact.numbers import round_to_bits
+from lmi.dyadic import round_to_bits
 from ptcc_certify.checker import Statement
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
