@@ -21,7 +21,7 @@ from operator import mul
 from typing import Any, NamedTuple
 
 from lmi.exact.polynomials import characteristic
-from lmi.exact.work import affordable, fits, spend
+from lmi.exact.work import fits, spend
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the dense factor, one after the other, until the proof succeeds.
@@ -75,9 +75,8 @@ class Factor:
 
     def __init__(self, S: Rows, bits: int):
         n, self.bits = len(S), bits
-        if any(S[i][i] <= 0 for i in range(n)):
-            raise ArithmeticError("a diagonal entry is not positive")
-        self.shifts = [self._shift(S[i][i]) for i in range(n)]
+        # Powers of two by which rows and columns are scaled, so that the diagonal fits the bits.
+        self.shifts = [bits - (S[i][i].bit_length() - 1) // 2 for i in range(n)]
         self.rows: list[list[int]] = []
         self.diagonal: list[int] = []
         # Scaled entries lie below 4^(bits + 1), so entries of R below 2^(bits + 1). A scaled entry is cut to an
@@ -91,12 +90,6 @@ class Factor:
                 raise ArithmeticError("not proved")
             self.rows.append(row)
             self.diagonal.append(isqrt(left))
-            if not self.diagonal[-1]:
-                raise ArithmeticError("not proved")
-
-    def _shift(self, entry: int) -> int:
-        """Return the power of two by which row and column are scaled, so that the diagonal fits the bits."""
-        return self.bits - (entry.bit_length() - 1) // 2
 
     def _substituted(self, entries: Sequence[int], shift: int) -> list[int]:
         """Return the row of ``R`` that belongs to a row of ``S``: forward substitution, each quotient rounded."""
@@ -202,13 +195,10 @@ def _well_formed(n: int, order: list[int], indptr: list[int], indices: list[int]
     """Tell whether ``order`` is a permutation, and the others the columns of a lower triangular matrix."""
     if sorted(order) != list(range(n)) or len(indices) != len(data) or len(indptr) != n + 1:
         return False
-    if indptr[0] != 0 or indptr[n] != len(indices) or any(b < a for a, b in pairwise(indptr)):
+    if indptr != sorted(indptr) or (indptr[0], indptr[n]) != (0, len(indices)):
         return False
-    for k, (first, last) in enumerate(pairwise(indptr)):
-        part = indices[first:last]
-        if part and (part[0] < k or part[-1] >= n or any(b <= a for a, b in pairwise(part))):
-            return False
-    return True
+    columns = enumerate(indices[first:last] for first, last in pairwise(indptr))
+    return all(not rows or (k <= rows[0] and rows[-1] < n and rows == sorted(set(rows))) for k, rows in columns)
 
 
 def remainder(S: Scaled) -> list[dict[int, int]] | None:
@@ -229,10 +219,11 @@ def remainder(S: Scaled) -> list[dict[int, int]] | None:
                 return None
     if not fits(sum(map(len, E)) * S.times.bit_length(), LARGEST_BITS):
         return None
-    if S.times != 1:
-        E = [{j: value * S.times for j, value in row.items()} for row in E]
+    for row in E:
+        for j in row:
+            row[j] *= S.times
     for (i, j), value in S.T.items():
-        E[i][j] = E[i].get(j, 0) + value
+        E[i][j] += value
     return E
 
 
@@ -262,8 +253,8 @@ class Arithmetic:
     """What decides, by the standard library; :mod:`lmi.exact.fast` has its twin, with arrays."""
 
     name = "standard library"
-    #: Largest matrix that is taken, and largest sum of squared column lengths of a sparse factor.
-    rows, products = 400, 300_000_000
+    #: Largest sum of squared column lengths of a sparse factor that is taken.
+    products = 300_000_000
     #: Whether NumPy is used.
     numpy = False
 
@@ -280,14 +271,12 @@ class Arithmetic:
     def factor(self, S: Rows, first: int = BITS[0]) -> Factor | None:
         """Return the factor that proves a matrix definite, with ``first`` bits or more; None if none does."""
         n = len(S)
-        for bits in BITS:
-            # Every precision costs more than the one before.
-            if bits >= first and affordable(n**3 // 6, bits, bits):
-                spend(n**3 // 6, bits, bits)
-                try:
-                    return Factor(S, bits)
-                except ArithmeticError:
-                    continue
+        for bits in BITS[BITS.index(first) :]:
+            spend(n**3 // 6, bits, bits, "a proof of definiteness")
+            try:
+                return Factor(S, bits)
+            except ArithmeticError:
+                continue
         return None
 
     def residual_definite(self, n: int, entries: Any, factor: SparseFactor, power: int = 0, scale: int = 1) -> bool:

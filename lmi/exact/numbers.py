@@ -51,11 +51,12 @@ def parse(text: str) -> Fraction:
     (Fraction(1, 10), Fraction(-3, 4), Fraction(1, 400), Fraction(3, 4))
     """
     if len(text) <= CACHED:
-        return _short_number(text)
+        return _parsed(text)
     spend(1, 2 * len(text), 2 * len(text), "reading long numbers")
-    return _parsed(text)
+    return _parsed.__wrapped__(text)  # which is not kept
 
 
+@lru_cache(maxsize=10_000)
 def _parsed(text: str) -> Fraction:
     if len(text) > MAX_CHARACTERS:
         raise NumberError(f"a number of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
@@ -77,11 +78,6 @@ def _parsed(text: str) -> Fraction:
         raise NumberError(f'the exponent of "{shorten(text)}" is beyond {limit}')
     value, power = int(sign + whole + part, base), int(digits) - len(part) * (4 if base == 16 else 1)
     return Fraction(value * radix**power) if power >= 0 else Fraction(value, radix**-power)
-
-
-@lru_cache(maxsize=10_000)
-def _short_number(text: str) -> Fraction:
-    return _parsed(text)
 
 
 def shorten(text: str, limit: int = 40) -> str:

@@ -94,14 +94,20 @@ def evaluated(p: Polynomial, matrix: Matrix) -> list[dict[int, int]]:
     """
     result: list[dict[int, int]] = [{} for _ in matrix]
     for c in p:
-        result = [_combined(row, matrix) for row in result]
+        result = [row_sum(row, matrix) for row in result]
         for i, row in enumerate(result):
             row[i] = row.get(i, 0) + c
     return result
 
 
-def _combined(factors: Mapping[int, int], matrix: Matrix) -> dict[int, int]:
-    """Return the sum of multiples of the rows of a matrix."""
+def row_sum(factors: Mapping[int, int], matrix: Matrix) -> dict[int, int]:
+    """Return the sum of multiples of some rows of a matrix.
+
+    Examples
+    --------
+    >>> row_sum({0: 1, 1: 10}, [{0: 2}, {0: 3, 1: 4}])
+    {0: 32, 1: 40}
+    """
     total: dict[int, int] = {}
     for k, v in factors.items():
         for j, w in matrix[k].items():
