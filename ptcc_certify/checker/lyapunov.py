@@ -14,7 +14,7 @@ from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.checker.large_function import Proved, check_dominance
-from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
+from ptcc_certify.checker.matrices import Matrix, block, combined, congruence, decrease, diagonal, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
 from ptcc_certify.checker.side_vectors import beside
@@ -144,8 +144,7 @@ def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tu
         ends = doc.open("overshoot", of, ["lowest", "highest"])
         low, high = ends["lowest"], ends["highest"]
         need(low > 0 and doc.exact.definite(less(P, low * scale)), "the lower end is not proved")
-        negative = [[-x for x in row] for row in P]
-        need(doc.exact.definite(less(negative, -high * scale)), "the upper end is not proved")
+        need(doc.exact.definite(less([[-x for x in row] for row in P], -high * scale)), "the upper end is not proved")
         need(low <= high, "the ends are in the wrong order")
         doc.done(f"at most {up(high / low)}")
     else:
@@ -171,9 +170,6 @@ def _deviation(doc: Document, final: FinalState, said: Any, state_form: tuple[Ma
     failed = doc.exact.bounded(S, forms)  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
     p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
-    bits, ratio = max(longest(x for row in part for x in row) for part in (S, gram)), longest((p, q))
-    sized(len(S) ** 2, bits + ratio, "the deviation of the norm")
-    spend(2 * len(S) ** 2, bits, ratio, "the deviation of the norm")
-    N = [[p * s - q * g for s, g in zip(r, t, strict=True)] for r, t in zip(S, gram, strict=True)]
+    N = combined("the deviation of the norm", (p, S), (-q, gram))
     need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
     doc.done(f"norm at most {up(exact(said['norm']))}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
 from lmi.exact.directed_rounding import up
@@ -11,7 +12,7 @@ from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import block, decrease, need_rows, product, transposed
+from ptcc_certify.checker.matrices import block, decrease, need_rows, transposed
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
@@ -77,7 +78,7 @@ def _inertia(doc: Document, structure: Structure, limit: Fraction, witness: Any)
     # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
     rows = entries(said["vectors"], "vectors", 2 if still else 1)
     X, _ = integers([[exact(x) for x in entries(row, "a vector", len(nodes))] for row in rows])
-    bits = longest(x for row in H for x in row)
-    spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
-    below = product(X, product(H, transposed(X)))
-    need(doc.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
+    bits, own = (longest(chain.from_iterable(rows)) for rows in (H, X))
+    spend(2 * len(nodes) ** 2, bits, 2 * own, "H on the vectors")
+    above = doc.exact.product(doc.exact.product([[-x for x in row] for row in X], H), transposed(X))
+    need(doc.exact.definite(above), "H is not negative on the vectors")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import chain
 from typing import Any, NamedTuple
 
 from lmi.exact.directed_rounding import down
@@ -15,6 +14,7 @@ from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrices import (
     Matrix,
     block,
+    combined,
     congruence,
     decrease,
     diagonal,
@@ -202,12 +202,9 @@ def _coupled(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, 
     graph, weights, gamma = paper.structure.graph, paper.weights(rho), gamma or {}
     nodes, ((own,), scale) = list(weights), integers([list(weights.values())])
     S, unit = decrease(doc.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
-    (tops,), other = integers([[*(gamma[v] * scale * unit for v in nodes if v in gamma)]])
-    bits, more = longest(chain.from_iterable(S)), other.bit_length()
-    sized(len(S) ** 2, bits + more, "the coupled blocks")
-    spend(len(S) ** 2, bits, more, "the coupled blocks")
-    S = [[x * other for x in row] for row in S]
     leading = [i for i, v in enumerate(nodes) if v in gamma]
+    (tops,), other = integers([[gamma[nodes[i]] * scale * unit for i in leading]])
+    S = combined("the coupled blocks", (other, S))
     for i, top in zip(leading, tops, strict=True):
         for j in leading:
             S[i][j] = top * (i == j)
