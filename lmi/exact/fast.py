@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
-from itertools import chain
+from itertools import chain, pairwise
 from operator import add
 from typing import Any, NamedTuple
 
@@ -380,31 +380,20 @@ def _pair_products(
         return None
     keys: Any = np.zeros(0, dtype=np.int64)
     limbs = [np.zeros(0, dtype=np.int64) for _ in range(count)]
-    waiting: list[tuple[np.ndarray, list[np.ndarray]]] = []
-
-    def gathered() -> tuple[np.ndarray, list[np.ndarray]]:
-        distinct, inverse = np.unique(np.concatenate([keys, *(key for key, _ in waiting)]), return_inverse=True)
-        sums = [np.zeros(len(distinct), dtype=np.int64) for _ in range(count)]
-        for m, total in enumerate(sums):
-            np.add.at(total, inverse, np.concatenate([limbs[m], *(part[m] for _, part in waiting)]))
-        return distinct, sums
-
-    size = 0
-    for c in np.unique(counts[counts > 0]).tolist():
-        upper, lower = np.tril_indices(c)
-        columns = np.flatnonzero(counts == c)
-        per_chunk = max(CHUNK // len(upper), 1)
-        for begin in range(0, len(columns), per_chunk):
-            at = indptr[columns[begin : begin + per_chunk]][:, None] + np.arange(c)[None, :]
-            rows = indices[at]
-            part = [np.zeros(len(at) * len(upper), dtype=np.int64) for _ in range(count)]
-            for a, x in enumerate(digits):
-                for b, y in enumerate(digits):
-                    part[a + b] += (x[at][:, upper] * y[at][:, lower]).ravel()
-            waiting.append(((rows[:, upper] * n + rows[:, lower]).ravel(), part))
-            size += len(part[0])
-            if size > CHUNK:
-                keys, limbs = gathered()
-                waiting, size = [], 0
-    keys, limbs = gathered()
+    pairs = np.cumsum(counts * (counts + 1) // 2)
+    cuts = np.searchsorted(pairs, np.arange(CHUNK, pairs[-1] if first else 0, CHUNK))
+    for begin, end in pairwise(np.unique([0, *cuts, first]).tolist()):
+        # Every entry of these columns, with those of its column down to itself.
+        entry = np.arange(indptr[begin], indptr[end])
+        head = np.repeat(indptr[begin:end], counts[begin:end])
+        many = entry - head + 1
+        upper = np.repeat(entry, many)
+        lower = np.arange(len(upper)) - np.repeat(np.cumsum(many) - many - head, many)
+        found = np.concatenate([keys, indices[upper] * n + indices[lower]])
+        keys, inverse = np.unique(found, return_inverse=True)
+        for m in range(count):
+            parts = [x[upper] * digits[m - a][lower] for a, x in enumerate(digits) if 0 <= m - a < len(digits)]
+            total = np.zeros(len(keys), dtype=np.int64)
+            np.add.at(total, inverse, np.concatenate([limbs[m], np.sum(parts, axis=0)]))
+            limbs[m] = total
     return keys, _joined(limbs, width)
