@@ -24,9 +24,8 @@ from lmi.exact.work import fits, spend
 
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
-#: Up to this many rows python-flint decides, by the characteristic polynomial, unless entries are longer than so many
-#: bits over the number of rows; above, NumPy proposes a factor.
-FLINT_ROWS, FLINT_BITS = 24, 40_000
+#: Above this many rows NumPy proposes a factor.
+SMALL_ROWS = 24
 #: Matrices with entries of more bits whose mean is shorter by this factor are not multiplied by python-flint.
 PADDED_BITS, PADDED = 4000, 8
 #: Bits of all entries up to which python-flint multiplies large matrices.
@@ -41,25 +40,14 @@ LONGEST_COLUMN, LARGEST_BLOCK, LARGEST_PAIRS, CHUNK = 4000, 2_000_000, 400_000_0
 
 
 class FastArithmetic(Arithmetic):
-    """What decides, by python-flint for small matrices and NumPy for large ones; in between as :class:`Arithmetic`.
-
-    python-flint forms the characteristic polynomial: ``S > 0`` iff its signs alternate strictly (Descartes; its roots
-    are real).
-    """
+    """What decides, with factors that NumPy proposes for large matrices, and products by python-flint."""
 
     name = f"python-flint {flint.__version__}, NumPy {np.__version__}"
     products, numpy = 10_000_000_000, True
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Arithmetic.definite`."""
-        if not symmetric(S):
-            return False
-        if len(S) > FLINT_ROWS and factor(S) is not None:
-            return True
-        if not 0 < len(S) <= FLINT_ROWS or _longest(S) * len(S) > FLINT_BITS:
-            return self.factor(S) is not None
-        coefficients = _flint(S).charpoly().coeffs()  # constant term first
-        return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
+        return (len(S) > SMALL_ROWS and symmetric(S) and factor(S) is not None) or super().definite(S)
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
         """Return ``A B``, by python-flint unless some entries are much longer than others, which it pads all to."""
@@ -85,7 +73,7 @@ class FastArithmetic(Arithmetic):
 
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
-        if len(S) > FLINT_ROWS and bits == BITS[0] and symmetric(S):
+        if len(S) > SMALL_ROWS and bits == BITS[0] and symmetric(S):
             return _above_by_congruence(S, D) or super().above(S, D, bits)
         return super().above(S, D, bits)
 

@@ -125,28 +125,15 @@ def rank(rows: Matrix) -> int:
     >>> rank([{0: 1, 1: 2}, {0: 2, 1: 4}, {2: 5}])
     2
     """
-    left = [_primitive_row(row) for row in rows]
-    left = [row for row in left if row]
-    found = 0
-    while left:
+    left, found = [_primitive_row(row) for row in rows], 0
+    while left := [row for row in left if row]:
         pivot = min(left, key=len)
+        column = min(pivot, key=lambda j: abs(pivot[j]))
         left.remove(pivot)
         found += 1
-        column = min(pivot, key=lambda j: abs(pivot[j]))
-        head = pivot.pop(column)
-        kept = []
-        for row in left:
-            factor = row.pop(column, 0)
-            if factor:
-                scale = gcd(head, factor)
-                up, down = head // scale, factor // scale
-                total = {j: up * v for j, v in row.items()}
-                for j, v in pivot.items():
-                    total[j] = total.get(j, 0) - down * v
-                row = _primitive_row(total)
-            if row:
-                kept.append(row)
-        left = kept
+        for k, row in enumerate(left):
+            if column in row:
+                left[k] = _primitive_row(row_sum({0: pivot[column], 1: -row[column]}, [row, pivot]))
     return found
 
 
