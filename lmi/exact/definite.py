@@ -164,18 +164,16 @@ def scaled(n: int, entries: Any, factor: SparseFactor, power: int = 0, scale: in
         columns = [x.tolist() if hasattr(x, "tolist") else list(x) for x in columns]
     except TypeError:
         return None
-    if len(columns) != 9 or not all(set(map(type, column)) <= {int} for column in columns):
+    columns.append([factor.bits, power, scale])
+    if len(columns) != 10 or not all(set(map(type, column)) <= {int} for column in columns):
         return None
-    if {type(factor.bits), type(power), type(scale)} != {int} or scale <= 0:
+    rows, cols, values, order, indptr, indices, data, exponents, d, _ = columns
+    if not (len(rows) == len(cols) == len(values) and len(exponents) == len(d) == n and min([scale, *d]) > 0):
         return None
-    rows, cols, values, order, indptr, indices, data, exponents, d = columns
-    if not len(rows) == len(cols) == len(values) or not _well_formed(n, order, indptr, indices, data):
-        return None
-    if len(exponents) != n or len(d) != n or min(d, default=1) <= 0:
+    largest = max(map(abs, (factor.bits, power, *exponents)))
+    if largest > LARGEST_SHIFT or not _well_formed(n, order, indptr, indices, data):
         return None
     if not all(n > row >= column >= 0 for row, column in zip(rows, cols, strict=True)):
-        return None
-    if max(map(abs, (factor.bits, power, *exponents))) > LARGEST_SHIFT:
         return None
     place = [0] * n
     for k, node in enumerate(order):

@@ -73,9 +73,8 @@ class FastArithmetic(Arithmetic):
 
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
-        if len(S) > SMALL_ROWS and bits == BITS[0] and symmetric(S):
-            return _above_by_congruence(S, D) or super().above(S, D, bits)
-        return super().above(S, D, bits)
+        large = len(S) > SMALL_ROWS and bits == BITS[0] and symmetric(S)
+        return (_above_by_congruence(S, D) if large else None) or super().above(S, D, bits)
 
 
 def _flint(rows: Rows) -> Any:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import chain
 from typing import Any
 
 from lmi.exact.directed_rounding import up
-from lmi.exact.numbers import integers, longest
-from lmi.exact.work import spend
+from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import block, decrease, need_rows, transposed
+from ptcc_certify.checker.matrices import block, congruence, decays, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
@@ -73,12 +71,9 @@ def _inertia(doc: Document, structure: Structure, limit: Fraction, witness: Any)
     need(nodes == own, "the nodes are not a strong component")
     need_rows(len(nodes))
     H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
-    S, _ = decrease(doc.exact, H, block(graph, nodes), limit, graph.unit)
-    need(doc.exact.definite(S), "not proved definite")
+    need(decays(doc.exact, H, block(graph, nodes), limit, graph.unit, range(len(nodes))), "not proved definite")
     # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
     rows = entries(said["vectors"], "vectors", 2 if still else 1)
     X, _ = integers([[exact(x) for x in entries(row, "a vector", len(nodes))] for row in rows])
-    bits, most = (longest(chain.from_iterable(part)) for part in (H, X))
-    spend(2 * len(nodes) ** 2, bits, 2 * most, "H on the vectors")
-    above = doc.exact.product(doc.exact.product([[-x for x in row] for row in X], H), transposed(X))
-    need(doc.exact.definite(above), "H is not negative on the vectors")
+    below = congruence(doc.exact, H, [dict(enumerate(column)) for column in zip(*X, strict=True)], len(X))
+    need(doc.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")
