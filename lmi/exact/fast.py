@@ -8,6 +8,7 @@ verified on the slices themselves. Every twin is compared with its plain one by 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
@@ -339,15 +340,10 @@ def remainder(S: Scaled) -> Remainder | None:
     block, sums = square(corner), _pair_products(n, first, indptr, indices, data)
     if block is None or sums is None or not fits((len(sums[0]) + corner.size) * S.times.bit_length(), LARGEST_BITS):
         return None
-    E = dict(zip(sums[0].tolist(), (-S.times * sums[1]).tolist(), strict=True))
+    E = defaultdict(int, zip(sums[0].tolist(), (-S.times * sums[1]).tolist(), strict=True))
     block = -S.times * block
     for (row, column), value in S.T.items():
-        if column >= first:
-            block[row - first, column - first] += value
-            if row != column:
-                block[column - first, row - first] += value
-        else:
-            E[row * n + column] = E.get(row * n + column, 0) + value
+        E[row * n + column] += value
     values = np.array(list(E.values()), dtype=object)
     i, j = np.divmod(np.array(list(E), dtype=np.int64), max(n, 1))
     inside = j >= first

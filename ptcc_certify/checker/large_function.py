@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import chain, pairwise
 from operator import mul
 from typing import Any
 
@@ -51,14 +51,13 @@ def check_dominance(
     for v, w, d in zip(nodes, own, each, strict=True):
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
-    known = {  # g_k of leader groups
-        k: _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
-        for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True)
-    }
+    spare = {}  # of leader groups, by which g_k exceeds the rate
+    for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True):
+        g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
+        spare[k] = ((g - rate) * graph.unit).as_integer_ratio()
     # w_i d_i times rate, less what the others push, times q and unit
     p, q = (rate * graph.unit).as_integer_ratio()
-    spare = {k: ((g - rate) * graph.unit).as_integer_ratio() for k, g in known.items()}
-    bits = longest((p, q, *(x for pair in spare.values() for x in pair))) + graph.bits
+    bits = longest((p, q, *chain.from_iterable(spare.values()))) + graph.bits
     spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
     heard, diagonal = graph.heard(D), graph.diagonal
     pushes = [0 if k >= 0 else w * d for k, w, d in zip(number, W, D, strict=True)]
@@ -100,7 +99,6 @@ def _factor(
     said, read, arithmetic = fields(said, keys, "factor"), doc.files.integers, doc.exact
     group, gauge = structure.closed[k], structure.gauges[k]
     n = len(group) - (gauge is not None)
-    need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")
     order, exponents, indptr = (
         read(said[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
     )
