@@ -94,7 +94,7 @@ def longest(values: Iterable[int]) -> int:
     >>> longest([1, -8])
     4
     """
-    return max((x.bit_length() for x in values), default=0)
+    return max(map(int.bit_length, values), default=0)
 
 
 def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import gcd
@@ -89,14 +90,14 @@ def evaluated(p: Polynomial, matrix: Matrix) -> list[dict[int, int]]:
 
     Examples
     --------
-    >>> evaluated([1, 0, 1], [{1: 2}, {0: 3}])
+    >>> [dict(row) for row in evaluated([1, 0, 1], [{1: 2}, {0: 3}])]
     [{0: 7, 1: 0}, {1: 7, 0: 0}]
     """
     result: list[dict[int, int]] = [{} for _ in matrix]
     for c in p:
         result = [row_sum(row, matrix) for row in result]
         for i, row in enumerate(result):
-            row[i] = row.get(i, 0) + c
+            row[i] += c
     return result
 
 
@@ -105,13 +106,13 @@ def row_sum(factors: Mapping[int, int], matrix: Matrix) -> dict[int, int]:
 
     Examples
     --------
-    >>> row_sum({0: 1, 1: 10}, [{0: 2}, {0: 3, 1: 4}])
+    >>> dict(row_sum({0: 1, 1: 10}, [{0: 2}, {0: 3, 1: 4}]))
     {0: 32, 1: 40}
     """
-    total: dict[int, int] = {}
+    total: dict[int, int] = defaultdict(int)
     for k, v in factors.items():
         for j, w in matrix[k].items():
-            total[j] = total.get(j, 0) + v * w
+            total[j] += v * w
     return total
 
 
