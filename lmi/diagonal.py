@@ -19,8 +19,8 @@ import numpy as np
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
 from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
+from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, MatrixError, NoCertificate
-from lmi.exact.numbers import round_to_bits
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks

@@ -27,8 +27,8 @@ import numpy as np
 
 import lmi
 from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.numbers import round_to_bits
 from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph

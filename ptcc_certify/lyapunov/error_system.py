@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin
-from lmi.exact.numbers import round_to_bits
+from lmi.dyadic import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.lemmas import left_vector
 from ptcc_certify.theorems.matrices import (

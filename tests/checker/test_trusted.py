@@ -29,7 +29,6 @@ STANDARD = {
     *(
         "fractions",
         "functools",
-        "graphlib",
         "hashlib",
         "io",
         "itertools",
