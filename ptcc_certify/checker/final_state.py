@@ -291,7 +291,7 @@ def _followers(
             X[v], R[v] = g * middle, wide
     blur = graph.heard(R) if any(R) else R
     residuals = [abs(x) + y for x, y in zip(graph.moved(X), blur, strict=True)]
-    worst, least = _worst(F, residuals, graph.compared(each))
+    worst, least = _worst(F, residuals, graph.moved(each, signed=False))
     # The radius that is proved is worst u / (least grid); all over least grid fine
     room, share = math.floor(spare * (least * grid * fine)), least * grid
     for v, told, weight in zip(F, radii, U, strict=True):
