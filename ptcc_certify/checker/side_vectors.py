@@ -35,7 +35,7 @@ class Numbers:
         return len(self.values)
 
     def __getitem__(self, k: int) -> Fraction:
-        return Fraction(self.values[k]) if self.scale is None else Fraction(self.values[k], self.scale)
+        return self.values[k] if self.scale is None else Fraction(self.values[k], self.scale)
 
     def __iter__(self) -> Iterator[Fraction]:
         return map(self.__getitem__, range(len(self)))
