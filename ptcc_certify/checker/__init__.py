@@ -69,14 +69,30 @@ __all__ = [
 ]
 
 
-def check(
+def check(source: str | Path | Mapping[str, Any], **options: Any) -> CheckReport:
+    """Check a certificate; source and options are those of :func:`read_and_check`.
+
+    Raises
+    ------
+    UnreadableError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> check({"schema": SCHEMA}).reason
+    'the key "producer" is missing'
+    """
+    return read_and_check(source, **options)[1]
+
+
+def read_and_check(
     source: str | Path | Mapping[str, Any],
     *,
     stdlib: bool = False,
     files: Mapping[str, bytes] | None = None,
     memory: float = 1,
-) -> CheckReport:
-    """Check a certificate.
+) -> tuple[dict[str, Any], CheckReport]:
+    """Check a certificate; return its JSON object beside the report.
 
     Parameters
     ----------
@@ -90,32 +106,6 @@ def check(
         GB that the check may take; what would take more is rejected before it is formed. The work that is allowed, some
         seconds for each GB, grows with it.
 
-    Returns
-    -------
-    CheckReport
-
-    Raises
-    ------
-    UnreadableError
-        The file cannot be read as a certificate; one line.
-
-    Examples
-    --------
-    >>> check({"schema": SCHEMA}).reason
-    'the key "producer" is missing'
-    """
-    return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
-
-
-def read_and_check(
-    source: str | Path | Mapping[str, Any],
-    *,
-    stdlib: bool = False,
-    files: Mapping[str, bytes] | None = None,
-    memory: float = 1,
-) -> tuple[dict[str, Any], CheckReport]:
-    """Return the parsed JSON object beside the report of :func:`check`, whose parameters these are.
-
     Raises
     ------
     UnreadableError
@@ -127,10 +117,7 @@ def read_and_check(
     {'schema': 'ptcc-certificate/2'}
     """
     with limited(memory) as account:
-        if isinstance(source, Mapping):
-            data, folder = dict(source), Path()
-        else:
-            data, folder = read(source), Path(source).parent
+        data, folder = (dict(source), Path()) if isinstance(source, Mapping) else (read(source), Path(source).parent)
         report = _check(data, SideFiles(folder, files), stdlib)
         return data, replace(report, memory=float(account.needed))
 

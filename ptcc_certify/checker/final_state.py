@@ -202,7 +202,7 @@ def _left_null_vector(graph: Digraph, group: Sequence[int], intervals: Sequence[
 
 
 def _weights(final: FinalState, said: Any) -> list[list[Interval]]:
-    """Verify the columns ``L_F w = -L_FLk G_k 1``, within the radii: unbalanced leaders, and those of others, are at 0."""
+    """Verify the columns ``L_F w = -L_FLk G_k 1``, within the radii; leaders of other components are at 0."""
     structure, F = final.structure, final.structure.followers
     said = ordered([structure.graph.labels[v] for v in F], said, "containment_weights")
     weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in said.values()]
@@ -241,7 +241,7 @@ def _final(doc: Document, final: FinalState, said: Any, degenerate: Any, begin: 
         if x != mid or r != radius:
             _narrow(structure.graph.labels[v], abs(x - mid), r, radius, spare)
     widest = max(r for _, r in proved.values())
-    return widest if final.weights is not None else max(widest, _followers(final, values, claimed, spare))
+    return widest if final.weights is not None else max(widest, _followers(final, moved, values, claimed, spare))
 
 
 def _narrow(label: str, off: Any, proved: Any, radius: Any, spare: Any) -> None:
@@ -265,7 +265,7 @@ def _claimed(doc: Document, graph: Digraph, said: Any) -> tuple[Numbers, Numbers
 
 
 def _followers(
-    final: FinalState, values: Mapping[int, Interval], claimed: tuple[Numbers, Numbers], spare: Fraction
+    final: FinalState, moved: Numbers, values: Mapping[int, Interval], claimed: tuple[Numbers, Numbers], spare: Fraction
 ) -> Fraction:
     """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``.
 
@@ -274,19 +274,20 @@ def _followers(
     """
     structure, F = final.structure, final.structure.followers
     (mids, scale), (radii, fine) = (numbers.over(F) for numbers in claimed)
-    single = {k: x for k, (x, _) in values.items() if len(structure.closed[k - 1]) == 1}
-    (own,), other = integers([list(single.values())])
+    single = [group[0] for k, group, _ in structure.balanced if k not in final.left_null_vectors]
+    own, other = moved.over(single)
     grid = math.lcm(scale, other)
-    if any(r or grid % x.denominator for k, (x, r) in values.items() if k not in single):
+    if any(r or grid % x.denominator for x, r in map(values.__getitem__, final.left_null_vectors)):
         grid <<= GRID_BITS
-    rounded = {k: (x * (grid // other), 0) for k, x in zip(single, own, strict=True)}
-    for k in values.keys() - single.keys():
-        value, r = values[k]
-        rounded[k] = math.floor(value * grid), math.ceil(r * grid) + (grid % value.denominator != 0)
-    known, wide = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}, {}
+    known = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}
+    known |= {v: x * (grid // other) for v, x in zip(single, own, strict=True)}
+    wide: dict[int, int] = {}
     for k, group, gauge in structure.balanced:
-        known |= {v: g * rounded[k][0] for v, g in zip(group, gauge, strict=True)}
-        wide |= dict.fromkeys(group, rounded[k][1])
+        if k in final.left_null_vectors:
+            value, r = values[k]
+            middle = math.floor(value * grid)
+            known |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
+            wide |= dict.fromkeys(group, math.ceil(r * grid) + (middle != value * grid))
     worst, least = final.error(known, wide)
     # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
     share = least * grid
