@@ -7,7 +7,7 @@ Nothing here decides what :class:`~ptcc_certify.checker.digraph.Digraph` does no
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from ptcc_certify.checker.digraph import Adjacency, Digraph
 
 #: Edges taken at a time.
-CHUNK = 65_536
+CHUNK = 8192
 
 
 class ArrayDigraph(Digraph):
@@ -59,3 +59,11 @@ class ArrayDigraph(Digraph):
             x, y = x[apart], y[apart]
         first = np.minimum(label[:n], label[n:])
         return first.tolist(), set(first[label[:n] == label[n:]].tolist())
+
+    def _lines(self, order: Sequence[int], rank: Sequence[int], *texts: Sequence[str]) -> Iterator[str]:
+        edges, place = [np.asarray(part) for part in (self.source, self.target, self.which)], np.array(rank)
+        ordered, columns = np.lexsort((place[edges[1]], place[edges[0]])), [np.array(x, dtype=object) for x in texts]
+        for first in range(0, self.n_edges, CHUNK):
+            part = ordered[first : first + CHUNK]
+            words = [column[numbers[part]] for column, numbers in zip(columns, edges, strict=True)]
+            yield "".join(np.stack(words, axis=1).ravel().tolist())

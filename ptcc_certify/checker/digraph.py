@@ -189,13 +189,13 @@ class Digraph:
         >>> list(Digraph("abc", [0, 1], [1, 2], [1, 1], 1).reached([1]))
         [0, 1, 1]
         """
-        adjacency = self.into if back else self.out
+        starts, ends, _ = self.into if back else self.out
         seen, todo = bytearray(self.n), list(first)
         for v in todo:
             seen[v] = 1
         while todo:
             v = todo.pop()
-            for u in edges_of(adjacency, v)[0]:
+            for u in ends[starts[v] : starts[v + 1]]:
                 if not seen[u] and (group is None or group[u] == group[v]):
                     seen[u] = 1
                     todo.append(u)
@@ -220,12 +220,13 @@ class Digraph:
 
     def closed(self, group: Sequence[int]) -> bool:
         """Tell whether no edge enters a group from outside; -1 marks nodes of none."""
-        return all(group[t] in (-1, group[s]) for s, t in zip(self.source, self.target, strict=True))
+        inside = (v for v, home in enumerate(group) if home != -1)
+        return all(group[s] == group[t] for t in inside for s in edges_of(self.into, t)[0])
 
     def fits(self, gauge: Sequence[int]) -> bool:
         """Tell whether ``w gauge[s] gauge[t] > 0`` for all edges to a ``t`` whose gauge is not 0."""
-        edges = zip(self.source, self.target, self.which, strict=True)
-        return all(not gauge[t] or gauge[s] * gauge[t] == (-1 if self.minus[k] else 1) for s, t, k in edges)
+        into = ((g, edges_of(self.into, t)) for t, g in enumerate(gauge) if g)
+        return all(gauge[s] == (-g if self.minus[k] else g) for g, edges in into for s, k in zip(*edges, strict=True))
 
     # ------------------------------------------------------------------ pairs of edges
 
@@ -250,23 +251,22 @@ class Digraph:
 
     def sha256(self) -> str:
         """Return the SHA-256 of nodes and edges, in an order that depends on the labels alone."""
-        hashed = hashlib.sha256()
-        for lines in self._lines():
+        order = sorted(range(self.n), key=self.labels.__getitem__)
+        rank = [v for _, v in sorted(zip(order, range(self.n), strict=True))]
+        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
+        weights = [f', "{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]
+        hashed = hashlib.sha256("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
+        for lines in self._lines(order, rank, [f"[{label}, " for label in quoted], quoted, weights):
             hashed.update(lines.encode("utf-8", "surrogatepass"))
         return hashed.hexdigest()
 
-    def _lines(self) -> Iterator[str]:
-        """Yield the lines of all nodes, ascending by label, then those of the edges that leave each."""
-        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
-        weights = [f', "{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]
-        order, (starts, ends, which) = sorted(range(self.n), key=self.labels.__getitem__), self.out
-        names, rank = [quoted[v] for v in order], dict(zip(order, range(self.n), strict=True))
-        yield "".join(f"[{name}]\n" for name in names)
-        ranked = starts, array("q", map(rank.__getitem__, ends)), which
+    def _lines(self, order: Sequence[int], rank: Sequence[int], *texts: Sequence[str]) -> Iterator[str]:
+        """Yield the lines of all edges, put together from texts of source, target and weight, ascending by rank."""
+        first, second, third = texts
         for v in order:
-            edges = sorted(zip(*edges_of(ranked, v), strict=True))
-            first = f"[{quoted[v]}, "
-            yield "".join([first + names[r] + weights[k] for r, k in edges])
+            ends, which = edges_of(self.out, v)
+            edges = sorted(zip(map(rank.__getitem__, ends), which, strict=True))
+            yield "".join([first[v] + second[order[r]] + third[k] for r, k in edges])
 
 
 def edges_of(adjacency: Adjacency, v: int) -> tuple[array[int], array[int]]:

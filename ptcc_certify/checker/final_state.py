@@ -248,7 +248,7 @@ def _narrow(label: str, off: Any, proved: Any, radius: Any, spare: Any) -> None:
     """Verify that a radius takes in what is proved, off the middle, and is not much wider; all over one scale."""
     if off + proved > radius:
         raise RejectedError(f"agent {shorten(label)} ends elsewhere")
-    if proved != radius and radius > 2 * proved + spare:
+    if radius > 2 * proved + spare:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 

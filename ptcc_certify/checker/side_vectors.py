@@ -128,9 +128,10 @@ class SideFiles:
         values = self._vector(said, what, count)
         if values.typecode == "d":
             need("scale" not in said, f"{what}: only integers have a scale")
-            common = max((x.as_integer_ratio()[1] for x in values), default=1)  # they are powers of two
+            ratios = [x.as_integer_ratio() for x in values]
+            common = max((q for _, q in ratios), default=1)  # they are powers of two
             sized(count, common.bit_length() + longest(int(end(values)) for end in (min, max) if count), what)
-            return Numbers([p * (common // q) for p, q in map(float.as_integer_ratio, values)], common)
+            return Numbers([p * (common // q) for p, q in ratios], common)
         scale = exact(said.get("scale", "1"))
         need(scale > 0, f"{what}: the scale is not positive")
         factor = scale.denominator

@@ -94,15 +94,15 @@ def check_structure(doc: Document, graph: Digraph) -> Structure:
         need(type(entry["balanced"]) is bool, "balance of a closed component")
         nodes = positions(doc, graph, entry["nodes"], "a closed component")
         need(bool(nodes) and all(a < b for a, b in pairwise(nodes)), "nodes of a closed component are not in order")
-        gauge = entries(entry["gauge"], "gauge", len(nodes)) if balanced else None
-        camps = gauge is None or (all(type(g) is int and g in (1, -1) for g in gauge) and gauge[0] == 1)
-        need(camps, "camps of a component")
+        gauge = None
+        if balanced:
+            gauge = entries(entry["gauge"], "gauge", len(nodes))
+            need(all(type(g) is int and abs(g) == 1 for g in gauge) and gauge[0] == 1, "camps of a component")
+        else:
+            _negative_cycle(doc, graph, entry["negative_cycle"], set(nodes))
         closed.append(nodes)
         gauges.append(gauge)
     structure = Structure(graph, closed, gauges, _closed_components(graph, closed))
-    for entry, nodes, gauge in zip(said["closed_components"], closed, gauges, strict=True):
-        if gauge is None:
-            _negative_cycle(doc, graph, entry["negative_cycle"], set(nodes))
     signs = {v: g for _, nodes, gauge in structure.balanced for v, g in zip(nodes, gauge, strict=True)}
     need(graph.fits([signs.get(v, 0) for v in range(graph.n)]), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):
