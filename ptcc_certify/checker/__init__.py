@@ -17,7 +17,6 @@ import io
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +49,9 @@ KEYS = (
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
     *("verdict", "digest", "unverified"),
 )
+
+#: What values of another type, or too deep, raise where they are used.
+MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
 
 __all__ = [
     "INPUT_NODES",
@@ -118,20 +120,15 @@ def read_and_check(
     """
     with limited(memory) as account:
         data, folder = (dict(source), Path()) if isinstance(source, Mapping) else (read(source), Path(source).parent)
-        report = _check(data, SideFiles(folder, files), stdlib)
-        return data, replace(report, memory=float(account.needed))
-
-
-def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
-    doc, verdict, reason = Document(data, files, arithmetic(stdlib)), "", None
-    try:
-        verdict = _verdict(doc)
-    except (RejectedError, WorkError) as error:
-        reason = str(error)
-    except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
-        reason = f"malformed ({type(error).__name__})"
-    at, steps = None if reason is None else doc.at, tuple(doc.steps)
-    return CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256)
+        doc, verdict, reason = Document(data, SideFiles(folder, files), arithmetic(stdlib)), "", None
+        try:
+            verdict = _verdict(doc)
+        except (RejectedError, WorkError) as error:
+            reason = str(error)
+        except MALFORMED as error:
+            reason = f"malformed ({type(error).__name__})"
+        at, steps, needed = None if reason is None else doc.at, tuple(doc.steps), float(account.needed)
+        return data, CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256, needed)
 
 
 def _verdict(doc: Document) -> str:

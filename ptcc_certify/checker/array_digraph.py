@@ -33,8 +33,9 @@ class ArrayDigraph(Digraph):
     def _added(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
         total: Any = np.zeros(self.n, dtype=object)
         weights, numbers = np.array(values, dtype=object), np.array(x, dtype=object)
-        for first in range(0, self.n_edges, CHUNK):
-            i, j, k = (np.asarray(part)[first : first + CHUNK] for part in (of, to, self.which))
+        step = min(CHUNK, self.n)  # so many products take no more memory than the sums
+        for first in range(0, self.n_edges, step):
+            i, j, k = (np.asarray(part)[first : first + step] for part in (of, to, self.which))
             np.add.at(total, j, weights[k] * numbers[i])
         return total.tolist()
 

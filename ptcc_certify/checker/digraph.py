@@ -252,7 +252,7 @@ class Digraph:
     def sha256(self) -> str:
         """Return the SHA-256 of nodes and edges, in an order that depends on the labels alone."""
         order = sorted(range(self.n), key=self.labels.__getitem__)
-        rank = [v for _, v in sorted(zip(order, range(self.n), strict=True))]
+        rank = sorted(range(self.n), key=order.__getitem__)
         quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
         weights = [f', "{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]
         hashed = hashlib.sha256("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
