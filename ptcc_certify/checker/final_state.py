@@ -68,20 +68,16 @@ class FinalState:
         each = dict(zip(self.structure.followers, self.scaled_u, strict=True))
         return graph.moved([each.get(v, 0) for v in range(graph.n)], signed=False)
 
-    def error(self, known: Mapping[int, int], radii: Mapping[int, int]) -> tuple[int, int]:
-        """Return ``e`` as numerator and denominator: followers at ``known`` are off by at most ``e scaled_u``.
+    def error(self, residuals: Sequence[int] | Mapping[int, int]) -> tuple[int, int]:
+        """Return ``e = max_i |r_i| / (M(L_F) u)_i`` as numerator and denominator; 0 where nothing is left over.
 
-        What ``L`` leaves of ``known``, with leaders within their radii, is ``r``; ``e = max_i r_i / (M(L_F) u)_i``.
+        ``r`` is what ``L_F`` leaves of some states: these are off by at most ``e scaled_u``.
         """
-        graph, F = self.structure.graph, self.structure.followers
-        residuals = [abs(x) for x in graph.moved([known.get(v, 0) for v in range(graph.n)])]
-        if any(radii.values()):
-            blur = graph.heard([radii.get(v, 0) for v in range(graph.n)])
-            residuals = [x + y for x, y in zip(residuals, blur, strict=True)]
+        labels, F = self.structure.graph.labels, self.structure.followers
         astray = next((v for v in F if residuals[v]), None)
         if astray is None:
             return 0, 1
-        need(self.u is not None, f"agent {shorten(graph.labels[astray])} is not where its neighbours pull it")
+        need(self.u is not None, f"agent {shorten(labels[astray])} is not where its neighbours pull it")
         return _worst(F, residuals, self.pushed)
 
     @cached_property
@@ -152,7 +148,9 @@ def _components(graph: Digraph, claim: Claim, said: Any) -> None:
             need(same(state, {graph.labels[v]: said[graph.labels[v]] for v in nodes}), "the final state of a component")
 
 
-def _worst(nodes: Sequence[int], residuals: Sequence[int], pushed: Sequence[int]) -> tuple[int, int]:
+def _worst(
+    nodes: Sequence[int], residuals: Sequence[int] | Mapping[int, int], pushed: Sequence[int]
+) -> tuple[int, int]:
     """Return ``max_i |r_i| / (M u)_i`` as numerator and denominator; ``M u > 0`` makes ``M`` an M-matrix."""
     worst, least = 0, 1
     for v in nodes:
@@ -203,13 +201,15 @@ def _left_null_vector(graph: Digraph, group: Sequence[int], intervals: Sequence[
 
 def _weights(final: FinalState, said: Any) -> list[list[Interval]]:
     """Verify the columns ``L_F w = -L_FLk G_k 1``, within the radii; leaders of other components are at 0."""
-    structure, F = final.structure, final.structure.followers
-    said = ordered([structure.graph.labels[v] for v in F], said, "containment_weights")
+    structure, graph, F = final.structure, final.structure.graph, final.structure.followers
+    said = ordered([graph.labels[v] for v in F], said, "containment_weights")
     weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in said.values()]
+    rows = {v: graph.row(v) for v in F}
     for column, (_, group, gauge) in enumerate(structure.balanced):
         (middles,), scale = integers([[row[column][0] for row in weights]])
         known = dict(zip((*F, *group), (*middles, *(g * scale for g in gauge)), strict=True))
-        worst, least = final.error(known, {})
+        spend(sum(map(len, rows.values())), graph.bits, longest(known.values()), "followers")
+        worst, least = final.error({v: sum(x * known.get(j, 0) for j, x in row.items()) for v, row in rows.items()})
         error = Fraction(worst, least * scale)
         within = all(error * x <= row[column][1] for x, row in zip(final.scaled_u, weights, strict=True))
         need(within, "followers are not enclosed")
@@ -272,7 +272,7 @@ def _followers(
     All in integers: states over ``grid``, to which values of leaders are rounded where they do not fit, and ``u``
     over another scale. Returns the largest radius that is proved.
     """
-    structure, F = final.structure, final.structure.followers
+    structure, graph, F = final.structure, final.structure.graph, final.structure.followers
     (mids, scale), (radii, fine) = (numbers.over(F) for numbers in claimed)
     single = [group[0] for k, group, _ in structure.balanced if k not in final.left_null_vectors]
     own, other = moved.over(single)
@@ -288,12 +288,14 @@ def _followers(
             middle = math.floor(value * grid)
             known |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
             wide |= dict.fromkeys(group, math.ceil(r * grid) + (middle != value * grid))
-    worst, least = final.error(known, wide)
+    X, R = ([states.get(v, 0) for v in range(graph.n)] for states in (known, wide))
+    blur = graph.heard(R) if any(R) else R
+    worst, least = final.error([abs(x) + y for x, y in zip(graph.moved(X), blur, strict=True)])
     # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
     share = least * grid
     room = math.floor(spare * (share * fine))
     for v, told, weight in zip(F, radii, final.scaled_u, strict=True):
-        _narrow(structure.graph.labels[v], 0, worst * fine * weight, share * told, room)
+        _narrow(graph.labels[v], 0, worst * fine * weight, share * told, room)
     return Fraction(worst * max(final.scaled_u, default=0), share)
 
 
