@@ -6,7 +6,7 @@ Everything is decided in integers, and no eigenvalue is computed: where entries 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from math import gcd
 from typing import Literal
@@ -40,7 +40,11 @@ def tractable(rows: Matrix, unit: int, line: Fraction = Fraction(1)) -> bool:
 
 
 def nonzero_spectrum_beyond(
-    rows: Matrix, unit: int, line: Fraction, polynomial: Callable[[Matrix], Polynomial] = characteristic
+    rows: Matrix,
+    unit: int,
+    line: Fraction,
+    parts: Iterable[Sequence[int]] | None = None,
+    polynomial: Callable[[Matrix], Polynomial] = characteristic,
 ) -> Location:
     """Decide where the nonzero eigenvalues of ``L = rows / unit`` lie against ``Re = line``.
 
@@ -52,6 +56,9 @@ def nonzero_spectrum_beyond(
         Common denominator of the entries.
     line
         Real part of the line, positive.
+    parts
+        Strong components of the graph of ``rows``, each node in one: ``L`` is block triangular, and its characteristic
+        polynomial the product of those of the blocks. None: one part.
     polynomial
         What forms the characteristic polynomial.
 
@@ -81,7 +88,10 @@ def nonzero_spectrum_beyond(
     """
     if unit <= 0 or line <= 0:
         raise ValueError("the unit or the line is not positive")
-    p, place = polynomial(rows), unit * line
+    p, place = [1], unit * line
+    for nodes in [range(len(rows))] if parts is None else parts:
+        index = {v: i for i, v in enumerate(nodes)}
+        p = product(p, polynomial([{index[j]: x for j, x in rows[v].items() if j in index} for v in nodes]))
     while not p[-1]:  # an eigenvalue 0
         p = p[:-1]
     found = _roots_on_axis(shifted(p, place))

@@ -144,7 +144,8 @@ def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
     need(graph.n <= INPUT_NODES, "too large a graph, or too long numbers")
     rows = block(graph, range(graph.n))
     need(tractable(rows, graph.unit, line), "too large a graph, or too long numbers")
-    return nonzero_spectrum_beyond(rows, graph.unit, line, doc.exact.characteristic)
+    parts = {tuple(structure.strong_component(v)[0]) for v in range(graph.n)}
+    return nonzero_spectrum_beyond(rows, graph.unit, line, parts, doc.exact.characteristic)
 
 
 # ---------------------------------------------------------------------- constants, sliding part, starts

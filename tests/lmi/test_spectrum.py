@@ -141,6 +141,13 @@ def leaders(r: random.Random) -> tuple[int, Edges]:
     return size, {(j, i): weight(r) for i in range(2, size) for j in range(i) if r.random() < 0.5}
 
 
+def parts(size: int, edges: Edges) -> list[list[int]]:
+    """Nodes of the strong components, by networkx."""
+    graph = nx.DiGraph(list(edges))
+    graph.add_nodes_from(range(size))
+    return [sorted(nodes) for nodes in nx.strongly_connected_components(graph)]
+
+
 CLASSES = [digraph, undirected, two_sides, unbalanced_ring, leaders]
 
 
@@ -162,6 +169,7 @@ def test_random_graphs_on_both_sides_of_the_slowest_mode(make: Callable[[random.
         for factor, expected in ((0.9, "beyond"), (1.1, "below")):
             line = Fraction(slowest[0] * factor).limit_denominator(r.choice([10**3, 10**6, 10**15]))
             assert nonzero_spectrum_beyond(rows, unit, line) == expected
+            assert nonzero_spectrum_beyond(rows, unit, line, parts(size, edges)) == expected
             c = r.randint(2, 40)
             more = [{j: c * v for j, v in row.items()} for row in rows]
             assert nonzero_spectrum_beyond(more, c * unit, line) == expected
@@ -202,7 +210,7 @@ def test_lines_through_eigenvalues(bits: tuple[int, ...], monkeypatch: pytest.Mo
             continue
         line = max(Fraction(round(2 * real[0]), 2), Fraction(1, 2))
         found = nonzero_spectrum_beyond(rows, unit, line)
-        assert found == exact(rows, unit, line)
+        assert found == exact(rows, unit, line) == nonzero_spectrum_beyond(rows, unit, line, parts(size, edges))
         seen[found] = seen.get(found, 0) + 1
     assert min(seen[key] for key in ("beyond", "on", "defective", "below")) >= 10, seen
 

@@ -155,7 +155,9 @@ def _bounded(
     rows = [{j: int(x * unit) for j, x in row.items()} for row in graph.exact_rows(range(graph.n_nodes))]
     if not tractable(rows, unit, 1 / k):
         return None, None
-    place = nonzero_spectrum_beyond(rows, unit, 1 / k, arithmetic().characteristic)
+    labels = structure.strong_component
+    parts = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
+    place = nonzero_spectrum_beyond(rows, unit, 1 / k, parts, arithmetic().characteristic)
     return place in ("beyond", "on"), "spectrum"
 
 
