@@ -5,8 +5,8 @@ outside ``unverified``, obligation by obligation as the proof lists them; ``_ver
 specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
 ``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
 
-What makes certificates asks the same kernel, and takes the bounds of the input from ``input_bounds``; graph, structure,
-final state, Lyapunov functions and upper bounds on rates are verified by code that nothing else uses.
+What makes certificates asks the same kernel, and takes the bounds of the input from ``input_formulas``; graph,
+structure, final state, Lyapunov functions and upper bounds on rates are verified by code of the checker's own.
 
     python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]
 """

@@ -12,9 +12,9 @@ from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered, positions
-from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.checker.large_function import Proved, check_dominance
-from ptcc_certify.checker.matrices import Matrix, block, combined, decays, less, need_rows, only, state_form
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrices import Matrix, block, combined, decays, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
 from ptcc_certify.checker.side_vectors import beside
@@ -79,7 +79,7 @@ def _of_paper(doc: Document, paper: Paper, function: Any) -> tuple[Function, tup
     equal = function["class"] == "paper" and all(same(function[key], said[key]) for key in KEYS)
     need(equal, "the first Lyapunov function is not the paper's certificate")
     function = Function("paper", form.rate, exact(said["overshoot"]), form)
-    return function, state_form(doc.exact, paper.structure.graph, form)
+    return function, form.of_state(doc.exact, paper.structure.graph)
 
 
 def _block(doc: Document, structure: Structure, function: Any, shape: str) -> tuple[list[int], Any]:
@@ -121,7 +121,7 @@ def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tu
         need(low > 0, "a weight is not positive")
         form = Form(rate, "E", nodes, weights, None, low)
     need(doc.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
-    F, times = state_form(doc.exact, graph, form)
+    F, times = form.of_state(doc.exact, graph)
     proved = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.kept)
     need(proved, "not proved definite")
     doc.done(f"b = {down(rate)}, class {function['class']}")

@@ -12,11 +12,10 @@ from itertools import chain
 from operator import mul
 
 from lmi.exact.definite import Arithmetic
-from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.numbers import longest, sized
 from lmi.exact.polynomials import row_sum
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.checker.reading import need
 
 Matrix = list[list[int]]
@@ -88,23 +87,6 @@ def decrease(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int) ->
 def decays(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int, kept: Sequence[int]) -> bool:
     """Tell whether ``F A + A'F - b F > 0`` is proved on some coordinates; see :func:`decrease`."""
     return exact.definite(only(decrease(exact, F, A, b, unit)[0], kept))
-
-
-def state_form(exact: Arithmetic, graph: Digraph, form: Form) -> tuple[Matrix, Fraction]:
-    """Return a Lyapunov function as a form of the state, times a scale, and the scale.
-
-    ``L'P L`` of the nodes in the coordinates ``E``; ``G (P - p p'/p'1) G``, ``P = diag(p)``, in ``eps``.
-    """
-    P, scale = integers(form.matrix or [form.diagonal or ()])
-    if form.coordinates == "eps":
-        eta = [g * p for g, p in zip(form.gauge, P[0], strict=True)]
-        bits, total = longest(eta) + len(eta).bit_length(), sum(P[0])
-        sized(len(eta) ** 2, 2 * bits, "deviations")
-        spend(4 * len(eta) ** 2, bits, bits, "deviations")
-        Z = [[total * abs(a) * (i == j) - a * b for j, b in enumerate(eta)] for i, a in enumerate(eta)]
-        return Z, Fraction(total * scale)
-    P = P if form.matrix else diagonal(P[0])
-    return congruence(exact, P, [graph.row(v) for v in form.nodes], graph.n), Fraction(scale * graph.unit**2)
 
 
 def diagonal(values: Sequence[int]) -> Matrix:

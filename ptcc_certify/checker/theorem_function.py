@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from lmi.exact.directed_rounding import down
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
-from ptcc_certify.checker.input_formulas import Form
-from ptcc_certify.checker.matrices import block, congruence, decays, decrease, diagonal, less, need_rows, state_form
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrices import block, congruence, decays, decrease, diagonal, less, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Claim, Structure
@@ -130,7 +130,7 @@ def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
     b = doc.open("deviation-decrease", "paper", ["b"])["b"]
     need(b == rate, "b is not the rate")
     _near_null_vector(paper.structure, one.nodes, one.weights)
-    Z, _ = state_form(doc.exact, graph, paper.form)
+    Z, _ = paper.form.of_state(doc.exact, graph)
     need(decays(doc.exact, Z, block(graph, range(graph.n)), b, graph.unit, paper.structure.kept), "not proved definite")
     doc.done(f"b = {down(b)}")
 
