@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.sparse.linalg import ArpackError, eigsh, splu
 
 from lmi.diagonal_certificate import DiagonalCertificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
-from lmi.matrix_classes import comparison_matrix, m_matrix_witness, square
+from lmi.matrix_classes import block_depths, m_matrix_witness, sparse_square
 from lmi.search_time import checkpoint
 
 #: Up to this many rows a tight rate is the eigenvalue of a dense matrix.
@@ -62,18 +63,11 @@ def h_matrix_diagonal(A: Any) -> np.ndarray:
     >>> h_matrix_diagonal([[2.0, 0.0], [-1.0, 1.0]])
     array([1.        , 0.33333333])
     """
-    A = square(A)
-    if len(A) == 0:
-        raise MatrixError("A has no rows")
-    if (low := np.flatnonzero(np.diag(A) <= 0)).size:
-        i = int(low[0])
-        raise NotAnHMatrix(f"diagonal entry {i} is {A[i, i]:.6g}, not positive")
-    M = comparison_matrix(A)
-    scale = np.diag(A)
+    M = _comparison(sparse_square(A)).toarray()
     # Rows scaled to unit diagonal: the class does not change, and the witness is confirmed at any magnitude.
-    if m_matrix_witness(M / scale[:, None]) is None:
+    if m_matrix_witness(M / np.diag(M)[:, None]) is None:
         raise NotAnHMatrix("no positive u with M(A) u > 0 was confirmed in float64")
-    u, v = np.linalg.solve(M, np.ones(len(A))), np.linalg.solve(M.T, np.ones(len(A)))
+    u, v = (np.linalg.solve(B, np.ones(len(M))) for B in (M, M.T))
     if not ((u > 0).all() and (v > 0).all()):
         raise NotAnHMatrix("the comparison matrix M(A) is too near a singular one for float64")
     omega = v / u
@@ -142,25 +136,20 @@ class _ClosedForm:
     """The witnesses of an M-matrix at several losses of rate, each made once."""
 
     def __init__(self, A: Any, u: Any = None, v: Any = None):
-        self.A = _sparse(A)
+        self.A = sparse_square(A)
         _require_z_matrix(self.A)
         self._right, self._left = _Components(self.A), _Components(self.A.T)
         self._low = max(self._right.smallest(), self._left.smallest())
         self._upper = 2 * float(min(self._right.high.min(), self._left.high.min()))
         self._log_u, self._log_v = _checked(self.A, u, "A u", "u"), _checked(self.A.T, v, "A' v", "v")
-        self._found: dict[float, DiagonalCertificate] = {}
+        self._at = cache(self._certificate)
 
-    def _at(self, loss: float) -> DiagonalCertificate:
-        if loss not in self._found:
-            checkpoint()
-            rate = self._low * (1 - loss)
-            self._found[loss] = _from_witness(
-                self.A,
-                self._right.log_witness(rate) if self._log_u is None else self._log_u,
-                self._left.log_witness(rate) if self._log_v is None else self._log_v,
-                self._upper,
-            )
-        return self._found[loss]
+    def _certificate(self, loss: float) -> DiagonalCertificate:
+        checkpoint()
+        rate = self._low * (1 - loss)
+        log_u = self._right.log_witness(rate) if self._log_u is None else self._log_u
+        log_v = self._left.log_witness(rate) if self._log_v is None else self._log_v
+        return _from_witness(self.A, log_u, log_v, self._upper)
 
     def best(self, max_condition: float | None) -> DiagonalCertificate:
         """Return the certificate of :func:`m_matrix_certificate`."""
@@ -257,7 +246,7 @@ def h_matrix_frontier(A: Any, conditions: Sequence[float | None]) -> Iterator[Di
     >>> wide.rate > narrow.rate, narrow.condition <= 100
     (True, True)
     """
-    A = _sparse(A)
+    A = sparse_square(A)
     try:
         closed = _ClosedForm(_comparison(A))
         for max_condition in conditions:
@@ -311,7 +300,7 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     >>> round(found.rate, 9), found.omega.round(9).tolist()
     (2.0, [0.333333333, 1.0])
     """
-    A = _sparse(A)
+    A = sparse_square(A)
     log_u, log_v = perron_vectors(A)
     log_omega = log_v - log_u
     log_omega -= log_omega.max()
@@ -352,7 +341,7 @@ def perron_vectors(A: Any) -> tuple[np.ndarray, np.ndarray]:
     >>> u.tolist(), round(float(v[1] - v[0]), 9)
     ([0.0, 0.0], 1.098612289)
     """
-    M = _comparison(_sparse(A))
+    M = _comparison(sparse_square(A))
     if connected_components(M, connection="strong")[0] > 1:
         raise NotAnHMatrix("the matrix is reducible")
     rows = np.zeros(M.shape[0])
@@ -380,8 +369,8 @@ class _Components:
     """
 
     def __init__(self, A: sparse.csr_array, singular: bool = False) -> None:
-        count, label = connected_components(A, connection="strong")
-        level, size = _levels(A, label, count), np.bincount(label)
+        label, level = block_depths(sparse.csr_array(A))
+        size = np.bincount(label)
         self.order = np.lexsort((label, size[label] > 1, level[label]))
         label = label[self.order]
         self.start = np.flatnonzero(np.diff(label, prepend=-1))
@@ -506,22 +495,6 @@ class _Components:
             pass
         log_r = self._log_r[rows]
         return log_r + max(0.0, float((log_c - log_r).max()) - math.log(self.low[k] - t))
-
-
-def _levels(A: sparse.csr_array, label: np.ndarray, count: int) -> np.ndarray:
-    """Return the depth of each strong component: 1 + that of the deepest one its rows are coupled to, 0 if none."""
-    entries = sparse.coo_array(A)
-    rows, columns = label[entries.row], label[entries.col]
-    keep = rows != columns
-    graph = sparse.csr_array((np.ones(keep.sum()), (rows[keep], columns[keep])), shape=(count, count))
-    waiting, dependents = np.diff(graph.indptr), graph.tocsc()
-    level, frontier, depth = np.zeros(count, dtype=int), np.flatnonzero(waiting == 0), 0
-    while frontier.size:
-        level[frontier] = depth
-        touched, hits = np.unique(dependents[:, frontier].indices, return_counts=True)
-        waiting[touched] -= hits.astype(waiting.dtype)
-        frontier, depth = touched[waiting[touched] == 0], depth + 1
-    return level
 
 
 def _ratios(A: sparse.csr_array, log_u: np.ndarray, blur: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -665,28 +638,3 @@ def _comparison(A: sparse.csr_array) -> sparse.csr_array:
     entries = sparse.coo_array(A)
     data = np.where(entries.row == entries.col, 1.0, -1.0) * np.abs(entries.data)
     return sparse.csr_array((data, (entries.row, entries.col)), shape=A.shape)
-
-
-def _sparse(A: Any) -> sparse.csr_array:
-    """Return ``A`` as a sparse float64 matrix without stored zeros.
-
-    Raises
-    ------
-    MatrixError
-        ``A`` is not a real, finite, square matrix, or has no rows.
-    """
-    if sparse.issparse(A):
-        if A.dtype.kind not in "biuf":
-            raise MatrixError("A is not a matrix of real numbers")
-        if A.ndim != 2 or A.shape[0] != A.shape[1]:
-            raise MatrixError(f"A has shape {A.shape}, not (n, n)")
-        A = sparse.csr_array(A, dtype=np.float64, copy=True)
-        if not np.isfinite(A.data).all():
-            raise MatrixError("A has an entry that is not finite")
-    else:
-        A = sparse.csr_array(square(A))
-    if A.shape[0] == 0:
-        raise MatrixError("A has no rows")
-    A.sum_duplicates()
-    A.eliminate_zeros()
-    return A
