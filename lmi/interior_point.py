@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -341,8 +342,9 @@ class _Newton:
         self.G = problem.lift(_inverse(point.factor))
         K = problem.schur(point.X, self.G, len(y))
         weights.add_to(K, point.z / self.s)
-        sums = np.append(np.ones(n), np.zeros(len(y) - n))[None, :] if weights.fixed else np.zeros((0, len(y)))
-        self.solve = _solver(K, sums, n - sums @ y)
+        self.solve = _solver(
+            K, np.append(np.full(n, float(weights.fixed)), np.zeros(len(y) - n)), n - float(y[:n].sum())
+        )
 
     def step(self) -> _Point | None:
         """Return the next point; None where precision ends."""
@@ -411,22 +413,27 @@ def _cholesky(S: np.ndarray) -> np.ndarray | None:
     return factor if info == 0 and np.isfinite(np.diag(factor)).all() else None
 
 
-def _solver(K: np.ndarray, sums: np.ndarray, defect: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Return what solves ``K dy + sums' m = rhs``, ``sums dy = defect``, with two steps of iterative refinement.
+def _solver(K: np.ndarray, border: np.ndarray, defect: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return what solves ``K dy + m border = rhs`` with two steps of iterative refinement.
 
-    Rows and columns of ``K`` are scaled to a unit diagonal: the weights of the blocks lie far apart near the end. What
-    it returns is not finite if the system is singular.
+    ``m`` is such that ``border' dy = defect``, or 0 without a border. Rows and columns are scaled to a unit diagonal:
+    the weights of the blocks lie far apart near the end. By Cholesky's factor, or by pivots where rounding has cost
+    ``K`` its definiteness; what it returns is not finite if the system is singular.
     """
-    unit, none = 1 / np.sqrt(np.maximum(np.diag(K), 1e-300)), np.zeros((len(sums), len(sums)))
-    whole = np.block([[unit[:, None] * K * unit, (sums * unit).T], [sums * unit, none]])
-    lu, pivots, _ = lapack.dgetrf(whole)
+    unit = 1 / np.sqrt(np.maximum(np.diag(K), 1e-300))
+    K, border = unit[:, None] * (K * unit), unit * border
+    plain = partial(lapack.dpotrs, _cholesky(K), lower=1)
+    if plain.args[0] is None:
+        plain = partial(lapack.dgetrs, *lapack.dgetrf(K)[:2])
 
     def solve(rhs: np.ndarray) -> np.ndarray:
-        right = np.append(unit * rhs, defect)
-        x = np.zeros(len(right))
+        x, multiplier, answer = np.zeros(len(rhs)), 0.0, plain(border)[0]
         for _ in range(3):
-            x = x + lapack.dgetrs(lu, pivots, right - whole @ x)[0]
-        return unit * x[: len(unit)]
+            x = x + plain(unit * rhs - K @ x - multiplier * border)[0]
+            if border.any():
+                more = float(border @ x - defect) / float(border @ answer)
+                x, multiplier = x - more * answer, multiplier + more
+        return unit * x
 
     return solve
 

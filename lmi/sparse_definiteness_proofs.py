@@ -69,9 +69,6 @@ class DominanceProof:
     v: np.ndarray
     rate: Fraction
 
-    def __bool__(self) -> bool:
-        return True
-
 
 def prove_dominance(A: Any, u: Any, v: Any, *, bits: int = 22) -> DominanceProof | None:
     """Find the largest rate that two positive vectors prove for a matrix that dominates, in integers.
