@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import ArpackError, eigsh, splu
+from scipy.sparse.linalg import ArpackError, eigsh
 
 from lmi.diagonal_certificate import DiagonalCertificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
 from lmi.matrix_classes import block_depths, m_matrix_witness, sparse_square
 from lmi.search_time import checkpoint
+from lmi.sparse_h_matrix import diagonal_factor
 
 #: Up to this many rows a tight rate is the eigenvalue of a dense matrix.
 DENSE_ROWS = 1500
@@ -434,7 +435,7 @@ class _Components:
     def _solve(self, rows: np.ndarray, log_r: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Solve ``(R^-1 A R - t I) z = 1`` on whole blocks."""
         B = _similar(self.blocks[rows][:, rows], log_r)
-        return _factor(B - sparse.diags_array(t)).solve(np.ones(len(rows)))
+        return diagonal_factor(B - sparse.diags_array(t)).solve(np.ones(len(rows)))
 
     def _bounds(self, log_r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         ratio, error = _ratios(self.blocks, log_r)
@@ -484,7 +485,7 @@ class _Components:
         """
         diagonal = self.diagonal[rows] - t
         try:
-            factor = _factor(self.blocks[rows, rows] - sparse.diags_array(np.full(len(log_c), t)))
+            factor = diagonal_factor(self.blocks[rows, rows] - sparse.diags_array(np.full(len(log_c), t)))
             flat = factor.solve(diagonal)
             if (flat > 0).all():
                 log_w = np.maximum(np.log(diagonal) - np.log(flat.max()), log_c)
@@ -573,7 +574,7 @@ def _log_left_vector(M: sparse.csr_array) -> np.ndarray:
     """
     n = M.shape[0]
     if n > ELIMINATION_ROWS:
-        v = np.append(_factor(sparse.csr_array(M.T)[:-1, :-1]).solve(-M[[n - 1]].toarray().ravel()[:-1]), 1.0)
+        v = np.append(diagonal_factor(sparse.csr_array(M.T)[:-1, :-1]).solve(-M[[n - 1]].toarray().ravel()[:-1]), 1.0)
         if not (np.isfinite(v).all() and (v > 0).all()):
             raise NoCertificate("no positive left null vector was found in float64")
         return np.log(v)
@@ -597,12 +598,6 @@ def _similar(A: sparse.csr_array, log_u: np.ndarray) -> sparse.csr_array:
     with np.errstate(over="ignore"):
         size = np.exp(np.log(np.abs(entries.data)) + log_u[entries.col] - log_u[entries.row])
     return sparse.csr_array((np.sign(entries.data) * size, (entries.row, entries.col)), shape=A.shape)
-
-
-def _factor(A: Any) -> Any:
-    """Factor an M-matrix with its diagonal entries as pivots, which keeps solutions of positive systems positive."""
-    options = {"SymmetricMode": True}
-    return splu(sparse.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def _checked(A: sparse.csr_array, u: Any, product: str, name: str) -> np.ndarray | None:

@@ -9,26 +9,22 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
-from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
+from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.exact.numbers import round_to_bits
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks
 from lmi.search_time import checkpoint, seconds_left
-
-if TYPE_CHECKING:
-    import cvxpy as cp
-
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 RESOLVED = 100.0
@@ -154,13 +150,7 @@ def diagonal_lyapunov(
     solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS else "interior-point")
     if solver == "interior-point":
         return _margin_certificate(A, maximise_margin(A / scale, np.ones(n), tolerance=tolerance, least=least).omega)
-
-    def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
-        omega, t = cp.Variable(n), cp.Variable()
-        S = symmetric_product(cp, omega, A / scale)
-        return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= least, omega <= 1]), omega
-
-    omega = positive(solve(problem, tolerance, solver))
+    omega = positive(solve(A / scale, least, tolerance, solver))
     return _margin_certificate(A, np.maximum(omega, least * omega.max()))
 
 
@@ -246,7 +236,7 @@ class _RateSearch:
         for _ in range(steps):
             checkpoint()
             try:
-                proposal = normalised(positive(self.step(frame, best, tolerance)[0])) + frame
+                proposal = np.log(positive(self.step(frame, best, tolerance)[0])) + frame
             except NoCertificate:
                 break
             proposal -= proposal.max()
@@ -581,7 +571,8 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
 
 
 def _margin_certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
-    log_omega = normalised(positive(omega))
+    log_omega = np.log(positive(omega))
+    log_omega -= log_omega.max()
     margin = diagonal_margin(A, np.exp(log_omega))
     if not margin > 0:
         raise NoCertificate(f"the best margin found is {margin:.3g}, which is not positive")
@@ -601,41 +592,33 @@ def largest_entry(A: np.ndarray) -> float:
     return float(np.abs(A).max(initial=0.0)) or 1.0
 
 
-def symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
-    """Return ``Omega A + A' Omega`` as a cvxpy expression that keeps the zeros of ``A``."""
-    from scipy import sparse
-
-    product = cp.diag(omega) @ sparse.csr_array(A)
-    return product + product.T
-
-
-def solve(
-    problem: Callable[[Any], tuple[cp.Problem, cp.Expression]],
-    tolerance: float,
-    solver: str = "clarabel",
-) -> np.ndarray:
-    """Solve with cvxpy and return the value of the expression; the status is not trusted, only its absence."""
+def solve(A: np.ndarray, least: float, tolerance: float, solver: str) -> np.ndarray:
+    """Maximise the margin with cvxpy, and return ``Omega``; the status is not trusted, only its absence."""
     import warnings
 
     import cvxpy as cp
+    from scipy import sparse
 
     checkpoint()
-    built, expression = problem(cp)
+    n = len(A)
+    omega, t = cp.Variable(n), cp.Variable()
+    product = cp.diag(omega) @ sparse.csr_array(A)  # keeps the zeros
+    form = product + product.T - t * np.eye(n)
+    problem = cp.Problem(cp.Maximize(t), [form >> 0, omega >= least, omega <= 1])
     options: dict[str, Any] = {}  # SDPA stops where its own precision ends, whatever it is asked for
     if solver == "clarabel":
         options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
         # The default merge of chordal cliques does not end on some sparse matrices. Small ones need no decomposition.
-        rows = max(c.shape[0] for c in built.constraints if len(c.shape) == 2)
-        options["chordal_decomposition_enable"] = rows > CLARABEL_MARGIN_ROWS
+        options["chordal_decomposition_enable"] = n > CLARABEL_MARGIN_ROWS
         options["chordal_decomposition_merge_method"] = "parent_child"
         options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
-        _run(built, solver, options)
+        _run(problem, solver, options)
     checkpoint()
-    if expression.value is None or not np.isfinite(expression.value).all():
-        raise NoCertificate(f"the solver answered {built.status}")
-    return np.atleast_1d(np.asarray(expression.value, dtype=np.float64))
+    if omega.value is None or not np.isfinite(omega.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    return omega.value
 
 
 def _run(built: Any, solver: str, options: dict[str, Any]) -> None:

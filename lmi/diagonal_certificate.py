@@ -71,20 +71,6 @@ class DiagonalCertificate:
         return self.upper / self.rate - 1 if self.rate > 0 else math.inf
 
 
-def normalised(omega: np.ndarray) -> np.ndarray:
-    """Return ``ln(omega / max(omega))`` of a positive diagonal.
-
-    Raises
-    ------
-    NoCertificate
-        An entry is not positive or not finite.
-    """
-    if not (np.isfinite(omega).all() and (omega > 0).all()):
-        raise NoCertificate("the solver returned no positive diagonal")
-    log = np.log(omega)
-    return log - log.max()
-
-
 def diagonal_margin(A: Any, omega: np.ndarray) -> float:
     """Return ``lmin(Omega A + A' Omega)`` with ``Omega = diag(omega)``.
 
