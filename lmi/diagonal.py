@@ -236,9 +236,10 @@ class _RateSearch:
         for _ in range(steps):
             checkpoint()
             try:
-                proposal = np.log(positive(self.step(frame, best, tolerance)[0])) + frame
+                log_omega = np.log(positive(self.step(frame, best, tolerance)[0]))
             except NoCertificate:
                 break
+            proposal = log_omega - log_omega.max() + frame
             proposal -= proposal.max()
             if self.max_condition is not None:
                 proposal = np.maximum(proposal, -math.log(self.max_condition))
