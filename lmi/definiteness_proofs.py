@@ -235,7 +235,8 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
 
     Scaling rows and columns alike keeps definiteness and keeps entries of very different size short.
     """
-    if _is_plain(S):
+    # An array of numbers that float64 or int64 hold.
+    if isinstance(S, np.ndarray) and S.dtype.kind in "fiub" and S.dtype.itemsize <= 8 and S.dtype != np.uint64:
         if S.ndim != 2 or S.shape[0] != S.shape[1]:
             raise MatrixError("the matrix is not square")
         if S.dtype.kind == "f" and not np.isfinite(S).all():
@@ -251,11 +252,6 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
     power = max(0, -min((place + (x & -x).bit_length() - 1 for row in pairs for x, place in row if x), default=0))
     moved = [[x << p + power if p + power >= 0 else x >> -p - power for x, p in row] for row in pairs]
     return moved, shift, scale << power
-
-
-def _is_plain(S: Any) -> bool:
-    """Tell whether something is an array of numbers that float64 or int64 hold."""
-    return isinstance(S, np.ndarray) and S.dtype.kind in "fiub" and S.dtype.itemsize <= 8 and S.dtype != np.uint64
 
 
 def _array_integers(S: np.ndarray) -> tuple[np.ndarray, list[int], int]:

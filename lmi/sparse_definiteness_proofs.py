@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from lmi.dyadic import dyadic_array
 from lmi.errors import MatrixError
 from lmi.exact import fast
 from lmi.exact.definite import SparseFactor, scaled
 from lmi.exact.elementary_enclosures import rounded
+from lmi.sparse_h_matrix import diagonal_factor
 
 EPS = float(np.finfo(float).eps)
 #: Bits of a rounded factor, one after the other.
@@ -68,9 +68,6 @@ class DominanceProof:
     u: np.ndarray
     v: np.ndarray
     rate: Fraction
-
-    def __bool__(self) -> bool:
-        return True
 
 
 def prove_dominance(A: Any, u: Any, v: Any, *, bits: int = 22) -> DominanceProof | None:
@@ -270,9 +267,8 @@ def prove_sparse_positive_definite(S: Any) -> SparseDefinitenessProof | None:
 def _proposed(unit: sparse.csc_array, shift: float, e: np.ndarray, bits: int) -> SparseDefinitenessProof | None:
     """Return an order and the factor of ``unit - shift I`` in that order, rounded; None if it meets a pivot <= 0."""
     n = unit.shape[0]
-    lowered = sparse.csc_matrix(unit - shift * sparse.eye_array(n))
     try:
-        lu = splu(lowered, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        lu = diagonal_factor(unit - shift * sparse.eye_array(n))
     except RuntimeError:
         return None
     pivots = lu.U.diagonal()
