@@ -189,19 +189,10 @@ class ReachingProblem:
 
     def sigma(self, z: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
-        values, sigma0 = np.zeros((self.z.size, z.size)), self._sign * self._unit
-        if not self._agents.size:
-            return values
+        values = np.zeros((self.z.size, z.size))
         for row, agent in enumerate(self._agents.tolist()):
-            before = np.flatnonzero(z < self.z[agent])
-            near = before[z[before] <= self._end]
-            panel = self._panel(z[near])
-            start = self._edges[panel]
-            spent = self._sums[row, panel] + self._integrals(start, z[near], [row])[0]
-            left = np.maximum(1 - spent, 0) * self._decay(z[near])
-            values[agent, near] = sigma0[agent] * left
-            far = before[z[before] > self._end]
-            values[agent, far] = sigma0[agent] * self._tail(row, z[far])
+            before = z < self.z[agent]
+            values[agent, before] = self._sign[agent] * self._unit[agent] * self._size(row, z[before])
         return values
 
     def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
@@ -213,16 +204,20 @@ class ReachingProblem:
         bounds = np.zeros((self.z.size, z.size))
         for row, agent in enumerate(self._agents.tolist()):
             before = z < certain[agent]
-            near, far = before & (z <= self._end), before & (z > self._end)
-            panel = self._panel(z[near])
-            spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
-            left = np.minimum(np.maximum(1 - spent, 0) + SUM_ERROR, 1)
+            size = self._size(row, z[before], SUM_ERROR)
             if certain[agent] <= self._end:
-                left = np.minimum(left, self._rest(row, z[near], float(certain[agent])))
-            bounds[agent, near] = left * self._decay(z[near])
-            bounds[agent, far] = self._tail(row, z[far], SUM_ERROR)
-            bounds[agent] *= self._unit[agent] * (1 + SUM_ERROR / 2)
+                size = np.minimum(size, self._rest(row, z[before], float(certain[agent])) * self._decay(z[before]))
+            bounds[agent, before] = size * self._unit[agent] * (1 + SUM_ERROR / 2)
         return bounds
+
+    def _size(self, row: int, z: np.ndarray, more: float = 0.0) -> np.ndarray:
+        """Return the size of one sliding variable in its unit, with so much added to the bracket."""
+        near, size = z <= self._end, np.empty(z.size)
+        panel = self._panel(z[near])
+        spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+        size[near] = np.minimum(np.maximum(1 - spent, 0) + more, 1) * self._decay(z[near])
+        size[~near] = self._tail(row, z[~near], more)
+        return size
 
     def _rest(self, row: int, z: np.ndarray, end: float) -> np.ndarray:
         """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision."""
@@ -308,23 +303,18 @@ class ReachingProblem:
 
     def _root(self, row: int) -> float:
         """Return where the bracket of one agent vanishes."""
+        from scipy.optimize import brentq
+
         panel = int(np.searchsorted(self._sums[row, 1:], 1.0))
         if panel == self._steps.shape[1]:
             return self._far_root(row)
-        start, low, high = self._edges[panel], self._edges[panel], self._edges[panel + 1]
+        start, end = self._edges[panel : panel + 2]
         rest = 1 - self._sums[row, panel]
-        z = low + (high - low) * rest / max(self._steps[row, panel], rest)
-        for _ in range(100):
-            excess = float(self._integrals(np.array([start]), np.array([z]), [row])[0, 0]) - rest
-            low, high = (low, z) if excess > 0 else (z, high)
-            slope = float(self._push(np.array([z]), [row])[0, 0] * self._weight(z))
-            better = z - excess / slope if slope > 0 else math.nan
-            if not low <= better <= high:
-                better = (low + high) / 2
-            if abs(better - z) <= 4e-16 * z:
-                return float(better)
-            z = better
-        return float(z)
+
+        def excess(z: float) -> float:
+            return float(self._integrals(self._edges[[panel]], np.array([z]), [row])[0, 0] - rest)
+
+        return float(brentq(excess, start, end, xtol=1e-300, rtol=1e-15)) if excess(end) > 0 else float(end)
 
     def _weight(self, z: np.ndarray | float) -> np.ndarray:
         """Return ``dt/psi``, per unit of ``z``."""
