@@ -20,12 +20,14 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
-from ptcc_certify.simulation.cvodes import Phase, Tolerances
+from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 from ptcc_certify.simulation.instants import Instants, tau_before
-from ptcc_certify.simulation.motions import NominalMotion, SlidingMotion
+from ptcc_certify.simulation.motions import MANY_STEPS, NominalMotion, signal
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
+    import casadi as ca
+
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import ReachingProtocol
 
@@ -55,17 +57,14 @@ def simulate_sliding(
     tolerances : Tolerances
     boundary_layer : float or None
     """
-    slack = rounding_slack(protocol)
-    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), slack)
-    unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
-    solver = _Solver(graph, protocol, disturbance, unit, tolerances)
-    state = np.stack([start - sigma0, sigma0], axis=1) / unit
+    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), rounding_slack(protocol))
+    motion = _SlidingMotion(graph, protocol, disturbance, start, sigma0, tolerances)
+    z = np.full(start.size, np.nan)
     if boundary_layer is None:
-        z, states, residual = solver.filippov(state, instants)
+        z, states, residual = motion.filippov(instants)
     else:
-        z = np.full(start.size, np.nan)
-        states, residual = solver.imitation(state, instants, boundary_layer)
-    y, sigma = states.T * unit
+        states, residual = motion.imitation(instants, boundary_layer)
+    y, sigma = states.T * motion.unit
     with np.errstate(divide="ignore"):
         clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left) + 0.0, np.inf)
     return SlidingTrajectory(
@@ -79,9 +78,9 @@ def simulate_sliding(
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
         deadline_residual=residual,
-        stats=solver.stats,
+        stats=motion.stats,
         sigma=sigma,
-        disturbance=solver.disturbances(instants.t, y + sigma, sigma, boundary_layer),
+        disturbance=motion.disturbances(instants.t, y + sigma, sigma),
         sigma0=sigma0,
         reaching_remaining=instants.reaching_left,
         reaching_z=z,
@@ -92,34 +91,67 @@ def simulate_sliding(
     )
 
 
-class _Solver:
-    """One run; ``stats`` adds up what the integrators did."""
+class _SlidingMotion(Motion):
+    """Agents moved along ``y' = -gain L (y + sigma)`` with their sliding variables, ``y = x - sigma``.
+
+        sigma' = -mu1 s - (reaching gain) sigma + d    until sigma is 0, and 0 from there on
+
+    Attributes
+    ----------
+    state : (N, 2) array
+        ``y`` and ``sigma`` in units of ``unit``, the size of the initial state.
+    reached : (N,) array
+        ``z`` where each sliding variable is 0; before, ``s`` is the sign of its initial value.
+    layer : float or None
+        ``s`` is ``tanh(sigma/layer)`` instead.
+    """
 
     def __init__(
         self,
         graph: SignedDigraph,
         protocol: ReachingProtocol,
         disturbance: Disturbance,
-        unit: float,
+        start: np.ndarray,
+        sigma0: np.ndarray,
         tolerances: Tolerances,
     ):
-        self.graph, self.protocol, self.disturbance = graph, protocol, disturbance
-        self.unit, self.tolerances = unit, tolerances
-        self.stats = {"steps": 0, "rhs": 0}
+        state = np.stack([start - sigma0, sigma0], axis=1)
+        self.unit = float(max(np.abs(start).max(), np.abs(state).max())) or 1.0
+        super().__init__(graph, state / self.unit, 1, tolerances)
+        self._options["max_num_steps"] = MANY_STEPS
+        self.graph, self.protocol, self.tolerances, self.slack = graph, protocol, tolerances, rounding_slack(protocol)
+        self.sigma0, self.disturbance = sigma0, disturbance
+        self.sources, self._signal = (disturbance,), signal(disturbance, graph.n_nodes)
+        self.reached, self.layer = np.full(len(state), np.inf), None
         self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
         self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
         self.mu1, self.mu2 = float(protocol.mu1), float(protocol.mu2)
         reaching_pole = float(protocol.reaching_gain.pole)
         self.reaching = Phase(0.0, self.T_r, self.rho1, self.pole, self.T_s, self.mu2, reaching_pole)
 
+    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
+        """Return ``dy/dz`` and ``dsigma/dz``, with 0 for a sliding variable that is 0."""
+        import casadi as ca
+
+        R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
+        y, sigma = ca.horzsplit(x)
+        s = ca.tanh(sigma * (self.unit / self.layer)) if self.layer else ca.DM(np.sign(self.sigma0))
+        push = R / self.unit * ca.DM(self.reached > ends[0]) * (self.mu1 * s - self._signal(phase, ends, t, s))
+        driven = -push - (phase.mu2 * R + phase.reaching_pole) * sigma
+        return ca.horzcat(-phase.nominal(R) * self._product(y + sigma), driven)
+
+    def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
+        self.state[self.reached <= start, 1] = 0
+        return super()._advance(phase, z, start)
+
     # ------------------------------------------------------------------ the true solution
 
-    def filippov(self, state: np.ndarray, instants: Instants) -> tuple[np.ndarray, np.ndarray, float | None]:
+    def filippov(self, instants: Instants) -> tuple[np.ndarray, np.ndarray, float | None]:
         """Return reaching times ``z``, the (M, N, 2) ``y`` and sliding variables, and the residual at the deadline."""
         z, t, left = instants.z, instants.t, instants.left
-        out = np.zeros((z.size, *state.shape))
-        reads_states = isinstance(self.disturbance, StateDependent) and bool(state[:, 1].any())
-        reached, end, y_end = (self._coupled if reads_states else self._decoupled)(state, z, out)
+        out = np.zeros((z.size, *self.state.shape))
+        reads_states = isinstance(self.disturbance, StateDependent) and bool(self.sigma0.any())
+        reached, end, y_end = (self._coupled if reads_states else self._decoupled)(z, out)
         # Sliding variables that are 0 at T_r only: from ``end`` on they move nobody.
         early = end < self._last_z
         out[(z >= end) & (z < np.inf), :, 0] = y_end
@@ -135,28 +167,25 @@ class _Solver:
     @property
     def _last_z(self) -> float:
         """Beyond this ``z`` what is left of the sliding variables moves nobody by a float's last bit."""
-        gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.graph.in_weight().max())
+        gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.in_weight.max())
         return LAST_Z + max(0.0, math.log(max(gain, 1.0)))
 
-    def _decoupled(self, state: np.ndarray, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    def _decoupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Fill ``out`` until all sliding variables are 0; return the reaching times, the last of them, ``y`` there."""
-        scalar = ReachingProblem(self.protocol, state[:, 1] * self.unit, self.disturbance)
+        scalar = ReachingProblem(self.protocol, self.sigma0, self.disturbance)
         end = min(float(scalar.z.max(initial=0.0)), self._last_z)
-        motion = self._motion(state, scalar.z)
-        early = z < end
-        out[early] = motion.sample(self.reaching, z[early], end, events=scalar.z)
+        self.reached, early = scalar.z, z < end
+        out[early] = self.sample(self.reaching, z[early], end, events=scalar.z)
         # The scalar equations are solved to near machine precision.
         out[:, :, 1] = scalar.sigma(z).T / self.unit
-        return scalar.z, end, motion.state[:, 0]
+        return scalar.z, end, self.state[:, 0]
 
-    def _coupled(self, state: np.ndarray, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    def _coupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
         from scipy.integrate import LSODA
 
-        n, end, now = len(state), self._last_z, 0.0
-        phase, L = self.reaching, self.graph.laplacian()
-        state = state.T.ravel()
-        signs = np.sign(state[n:])
+        n, end, now, phase = len(self.state), self._last_z, 0.0, self.reaching
+        state, signs = self.state.T.ravel(), np.sign(self.sigma0)
         reached = np.where(signs == 0, 0.0, np.inf)
         # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
         sizes = np.abs(state[n:])
@@ -169,7 +198,7 @@ class _Solver:
             d = self._met(t, (y + sigma) * self.unit, sigma * self.unit)
             push = R * (self.mu1 * signs - np.abs(signs) * d) / self.unit
             rate = -push - (phase.mu2 * R + phase.reaching_pole) * np.where(signs != 0, v[n:], 0.0)
-            return np.concatenate([-phase.nominal(R) * (L @ (y + sigma)), rate])
+            return np.concatenate([-phase.nominal(R) * (self.laplacian @ (y + sigma)), rate])
 
         while signs.any() and now < end:
             solver = LSODA(motion, now, state, end, rtol=self.tolerances.rtol, atol=atol)
@@ -199,7 +228,7 @@ class _Solver:
 
     # ------------------------------------------------------------------ the imitation
 
-    def imitation(self, state: np.ndarray, instants: Instants, width: float) -> tuple[np.ndarray, float | None]:
+    def imitation(self, instants: Instants, width: float) -> tuple[np.ndarray, float | None]:
         """Return the (M, N, 2) ``y`` and sliding variables with ``tanh(sigma/width)`` for the sign, and the residual.
 
         Towards each pole the run stops at ``1 - t/T = 1e-13``; its state there stands for what follows.
@@ -207,8 +236,8 @@ class _Solver:
         if isinstance(self.disturbance, StateDependent):
             raise ParameterError("a boundary layer takes no disturbance that reads the states; give one of time")
         t, residual = instants.t, None
-        out = np.empty((t.size, *state.shape))
-        motion = self._motion(state, np.full(len(state), np.inf), width)
+        out = np.empty((t.size, *self.state.shape))
+        self.layer = width
         before, after = instants.reaching_left > 0, instants.left == 0
         settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, mu2=self.mu2)
         past = Phase(self.T, self.T, self.rho1, mu2=self.mu2, past=True)
@@ -220,34 +249,25 @@ class _Solver:
         )
         for phase, here, clock, end in clocks:
             if phase is past and after.any():
-                residual = motion.imbalance(motion.state.sum(axis=1, keepdims=True))
+                residual = self.imbalance(self.state.sum(axis=1, keepdims=True))
             if (t >= phase.start).any():
-                out[here] = motion.sample(phase, np.minimum(clock[here], end), end)
+                out[here] = self.sample(phase, np.minimum(clock[here], end), end)
         return out, residual
-
-    def _motion(self, state: np.ndarray, reached: np.ndarray, layer: float | None = None) -> SlidingMotion:
-        motion = SlidingMotion(
-            self.graph, self.protocol, self.disturbance, state.copy(), self.unit, self.tolerances, reached, layer
-        )
-        motion.stats = self.stats
-        return motion
 
     def _met(self, t: float, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the (N,) disturbances at one instant and state, within the bound."""
         assert isinstance(self.disturbance, StateDependent)
-        slack = rounding_slack(self.protocol)
-        return self.disturbance.at(t, x, sigma, self.protocol.delta, self.graph.labels, slack)
+        return self.disturbance.at(t, x, sigma, self.protocol.delta, self.graph.labels, self.slack)
 
-    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray, layer: float | None) -> np.ndarray:
+    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
         disturbance = self.disturbance
         if isinstance(disturbance, StateDependent):
             return np.stack([self._met(*at) for at in zip(t.tolist(), x.T, sigma.T, strict=True)], axis=1)
-        if isinstance(disturbance, WorstCaseDisturbance) and layer is not None:
-            return float(disturbance.delta) * np.tanh(sigma / layer)
-        agents = np.arange(x.shape[0])
-        up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
-        return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
+        if isinstance(disturbance, WorstCaseDisturbance):
+            return float(disturbance.delta) * (np.tanh(sigma / self.layer) if self.layer else np.sign(sigma))
+        agents = np.arange(len(x))
+        return disturbance.values(t, agents, np.zeros_like(agents))
 
 
 def rounding_slack(protocol: ReachingProtocol) -> float:

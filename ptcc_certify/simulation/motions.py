@@ -1,4 +1,4 @@
-"""What moves the agents: the nominal input with disturbance and measurement noise, and the sliding variables."""
+"""Motions under the nominal input, alone or with a disturbance and measurement noise."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     import casadi as ca
 
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols import ReachingProtocol
     from ptcc_certify.protocols.gain_limits import LimitedGain
 
 # A disturbance may be fast: so many steps between two instants.
-_MAX_STEPS = 500_000
+MANY_STEPS = 500_000
 # From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit.
 _LAST_TAU = 40.0
 # No tolerance is made finer than this on the way to the state at T.
@@ -86,7 +85,7 @@ class NominalMotion(Motion):
         super().__init__(graph, state, state.shape[1], tolerances)
         self._unit = unit
         if forcing is not None:
-            self._options["max_num_steps"] = _MAX_STEPS
+            self._options["max_num_steps"] = MANY_STEPS
             self.sources = forcing.disturbance, forcing.noise
             self._signals = [signal(source, len(state)) for source in self.sources]
 
@@ -174,53 +173,3 @@ class NominalMotion(Motion):
             return {}
         share = math.sqrt(len(self.state))
         return {n: min(self._options[n], max(self._options[n] / share, _FINEST)) for n in ("reltol", "abstol")}
-
-
-class SlidingMotion(Motion):
-    """Agents moved along ``y' = -gain L (y + sigma)`` with their sliding variables, ``y = x - sigma``.
-
-        sigma' = -mu1 s - (reaching gain) sigma + d    until sigma is 0, and 0 from there on
-
-    Parameters
-    ----------
-    state : (N, 2) array
-        ``y`` and ``sigma`` in units of ``unit``.
-    unit : float
-        Size of the initial state.
-    reached : (N,) array
-        ``z`` where each sliding variable is 0; before, ``s`` is the sign of its initial value.
-    layer : float or None
-        ``s`` is ``tanh(sigma/layer)`` instead.
-    """
-
-    def __init__(
-        self,
-        graph: SignedDigraph,
-        protocol: ReachingProtocol,
-        disturbance: Disturbance,
-        state: np.ndarray,
-        unit: float,
-        tolerances: Tolerances,
-        reached: np.ndarray,
-        layer: float | None = None,
-    ):
-        super().__init__(graph, state, 1, tolerances)
-        self._options["max_num_steps"] = _MAX_STEPS
-        self._unit, self._mu1, self._layer = unit, float(protocol.mu1), layer
-        self._sign, self._reached = np.sign(state[:, 1]), reached
-        self.sources, self._signal = (disturbance,), signal(disturbance, graph.n_nodes)
-
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
-        """Return ``dy/dz`` and ``dsigma/dz``, with 0 for a sliding variable that is 0."""
-        import casadi as ca
-
-        R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
-        y, sigma = ca.horzsplit(x)
-        s = ca.tanh(sigma * (self._unit / self._layer)) if self._layer else ca.DM(self._sign)
-        push = R / self._unit * ca.DM(self._reached > ends[0]) * (self._mu1 * s - self._signal(phase, ends, t, s))
-        driven = -push - (phase.mu2 * R + phase.reaching_pole) * sigma
-        return ca.horzcat(-phase.nominal(R) * self._product(y + sigma), driven)
-
-    def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
-        self.state[self._reached <= start, 1] = 0
-        return super()._advance(phase, z, start)
