@@ -16,7 +16,6 @@ from ptcc_certify.simulation.interrupt import interruptible
 
 if TYPE_CHECKING:
     import casadi as ca
-    from scipy import sparse
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols.disturbance import Disturbance
@@ -114,6 +113,8 @@ class Motion:
     sources: tuple[Disturbance, ...] = ()
 
     def __init__(self, graph: SignedDigraph, state: np.ndarray, columns: int, tolerances: Tolerances):
+        import casadi as ca
+
         self.state = state
         self.laplacian = graph.laplacian()
         self.in_weight = graph.in_weight()
@@ -126,11 +127,11 @@ class Motion:
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
         }
-        if graph.n_nodes > DIRECT_UP_TO:
+        if large := graph.n_nodes > DIRECT_UP_TO:
             self._options |= {"newton_scheme": "gmres", "use_preconditioner": False, "max_krylov": _KRYLOV}
-            self._product = _product_without_pattern(self.laplacian, columns)
-        else:
-            self._product = _product(self.laplacian, columns)
+        part, n = self.laplacian.tocsc(), graph.n_nodes
+        laplacian = ca.DM(ca.Sparsity(n, n, part.indptr.tolist(), part.indices.tolist()), part.data)
+        self._product = (_product_without_pattern if large else _product)(laplacian, columns)
 
     def imbalance(self, states: np.ndarray) -> float:
         """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
@@ -197,15 +198,15 @@ class Motion:
         return reached.reshape(*self.state.T.shape, -1).transpose(2, 1, 0)
 
 
-def _product(laplacian: sparse.csr_array, columns: int) -> Any:
+def _product(laplacian: ca.DM, columns: int) -> Any:
     """Return the CasADi function ``X -> L X`` of (N, columns) matrices."""
     import casadi as ca
 
     X = ca.MX.sym("X", laplacian.shape[0], columns)
-    return ca.Function("product", [X], [ca.densify(ca.mtimes(_to_casadi(laplacian), X))])
+    return ca.Function("product", [X], [ca.densify(ca.mtimes(laplacian, X))])
 
 
-def _product_without_pattern(laplacian: sparse.csr_array, columns: int) -> Any:
+def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
     """Return the same function, its dependencies kept from CasADi; it must outlive the integrators that call it.
 
     CasADi prepares the Jacobian of every right-hand side, which takes long (N = 100,000: 9 s) and which GMRES without
@@ -226,8 +227,7 @@ def _product_without_pattern(laplacian: sparse.csr_array, columns: int) -> Any:
         def get_sparsity_in(self, _: int) -> Any:
             return ca.Sparsity.dense(*shape)
 
-        def get_sparsity_out(self, _: int) -> Any:
-            return ca.Sparsity.dense(*shape)
+        get_sparsity_out = get_sparsity_in
 
         def has_jac_sparsity(self, *_: int) -> bool:
             return True
@@ -256,14 +256,3 @@ def _product_without_pattern(laplacian: sparse.csr_array, columns: int) -> Any:
             return ca.Function(name, [X, Y, seeds], [moved], inputs, outputs, options)
 
     return Product()
-
-
-def _to_casadi(matrix: sparse.csr_array) -> Any:
-    import casadi as ca
-
-    columns = matrix.tocsc()
-    columns.sort_indices()
-    n: int = matrix.shape[0]
-    starts: list[int] = columns.indptr.tolist()
-    rows: list[int] = columns.indices.tolist()
-    return ca.DM(ca.Sparsity(n, n, starts, rows), columns.data)

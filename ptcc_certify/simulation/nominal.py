@@ -73,15 +73,18 @@ def simulate_nominal(
     unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
     unit[unit == 0] = 1
     held = residual = None
-    run, clock = NominalMotion(graph, columns / unit, tolerances, forcing, unit), limited.clock(t, left)
+    run = NominalMotion(graph, columns / unit, tolerances, forcing, unit)
     if sampled:
         periods = limited.periods(float(t[-1]))
+        clock = periods.clock(t)
         states, held = _sampled(graph, periods, run.state, t)
         run.stats["steps"] = int(periods.locate(t[-1:])[0][0])
     elif forcing is None and limited.bounded:
+        clock = limited.clock(t, left)
         span = float(clock[-1]) or 1.0
         states = run.sample(Phase(0.0, 1.0, span, past=True), clock / span, float(clock[-1]) / span)
     else:
+        clock = limited.clock(t, left)
         states, residual = run.follow(limited, t, left)
     late = np.flatnonzero(left == 0)
     if residual is None and protocol.prescribed and late.size:
