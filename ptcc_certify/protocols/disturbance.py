@@ -159,13 +159,13 @@ class ExpressionDisturbance(Disturbance):
 
     def __init__(self, text_or_texts: str | Sequence[str]):
         common = isinstance(text_or_texts, str)
-        texts = [text_or_texts] if common else list(text_or_texts)
+        texts: list[Any] = [text_or_texts] if common else list(text_or_texts)
         if not texts or not all(isinstance(text, str) for text in texts):
             raise ParameterError("a disturbance is one text, or one text for each agent")
-        programs = {text: parse(text) for text in dict.fromkeys(map(str, texts))}
-        object.__setattr__(self, "texts", tuple(" ".join(str(text).split()) for text in texts))
+        programs = {" ".join(text.split()): parse(text) for text in dict.fromkeys(texts)}
+        object.__setattr__(self, "texts", tuple(" ".join(text.split()) for text in texts))
         object.__setattr__(self, "common", common)
-        object.__setattr__(self, "_programs", {" ".join(text.split()): program for text, program in programs.items()})
+        object.__setattr__(self, "_programs", programs)
 
     @property
     def text(self) -> str:

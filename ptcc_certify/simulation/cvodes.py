@@ -227,7 +227,8 @@ def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
         def get_sparsity_in(self, _: int) -> Any:
             return ca.Sparsity.dense(*shape)
 
-        get_sparsity_out = get_sparsity_in
+        def get_sparsity_out(self, _: int) -> Any:
+            return ca.Sparsity.dense(*shape)
 
         def has_jac_sparsity(self, *_: int) -> bool:
             return True

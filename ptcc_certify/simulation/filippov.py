@@ -58,12 +58,12 @@ def simulate_sliding(
     boundary_layer : float or None
     """
     bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), rounding_slack(protocol))
-    motion = _SlidingMotion(graph, protocol, disturbance, start, sigma0, tolerances)
+    motion = _SlidingMotion(graph, protocol, disturbance, start, sigma0, tolerances, boundary_layer)
     z = np.full(start.size, np.nan)
     if boundary_layer is None:
         z, states, residual = motion.filippov(instants)
     else:
-        states, residual = motion.imitation(instants, boundary_layer)
+        states, residual = motion.imitation(instants)
     y, sigma = states.T * motion.unit
     with np.errstate(divide="ignore"):
         clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left) + 0.0, np.inf)
@@ -114,6 +114,7 @@ class _SlidingMotion(Motion):
         start: np.ndarray,
         sigma0: np.ndarray,
         tolerances: Tolerances,
+        boundary_layer: float | None,
     ):
         state = np.stack([start - sigma0, sigma0], axis=1)
         self.unit = float(max(np.abs(start).max(), np.abs(state).max())) or 1.0
@@ -122,7 +123,7 @@ class _SlidingMotion(Motion):
         self.graph, self.protocol, self.tolerances, self.slack = graph, protocol, tolerances, rounding_slack(protocol)
         self.sigma0, self.disturbance = sigma0, disturbance
         self.sources, self._signal = (disturbance,), signal(disturbance, graph.n_nodes)
-        self.reached, self.layer = np.full(len(state), np.inf), None
+        self.reached, self.layer = np.full(len(state), np.inf), boundary_layer
         self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
         self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
         self.mu1, self.mu2 = float(protocol.mu1), float(protocol.mu2)
@@ -228,8 +229,8 @@ class _SlidingMotion(Motion):
 
     # ------------------------------------------------------------------ the imitation
 
-    def imitation(self, instants: Instants, width: float) -> tuple[np.ndarray, float | None]:
-        """Return the (M, N, 2) ``y`` and sliding variables with ``tanh(sigma/width)`` for the sign, and the residual.
+    def imitation(self, instants: Instants) -> tuple[np.ndarray, float | None]:
+        """Return the (M, N, 2) ``y`` and sliding variables with ``tanh(sigma/layer)`` for the sign, and the residual.
 
         Towards each pole the run stops at ``1 - t/T = 1e-13``; its state there stands for what follows.
         """
@@ -237,7 +238,6 @@ class _SlidingMotion(Motion):
             raise ParameterError("a boundary layer takes no disturbance that reads the states; give one of time")
         t, residual = instants.t, None
         out = np.empty((t.size, *self.state.shape))
-        self.layer = width
         before, after = instants.reaching_left > 0, instants.left == 0
         settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, mu2=self.mu2)
         past = Phase(self.T, self.T, self.rho1, mu2=self.mu2, past=True)

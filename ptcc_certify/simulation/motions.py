@@ -71,7 +71,7 @@ class NominalMotion(Motion):
     forcing : Forcing or None
         ``d`` and ``n``; None: 0.
     unit : (S,) array or None
-        Size of the initial states, needed with a forcing.
+        Size of the initial states; None: 1.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class NominalMotion(Motion):
         unit: np.ndarray | None = None,
     ):
         super().__init__(graph, state, state.shape[1], tolerances)
-        self._unit = unit
+        self._unit = np.ones(state.shape[1]) if unit is None else unit
         if forcing is not None:
             self._options["max_num_steps"] = MANY_STEPS
             self.sources = forcing.disturbance, forcing.noise
