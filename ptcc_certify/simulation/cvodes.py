@@ -142,11 +142,14 @@ class Motion:
     def sample(
         self, phase: Phase, z: np.ndarray, end: float, begin: float = 0.0, events: Iterable[float] = ()
     ) -> np.ndarray:
-        """Return the (len(z), N, S) states at ``begin <= z <= end`` of a phase; that at the end becomes present."""
+        """Return the (len(z), N, S) states at instants of a phase, those outside ``begin .. end`` as at these two.
+
+        The state at ``begin`` is the present one; that at ``end`` becomes it.
+        """
         jumps = np.concatenate([np.empty(0), *(source.breaks(phase.end) for source in self.sources)])
         inner = np.concatenate([phase.clock(jumps[jumps > phase.start]), list(events)])
         stops = np.unique([begin, *inner[(inner > begin) & (inner < end)], end])
-        states = np.empty((z.size, *self.state.shape))
+        z, states = np.minimum(z, end), np.empty((z.size, *self.state.shape))
         states[z <= begin] = self.state
         for a, b in pairwise(stops.tolist()):
             inside = (z > a) & (z <= b)

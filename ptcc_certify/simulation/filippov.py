@@ -251,7 +251,7 @@ class _SlidingMotion(Motion):
             if phase is past and after.any():
                 residual = self.imbalance(self.state.sum(axis=1, keepdims=True))
             if (t >= phase.start).any():
-                out[here] = self.sample(phase, np.minimum(clock[here], end), end)
+                out[here] = self.sample(phase, clock[here], end)
         return out, residual
 
     def _met(self, t: float, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:

@@ -129,7 +129,7 @@ class NominalMotion(Motion):
                 phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
                 z, end = limited.elapsed(stretch, t, left)[here] / span, 1.0 if stretch.end >= 0 else math.inf
             last = end if beyond else min(float(z[-1]), end)
-            states[here] = self.sample(phase, np.minimum(z, last), last, begin, [_LAST_TAU] if self.sources else [])
+            states[here] = self.sample(phase, z, last, begin, [_LAST_TAU] if self.sources else [])
             if beyond and stretch.level is None and not stretch.end:
                 residual = self._settle(rho1 * T, pole, last)
             begin = 0.0
