@@ -126,7 +126,8 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
     worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
-    guesses = {abs(size): z for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
+    # What is below the range of floats is guessed as 0.
+    guesses = {abs(size): max(z, 1e-305) for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
     known = {Fraction(0): Fraction(0)}
 
