@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.final_state import exact_initial_state
 from ptcc_certify.bounds.input import InitialSet, Limits, initial_set_within
-from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -225,16 +223,7 @@ def sliding_start(
     start = (
         (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else initial_state(structure, sigma0, "sigma0")
     )
-    times = certified_reaching_times(sliding, start)
-    # Whatever the check could not confirm is not claimed.
-    asked = [r.z for r, s in zip(times, start, strict=True) if s and r.z is not None]
-    pole = sliding.mu3 * sliding.kappa
-    known = decay_integrals_below(sliding.T_r, sliding.mu2, pole, asked, REACHING_BITS)
-    push = sliding.mu1 - sliding.delta
-    return start, tuple(
-        r if r.z is None or abs(s) <= push * known.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
-        for r, s in zip(times, start, strict=True)
-    )
+    return start, certified_reaching_times(sliding, start)
 
 
 def _instant(at: Any, protocol: Protocol) -> Fraction:
