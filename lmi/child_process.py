@@ -25,6 +25,9 @@ any_thread: ContextVar[bool] = ContextVar("any_thread", default=False)
 #: PR_SET_PDEATHSIG of Linux.
 _DEATH_SIGNAL = 1
 
+#: Whether this process is such a child.
+forked = False
+
 
 def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
     """Yield what ``work()`` yields, computed in a child process.
@@ -96,6 +99,8 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
 
 def _work(work: Callable[[], Iterable[Any]], here: Connection, there: Connection, parent: int) -> None:
     """Do the work in the child, send what it yields, and leave without cleaning up what belongs to the parent."""
+    global forked
+    forked = True
     try:
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)  # ends with the parent, however that ends
         if os.getppid() != parent:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi import child_process
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
 from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
@@ -24,7 +25,7 @@ from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks
-from lmi.search_time import checkpoint, seconds_left
+from lmi.search_time import checkpoint, seconds_left, uncounted
 
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 RESOLVED = 100.0
@@ -38,13 +39,6 @@ _COARSE, _COARSE_GAIN, _COARSE_STEPS, _FINE_ROWS = 1e-6, 1e-4, 8, 20
 SOLVERS = ("clarabel", "interior-point", "sdpa")
 #: Share of the smallest block rate that is given up when blocks are coupled.
 COUPLING_LOSS = 5e-7
-
-
-def load_solver() -> None:
-    """Import cvxpy with Clarabel, a second's work that otherwise falls into the first search."""
-    import cvxpy
-
-    cvxpy.installed_solvers()
 
 
 def diagonal_lyapunov(
@@ -147,7 +141,8 @@ def diagonal_lyapunov(
     if n == 1 or max_condition == 1:
         return _margin_certificate(A, np.ones(n))
     scale, least = largest_entry(A), 0.0 if max_condition is None else 1 / max_condition
-    solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS else "interior-point")
+    # After a fork Clarabel may wait for ever for threads that the parent has.
+    solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS and not child_process.forked else "interior-point")
     if solver == "interior-point":
         return _margin_certificate(A, maximise_margin(A / scale, np.ones(n), tolerance=tolerance, least=least).omega)
     omega = positive(solve(A / scale, least, tolerance, solver))
@@ -597,9 +592,12 @@ def solve(A: np.ndarray, least: float, tolerance: float, solver: str) -> np.ndar
     """Maximise the margin with cvxpy, and return ``Omega``; the status is not trusted, only its absence."""
     import warnings
 
-    import cvxpy as cp
     from scipy import sparse
 
+    with uncounted():
+        import cvxpy as cp
+
+        cp.installed_solvers()
     checkpoint()
     n = len(A)
     omega, t = cp.Variable(n), cp.Variable()

@@ -11,6 +11,8 @@ from contextvars import ContextVar
 from lmi.errors import OutOfTime
 
 _until: ContextVar[float] = ContextVar("until", default=math.inf)
+#: Seconds that no limit counts.
+_uncounted = 0.0
 
 
 @contextmanager
@@ -42,7 +44,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     ...     print(error)
     the time limit is reached
     """
-    token = _until.set(min(_until.get(), time.monotonic() + seconds))
+    token = _until.set(min(_until.get(), _now() + seconds))
     try:
         yield
     finally:
@@ -77,6 +79,29 @@ def share_of_time(share: float, name: str, cut_off: list[str]) -> Iterator[None]
         cut_off.append(name)
 
 
+@contextmanager
+def uncounted() -> Iterator[None]:
+    """Let the time inside count for no limit: that of loading a library, which is no part of a search.
+
+    Examples
+    --------
+    >>> with time_limit(0.01):
+    ...     with uncounted():
+    ...         time.sleep(0.02)
+    ...     checkpoint()
+    """
+    global _uncounted
+    begin = time.monotonic()
+    try:
+        yield
+    finally:
+        _uncounted += time.monotonic() - begin
+
+
+def _now() -> float:
+    return time.monotonic() - _uncounted
+
+
 def seconds_left() -> float:
     """Return how many seconds are left, infinity without a limit.
 
@@ -85,7 +110,7 @@ def seconds_left() -> float:
     >>> seconds_left()
     inf
     """
-    return _until.get() - time.monotonic()
+    return _until.get() - _now()
 
 
 def checkpoint() -> None:

@@ -18,7 +18,6 @@ import numpy as np
 
 from lmi import search_time as deadline
 from lmi.child_process import apart
-from lmi.diagonal import CLARABEL_MARGIN_ROWS, load_solver
 from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
@@ -63,8 +62,6 @@ STEPS = (
     "final state",
     "independent check",
 )
-#: Below this time limit, in seconds, the solver is loaded before the time begins to run.
-SHORT_LIMIT = 10
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
@@ -178,8 +175,6 @@ ReachingTime(0, 1 before T_r)))
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
         source = as_disturbance(disturbance, graph.n_nodes, sliding.delta, horizon)
         source.check(sliding.delta, graph.labels, horizon, rounding_slack(sliding))
-    if request.time_limit < SHORT_LIMIT and graph.n_nodes <= CLARABEL_MARGIN_ROWS:
-        load_solver()
     with deadline.time_limit(SEARCHING * request.time_limit):
         trajectory = case.simulation(disturbance) if runs else None
         lyapunov, proof, numerical = case.paper()
