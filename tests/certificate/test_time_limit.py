@@ -225,6 +225,16 @@ def test_an_error_that_cannot_be_handed_over_is_told_in_words():
 
 
 @linux
+def test_a_search_apart_ends_though_the_solver_ran_before():
+    """Clarabel waits for ever in a child that is forked after it ran, from about 20 rows on."""
+    A = np.diag(np.arange(1.0, 26)) - 0.01
+    assert lmi.diagonal_lyapunov(A, solver="clarabel").rate > 0
+    with time_limit(30):
+        (found,) = apart(lambda: iter([lmi.diagonal_lyapunov(A).rate]))
+    assert found > 0
+
+
+@linux
 def test_what_came_before_the_limit_is_kept():
     found = []
 
