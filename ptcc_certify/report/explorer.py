@@ -262,7 +262,7 @@ class Explorer:
         moved = [x - s for x, s in zip(start, gone, strict=True)]
         return base.changed(
             protocol=protocol,
-            start=tuple(start),
+            initial_state=tuple(start),
             final_state=final_state(structure, moved, matrix=base.influence),
             trajectory=run,
         )

@@ -157,7 +157,7 @@ def _title(saved: Certificate, kept: str) -> Markup:
 
 def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
     """Return head and rows of the table of initial and final states."""
-    if saved.start is None:
+    if saved.initial_state is None:
         return [], []
     heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     numbers = texts.state_columns(saved, heads, ROWS, enclosed)
@@ -168,7 +168,7 @@ def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
 
 def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
-    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.start is None):
+    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.initial_state is None):
         return []
     instants = [(Fraction(str(f)), f"{f} T") for f in FRACTIONS]
     if not saved.direct:
@@ -177,7 +177,7 @@ def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     left = [float(1 - f) for f, _ in instants]
     bounds = map(saved.envelope.residual, left) if saved.direct else saved.norm_bound(left).tolist()
     columns = [[above(x, 2) for x in bounds]]
-    if saved.start is not None and any(m.deviation is not None for m in saved.envelope.functions):
+    if saved.initial_state is not None and any(m.deviation is not None for m in saved.envelope.functions):
         columns.append([above(float(x), 2) for x in saved.deviation_bound(left).max(axis=0)])
     return list(zip((name for _, name in instants), *columns, strict=True))
 

@@ -62,8 +62,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         yield from _claim_lines(certificate.claims, f" {when}")
         names = [name for name in p.to_dict() if name != "kind"]
         yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
-        if certificate.start is not None:
-            yield "x(0)", _pairs(structure.graph.labels, certificate.start)
+        if certificate.initial_state is not None:
+            yield "x(0)", _pairs(structure.graph.labels, certificate.initial_state)
         for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines):
             yield from part(certificate)
         yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
@@ -166,7 +166,7 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
 
 def _deviation_lines(certificate: Certificate) -> Lines:
     """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
-    if certificate.start is None or not any(V.deviation for V in certificate.functions):
+    if certificate.initial_state is None or not any(V.deviation for V in certificate.functions):
         return
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
     worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
@@ -266,7 +266,7 @@ def _residual_lines(certificate: Certificate) -> Lines:
 
 def _reaching_lines(certificate: Certificate) -> Lines:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
-    if certificate.start is None:
+    if certificate.initial_state is None:
         return
     share = _sliding_share(certificate)
     chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]

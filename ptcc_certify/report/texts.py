@@ -160,7 +160,7 @@ def state_columns(
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    columns = {heads[0]: [rational(x) for x in (saved.start or ())[:rows]]}
+    columns = {heads[0]: [rational(x) for x in (saved.initial_state or ())[:rows]]}
     if not saved.direct:
         columns[heads[1]] = [rational(x) for x in (saved.sigma0 or ())[:rows]]
     if saved.final_state is not None:

@@ -178,12 +178,12 @@ def test_the_input_of_the_sliding_mode() -> None:
 def test_a_certificate_of_something_else_is_refused() -> None:
     cert, structure = certified("fig1a"), certified("fig1a").structure
     run = cert.trajectory
-    assert run is not None and cert.start is not None
+    assert run is not None and cert.initial_state is not None
     other = certified("fig3b")
     with pytest.raises(ValueError, match="another graph than"):
         plot_input(run, structure, other)
     with pytest.raises(ValueError, match="another protocol than"):
-        plot_input(run, structure, certify(cert.graph, PROTOCOL, cert.start, simulation=False))
+        plot_input(run, structure, certify(cert.graph, PROTOCOL, cert.initial_state, simulation=False))
     with pytest.raises(ValueError, match="another start than"):
         plot_input(run, structure, certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
     without = certify(cert.graph, cert.protocol, simulation=False)

@@ -52,7 +52,7 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     """
     if axis not in _DECAY_AXES:
         raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
-    run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
+    run, envelope, start = certificate.trajectory, certificate.envelope, certificate.initial_state
     if run is None or start is None or certificate.comparison is None or not envelope.functions:
         raise ValueError("the certificate holds no simulated run with a proved bound")
     ax, before = axes_of(ax), run.remaining > 0

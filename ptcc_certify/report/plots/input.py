@@ -215,7 +215,7 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     for name in ("graph", "protocol"):
         if getattr(certificate, name) != getattr(trajectory, name):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
-    starts = [("start", certificate.start, trajectory.states[:, :1])]
+    starts = [("start", certificate.initial_state, trajectory.states[:, :1])]
     rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the initial state
     unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     if (slid := trajectory.sliding) is not None:
@@ -228,5 +228,5 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
         if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
-    unproved = unproved or effort is None or effort.initial_set is not None or certificate.start is None
+    unproved = unproved or effort is None or effort.initial_set is not None or certificate.initial_state is None
     return None if unproved else effort
