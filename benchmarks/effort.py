@@ -83,7 +83,7 @@ def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
     seen = motion(graph, cert.protocol, points)  # type: ignore[arg-type]
     alone: Ratios = {kind: [] for kind in KINDS}
     for i in range(STARTS + 1):
-        effort = cert.changed(start=tuple(Fraction(float(x)) for x in points[:, i])).effort
+        effort = cert.changed(initial_state=tuple(Fraction(float(x)) for x in points[:, i])).effort
         assert effort is not None
         one = (seen[0][:, i : i + 1], *(x[i : i + 1] for x in seen[1:]))
         if one[1].max() > 0:

@@ -3,11 +3,11 @@
 With ``k = rho2 kappa`` and ``a = rho1 T`` the gain is ``(a + k e^z)/T`` at ``z = ln(T/(T - t))``, and the stretched
 clock ``s = a (1 - e^-z) + k z``, which knows no ``T``. So a bound of the input over a set of initial states is ``phi(a,
 k)/T`` exactly: smallest peak and shortest deadline are one question, ``T = phi/U``. Of every agent ``|e_v|`` is at most
-``held_v``, and ``B_vi e^(-rate_i s/2)`` for each proved Lyapunov function ``i``. The bounded input up to ``T`` needs
-``rate_i k >= 2``; then the peak is the gain where both meet, at the clock ``sigma_vi = (2/rate_i) ln(B_vi/held_v)``:
+``m_v``, and ``B_vi e^(-rate_i s/2)`` for each proved Lyapunov function ``i``. The bounded input up to ``T`` needs
+``rate_i k >= 2``; then the peak is the gain where both meet, at the clock ``sigma_vi = (2/rate_i) ln(B_vi/m_v)``:
 
-    phi(a, k) = max_v held_v (a + k e^(z_v)),    a (1 - e^(-z_v)) + k z_v = min_i sigma_vi
-    phi(a, k) = max_v B_v (a + k),               where B_v = B_vi < held_v, since then z_v = 0
+    phi(a, k) = max_v m_v (a + k e^(z_v)),    a (1 - e^(-z_v)) + k z_v = min_i sigma_vi
+    phi(a, k) = max_v B_v (a + k),               where B_v = B_vi < m_v, since then z_v = 0
 
 Which function serves an agent best depends on ``k`` only, by ``rate_i k >= 2``.
 
@@ -20,7 +20,7 @@ Which function serves an agent best depends on ``k`` only, by ``rate_i k >= 2``.
   ``2/rate_i`` is tried, and nothing between.
 
 Where a residual is allowed at the deadline, the gain may be constant instead: a cap ``g`` that always acts gives the
-clock ``g T`` and a peak of at most ``g max held``, so ``phi = s max held`` with the least clock ``s`` that proves the
+clock ``g T`` and a peak of at most ``g max m``, so ``phi = s max m`` with the least clock ``s`` that proves the
 residual, ``sqrt(c_v) start_i e^(-rate_i s/2) <= r``.
 
 Two bounds hold for all gains of the protocol, whatever the certificate:
@@ -77,8 +77,8 @@ _HOPELESS = Fraction(1001, 1000)
 _NUDGES = 20
 #: How often gains are sought with the functions that certify finds for those before, until it proves its own.
 _ROUNDS = 4
-_KEPT_BITS = 40
-_NONE_LEFT = "none, every agent is at its final state"
+_PRODUCT_BITS = 40
+_NO_RESIDUAL = "none, every agent is at its final state"
 
 
 class TradeOff(NamedTuple):
@@ -90,7 +90,7 @@ class TradeOff(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Asked:
+class DesignRequest:
     """What is asked of an input.
 
     Attributes
@@ -129,7 +129,7 @@ class Design(Shown):
         certificate do not suffice, and nothing about other gains.
     binding : str
         The limit that binds, and how far off it is.
-    asked : Asked
+    asked : DesignRequest
         The limit, the initial states, deadline and residual.
     deadline : Fraction or None
         ``T``, in units of time; None if none was asked for and none is certified.
@@ -157,14 +157,14 @@ class Design(Shown):
     --------
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
-    >>> found = design(pair, max_input=10, initial_bound=1, deadline=1)
-    >>> found.verdict, bool(found.shortest_possible <= found.shortest_certified <= 1)
+    >>> answer = design(pair, max_input=10, initial_bound=1, deadline=1)
+    >>> answer.verdict, bool(answer.shortest_possible <= answer.shortest_certified <= 1)
     ('met', True)
     """
 
     verdict: str
     binding: str
-    asked: Asked
+    asked: DesignRequest
     deadline: Fraction | None = None
     certificate: Certificate | None = None
     peak: Fraction | None = None
@@ -229,7 +229,7 @@ class Design(Shown):
 
     @cached_property
     def worst(self) -> WorstInitialState | None:
-        """The start from which the input gets largest under these gains (numerical); None without gains."""
+        """The initial state from which the input gets largest under these gains (numerical); None without gains."""
         if self.certificate is None:
             return None
         case = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
@@ -263,12 +263,12 @@ class Design(Shown):
         array([1.5 , 0.75])
         """
         T = np.array([float(parameter("a deadline", t)) for t in deadlines])
-        known = (self.product, math.inf), (self.lower_product, -math.inf)
+        products = (self.product, math.inf), (self.lower_product, -math.inf)
         certified, lower = (
             np.full(T.shape, math.nan)
             if x is None
             else np.nextafter(np.nextafter(nearest_float(x), towards) / T, towards)
-            for x, towards in known
+            for x, towards in products
         )
         return TradeOff(T, certified, lower)
 
@@ -285,31 +285,31 @@ class Design(Shown):
         (count,) array
             In units of time.
         """
-        known = (self.deadline, self.shortest_certified, self.shortest_possible, Fraction(1))
-        middle = nearest_float(next(T for T in known if T))
+        candidates = (self.deadline, self.shortest_certified, self.shortest_possible, Fraction(1))
+        middle = nearest_float(next(T for T in candidates if T))
         return np.geomspace(middle / 5, middle * 5, count)
 
     def lines(self) -> list[str]:
         """Return what the screen shows."""
-        asked = f"{'||u||' if self.asked.input_norm == 2 else 'max |u_k|'} <= {short_exact(self.asked.max_input)}"
+        request = f"{'||u||' if self.asked.input_norm == 2 else 'max |u_k|'} <= {short_exact(self.asked.max_input)}"
         deadline, residual = self.asked.deadline, self.asked.residual
-        asked += ", shortest deadline" if deadline is None else f", deadline {short_exact(deadline)}"
-        asked += "" if residual is None else f", residual {short_exact(residual)}"
-        found = [("asked", asked), ("verdict", self.verdict), ("", self.binding)]
+        request += ", shortest deadline" if deadline is None else f", deadline {short_exact(deadline)}"
+        request += "" if residual is None else f", residual {short_exact(residual)}"
+        rows = [("asked", request), ("verdict", self.verdict), ("", self.binding)]
         if self.protocol is not None:
             gains = (f"{name} = {short_exact(value)}" for name, value in self.protocol.parameters.items())
-            found.append(("gains", ", ".join(gains)))
+            rows.append(("gains", ", ".join(gains)))
         times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
         numbers: tuple[tuple[str, Fraction | None, Callable[[Fraction], str]], ...] = (
             ("", self.gain_cap, lambda x: f"gain capped at {short_exact(x)}, which acts from 0 on"),
             ("peak input", self.peak, lambda x: f"{up(x)} at most"),
-            ("left at the deadline", self.residual, lambda x: f"{up(x)} at most" if x else _NONE_LEFT),
+            ("left at the deadline", self.residual, lambda x: f"{up(x)} at most" if x else _NO_RESIDUAL),
             ("shortest deadline", self.shortest_certified, lambda x: f"{up(x, DIGITS)} certified"),
             ("", self.shortest_possible, lambda x: f"{down(x)} at least, whatever the gains{times}"),
         )
-        found += [(name, text(value)) for name, value, text in numbers if value is not None]
-        width = max(len(name) for name, _ in found)
-        return [f"{name:<{width}}  {text}" for name, text in found]
+        rows += [(name, text(value)) for name, value, text in numbers if value is not None]
+        width = max(len(name) for name, _ in rows)
+        return [f"{name:<{width}}  {text}" for name, text in rows]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
@@ -403,12 +403,12 @@ def design(
     >>> design(trio, max_input=20, initial_bound=3, deadline=1)
     Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18857, 1.18857 times the \
 one asked for)
-    >>> found = design(trio, max_input=20, initial_bound=3, deadline="2.5")
-    >>> found.verdict, bool(found.peak <= 20), found.certificate.verdict
+    >>> answer = design(trio, max_input=20, initial_bound=3, deadline="2.5")
+    >>> answer.verdict, bool(answer.peak <= 20), answer.certificate.verdict
     ('met', True, 'certified')
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> found = design(pair, max_input=20, initial_bound=3, residual="2.9")  # 2 * 3 * gain_cap = 20
-    >>> found.verdict, float(found.limits.gain_cap)
+    >>> answer = design(pair, max_input=20, initial_bound=3, residual="2.9")  # 2 * 3 * gain_cap = 20
+    >>> answer.verdict, float(answer.limits.gain_cap)
     ('met', 3.333333333)
     """
     U = parameter("max_input", max_input)
@@ -420,46 +420,46 @@ one asked for)
     initial_set = (
         initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
     )
-    asked = Asked(U, input_norm, initial_set, T, r)
+    request = DesignRequest(U, input_norm, initial_set, T, r)
     begin: dict[str, Any] = {"x0": initial_set.center} if initial_set.point else {"initial_set": initial_set}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
-    lower, why = _lower_product(base, asked)
-    blank = Design(UNPROVED, "", asked, T, lower_product=lower, lower_by=why)
+    lower, why = _lower_product(base, request)
+    blank = Design(UNPROVED, "", request, T, lower_product=lower, lower_by=why)
     first: list[Fit] = []
-    offered = None
+    candidate = None
     for _ in range(_ROUNDS):
         if (reason := _unusable(base)) is not None:
             break
-        fits = _search(base, asked)
+        fits = _search(base, request)
         first = first or fits
-        if not fits or not asked.met_by(fits[-1]):
+        if not fits or not request.met_by(fits[-1]):
             break
-        offered = offered or fits[-1]
+        candidate = candidate or fits[-1]
         own = fits[-1].certificate
         base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
-        again = _fit_of(base, asked)
-        if asked.met_by(again) and base.verdict == "certified":
-            return _met(replace(blank, verdict=MET, repeatable=True), again)
-    if offered is not None:
-        checked = offered.certificate.checked
-        if checked is None or not checked.accepted:
-            why = "" if checked is None else f" {checked.rejected}: {checked.reason}"
+        again = _fit_of(base, request)
+        if request.met_by(again) and base.verdict == "certified":
+            return _answer_with_gains(replace(blank, verdict=MET, repeatable=True), again)
+    if candidate is not None:
+        report = candidate.certificate.checked
+        if report is None or not report.accepted:
+            why = "" if report is None else f" {report.rejected}: {report.reason}"
             return replace(blank, binding=f"the independent check does not accept{why}")
-        return _met(replace(blank, verdict=MET), offered)
+        return _answer_with_gains(replace(blank, verdict=MET), candidate)
     if reason is None and first and (peak := first[0].peak) is not None:
-        return _missed(replace(blank, peak=peak, product=peak * first[0].deadline))
-    return _missed(replace(blank, binding=reason or "this certificate bounds no input"))
+        return _answer_without_gains(replace(blank, peak=peak, product=peak * first[0].deadline))
+    return _answer_without_gains(replace(blank, binding=reason or "this certificate bounds no input"))
 
 
-def _search(base: Certificate, asked: Asked) -> list[Fit]:
+def _search(base: Certificate, request: DesignRequest) -> list[Fit]:
     """Return gains until the first of which the functions of ``base`` prove what is asked."""
-    tried = []
-    for option in _options(base, asked):
-        tried.append(_fit(base, option, asked))
-        hopeless = asked.deadline and option.product > asked.max_input * asked.deadline * _HOPELESS
-        if asked.met_by(tried[-1]) or hopeless:
+    fits = []
+    for option in _options(base, request):
+        fits.append(_fit(base, option, request))
+        hopeless = request.deadline and option.product > request.max_input * request.deadline * _HOPELESS
+        if request.met_by(fits[-1]) or hopeless:
             break
-    return tried
+    return fits
 
 
 # ---------------------------------------------------------------------- what is known
@@ -497,20 +497,22 @@ def _bounds(base: Certificate, initial_set: InitialSet) -> InputBounds:
     return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, initial_set)
 
 
-def _lower_product(base: Certificate, asked: Asked) -> tuple[Fraction | None, str]:
+def _lower_product(base: Certificate, request: DesignRequest) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
-    known, initial_set, graph = [(Fraction(0), "")], asked.initial_set, base.graph
+    candidates, initial_set, graph = [(Fraction(0), "")], request.initial_set, base.graph
     agents = [shorten(label) for label in graph.labels]
     if base.influence.exact and graph.n_nodes <= INPUT_NODES:
         for agent, row in zip(agents, ways(base.influence), strict=True):
-            way = _largest_below(initial_set, row) - (asked.residual or 0)
-            known.append((way, f"the way of agent {agent} to its final state"))
+            way = _largest_below(initial_set, row) - (request.residual or 0)
+            candidates.append((way, f"the way of agent {agent} to its final state"))
     limit = base.upper_bound
-    if asked.residual is None and limit and _has_inner_points(initial_set):
-        for agent, heard in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
-            known.append((2 / limit * _largest_below(initial_set, heard), f"the input of agent {agent} at the start"))
-    best, why = max(known, key=lambda entry: entry[0])
-    return (rounded(best, _KEPT_BITS) if best > 0 else None), why
+    if request.residual is None and limit and _has_inner_points(initial_set):
+        for agent, weights in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
+            candidates.append(
+                (2 / limit * _largest_below(initial_set, weights), f"the input of agent {agent} at the start")
+            )
+    best, why = max(candidates, key=lambda entry: entry[0])
+    return (rounded(best, _PRODUCT_BITS) if best > 0 else None), why
 
 
 def _largest_below(initial_set: InitialSet, row: Linear) -> Fraction:
@@ -535,23 +537,23 @@ def _has_inner_points(initial_set: InitialSet) -> bool:
 # ---------------------------------------------------------------------- search
 
 
-def _options(base: Certificate, asked: Asked) -> list[Option]:
+def _options(base: Certificate, request: DesignRequest) -> list[Option]:
     """Return gains by increasing ``phi``: the best without a cap, and a cap for each function if a residual is allowed.
 
-    In units of ``k`` and the largest ``held`` everything is free of dimensions.
+    In units of ``k`` and the largest ``m_v`` everything is free of dimensions.
     """
-    bounds, residual = _bounds(base, asked.initial_set), asked.residual
+    bounds, residual = _bounds(base, request.initial_set), request.residual
     functions = usable_functions(bounds)
-    agents: list[int | None] = [None] if asked.input_norm == 2 else [*range(len(bounds.rows))]
-    held = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
-    top = max(held)
+    agents: list[int | None] = [None] if request.input_norm == 2 else [*range(len(bounds.rows))]
+    largest = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
+    top = max(largest)
     if base.constant or top == 0 or not functions:
         return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
     rates = {i: bounds.form(i).rate for i in functions}
     decay = {i: [decaying(bounds, i, v) for v in agents] for i in functions}
-    moving = [j for j, h in enumerate(held) if h and all(decay[i][j] for i in functions)]
-    size = np.array([nearest_float(held[j] / top) for j in moving])
-    over = {i: np.array([log(decay[i][j] / held[j]) for j in moving]) for i in functions}
+    moving = [j for j, h in enumerate(largest) if h and all(decay[i][j] for i in functions)]
+    size = np.array([nearest_float(largest[j] / top) for j in moving])
+    over = {i: np.array([log(decay[i][j] / largest[j]) for j in moving]) for i in functions}
     least = 2 / max(rates.values())
     best = (math.inf, 1.0, least)
     for i in functions:
@@ -560,9 +562,9 @@ def _options(base: Certificate, asked: Asked) -> list[Option]:
         # The clock of the crossing, over k.
         clocks = np.array([over[j] * nearest_float(2 / (rates[j] * k)) for j in may])
         which, every = clocks.argmin(axis=0), np.arange(len(moving))
-        start = clocks[which, every]
+        crossing = clocks[which, every]
         share = size * np.exp(np.minimum(np.array([over[j] for j in may])[which, every], 0))
-        a, peak = least_peak(np.maximum(start, 0), share)
+        a, peak = least_peak(np.maximum(crossing, 0), share)
         if peak * nearest_float(k / least) < best[0] * (1 - 1e-9):
             best = (peak * nearest_float(k / least), a, k)
     product, a, k = best
@@ -574,8 +576,8 @@ def _options(base: Certificate, asked: Asked) -> list[Option]:
             bound = base.functions[i].deviation
             if bound is None:
                 continue
-            left = max(map(log, bound.agents)) / 2 + log(bounds.start(i)) - log(residual)
-            clock = _decimal(Fraction(max(left, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
+            excess = max(map(log, bound.agents)) / 2 + log(bounds.start(i)) - log(residual)
+            clock = _decimal(Fraction(max(excess, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
             options.append(Option(clock, k, clock, clock * top))
     return sorted(options, key=lambda option: option.product)
 
@@ -626,71 +628,71 @@ def peak_factor(a: float, clocks: np.ndarray, sizes: np.ndarray) -> float:
 # ---------------------------------------------------------------------- proof
 
 
-def _fit(base: Certificate, option: Option, asked: Asked) -> Fit:
+def _fit(base: Certificate, option: Option, request: DesignRequest) -> Fit:
     """Return the gains at a deadline, or at the shortest one that is proved, and what is proved of them."""
-    U, deadline = asked.max_input, asked.deadline
+    U, deadline = request.max_input, request.deadline
     T = deadline if deadline is not None else _decimal(option.product / U, up=True) or Fraction(1)
     for nudge in range(_NUDGES + 1):
-        fit = _at(base, option, T, asked)
+        fit = _at(base, option, T, request)
         if deadline is not None or fit.peak is None or fit.peak <= U:
             break
         T = _decimal(T * fit.peak / U * (1 + nudge * Fraction(1, 10**9)), up=True)
     return fit
 
 
-def _at(base: Certificate, option: Option, T: Fraction, asked: Asked) -> Fit:
+def _at(base: Certificate, option: Option, T: Fraction, request: DesignRequest) -> Fit:
     rho1 = _decimal(option.a / T) if option.clock is None else _decimal(option.clock / T, up=True)
     limits = () if option.clock is None else (GainLimits(gain_cap=rho1),)
-    return _fit_of(base.changed(protocol=NominalProtocol(T, rho1, option.k, 1), limits=limits), asked)
+    return _fit_of(base.changed(protocol=NominalProtocol(T, rho1, option.k, 1), limits=limits), request)
 
 
-def _fit_of(cert: Certificate, asked: Asked) -> Fit:
+def _fit_of(cert: Certificate, request: DesignRequest) -> Fit:
     """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
-    T, effort, by_norm = cert.protocol.T, cert.effort, asked.input_norm == 2
+    T, effort, by_norm = cert.protocol.T, cert.effort, request.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
-            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, asked.initial_set).held) else None, Fraction(0))
+            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, request.initial_set).held) else None, Fraction(0))
         return Fit(T, cert, effort.peak.norm if by_norm else effort.peak.largest, Fraction(0))
     cap = cert.limits[0].gain_cap
     entries = effort.residual if effort is not None else ()
     if cap is None or not entries or entries[0].agents is None:
         return Fit(T, cert, None, None)
-    peak = cap * _bounds(cert, asked.initial_set).held_norm if by_norm else entries[0].largest
+    peak = cap * _bounds(cert, request.initial_set).held_norm if by_norm else entries[0].largest
     return Fit(T, cert, peak, max(entries[0].agents))
 
 
-def _met(asked: Design, fit: Fit) -> Design:
+def _answer_with_gains(blank: Design, fit: Fit) -> Design:
     """Return the answer with gains."""
     assert fit.peak is not None
-    cert, effort, limit = fit.certificate, fit.certificate.effort, asked.asked.max_input
+    cert, effort, limit = fit.certificate, fit.certificate.effort, blank.asked.max_input
     if not fit.peak:
         binding = "nothing binds: no agent moves, whatever the gains"
     elif cert.limits:
         binding = f"the capped gain times the largest error at the start, {_percent(fit.peak, limit)}"
     else:
         assert effort is not None and effort.peak is not None
-        agents, by_norm = effort.peak.agents, asked.asked.input_norm == 2
+        agents, by_norm = effort.peak.agents, blank.asked.input_norm == 2
         v = max(range(len(agents)), key=agents.__getitem__)
         how = effort.peak.norm_how if by_norm else effort.peak.how[v]
         whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph.labels[v])}"
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
         binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
-    return replace(asked, binding=binding, product=fit.peak * fit.deadline, **fit._asdict())
+    return replace(blank, binding=binding, product=fit.peak * fit.deadline, **fit._asdict())
 
 
-def _missed(asked: Design) -> Design:
+def _answer_without_gains(answer: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
-    U, T, shortest = asked.asked.max_input, asked.asked.deadline, asked.shortest_possible
+    U, T, shortest = answer.asked.max_input, answer.asked.deadline, answer.shortest_possible
     if T is not None and shortest is not None and shortest > T:
         least, times = map(down, (shortest, shortest / T))
         text = f"no gains meet a deadline below {least}, {times} times the one asked for"
-        return replace(asked, verdict=INFEASIBLE, binding=f"{asked.lower_by}: {text}")
-    if asked.peak is None or asked.product is None:
-        return asked
-    if asked.peak <= U:
-        return replace(asked, binding="the residual is not proved")
-    over = f"the certified peak is {up(asked.peak)}, {up(asked.peak / U)} times max_input"
-    return replace(asked, binding=f"{over}; from T = {up(asked.product / U)} on it is met")
+        return replace(answer, verdict=INFEASIBLE, binding=f"{answer.lower_by}: {text}")
+    if answer.peak is None or answer.product is None:
+        return answer
+    if answer.peak <= U:
+        return replace(answer, binding="the residual is not proved")
+    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times max_input"
+    return replace(answer, binding=f"{over}; from T = {up(answer.product / U)} on it is met")
 
 
 # ---------------------------------------------------------------------- numbers

@@ -230,7 +230,7 @@ OPTIONS = [
     BadInput("kappa without a value", ("certify", "fig1b", "--kappa"), "--kappa"),
     _option("x0 too short", "5 values.* 6 nodes", "--x0", "1,2,3,4,5"),
     _option("x0 too long", "7 values.* 6 nodes", "--x0", "1,2,3,4,5,6,7"),
-    _option("x0 empty", "start", "--x0", ""),
+    _option("x0 empty", "initial state", "--x0", ""),
     _option("x0 of an unknown node", 'node "?zeta', "--x0", "1=1,2=2,3=3,4=4,5=5,zeta=6"),
     _option("x0 of a node twice", "two values", "--x0", "1=1,2=2,3=3,4=4,5=5,5=6"),
     _option("x0 of a node missing", "no value.*6|6 has no value", "--x0", "1=1,2=2,3=3,4=4,5=5"),

@@ -106,32 +106,32 @@ def certify_many(
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
     """
-    asked, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1, LARGEST_SETTING)
+    request, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1, LARGEST_SETTING)
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
-    chosen = chosen_sources(sources, () if path is None else (path, journal_path(path)))
+    selection = chosen_sources(sources, () if path is None else (path, journal_path(path)))
     rows: dict[int, Row] = {}
     with ExitStack() as stack:
         journal = None
         if path is not None:
-            refuse_table(path, chosen, restart or journal_path(path).exists())  # a table that is replaced has one
-            journal = stack.enter_context(closing(Journal(journal_path(path), chosen, asked, restart)))
+            refuse_table(path, selection, restart or journal_path(path).exists())  # a table that is replaced has one
+            journal = stack.enter_context(closing(Journal(journal_path(path), selection, request, restart)))
             if journal.new:  # another batch may have written the table meanwhile, and removed its journal
-                refuse_table(path, chosen, restart)
+                refuse_table(path, selection, restart)
             rows |= journal.current()
         try:
             errors = sum(row["error"] is not None for row in rows.values())
-            progress(len(rows), len(chosen), errors)
-            missing = [number for number in range(len(chosen)) if number not in rows]
-            tasks = (chosen[number].task(number) for number in missing)
+            progress(len(rows), len(selection), errors)
+            missing = [number for number in range(len(selection)) if number not in rows]
+            tasks = (selection[number].task(number) for number in missing)
             where = (max(1, min(workers, len(missing))), scheduler if missing else None)
-            for task, row in stack.enter_context(closing(compute_rows(tasks, asked, *where))):
+            for task, row in stack.enter_context(closing(compute_rows(tasks, request, *where))):
                 rows[task.number] = row
                 if journal is not None:
                     journal.append(task.mark, row)
                 errors += row["error"] is not None
-                progress(len(rows), len(chosen), errors)
+                progress(len(rows), len(selection), errors)
         except BaseException as error:
             error.rows = _in_order(rows)  # type: ignore[attr-defined]
             if path is not None and rows:

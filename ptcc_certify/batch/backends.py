@@ -81,27 +81,27 @@ def _on_cluster(
     one at a time, where nothing else can have died.
     """
     try:
-        with _interrupts_kept_back():  # Python forgets that one was handled which came while an import ran a text
+        with _hold_back_interrupts():  # Python forgets that one was handled which came while an import ran a text
             import distributed  # noqa: F401
     except ImportError:
         raise ParameterError(f"several workers, or a scheduler, need Dask; {INSTALL}, or say --workers 1") from None
     if scheduler is None:
-        workplace, gone = _own_workers(workers), "the worker processes have died; say --workers 1"
+        workplace, loss = _own_workers(workers), "the worker processes have died; say --workers 1"
     else:
         where = shorten(scheduler, 100)
-        workplace, gone = _workers_of(scheduler, where), f"{where}: this scheduler has lost all its workers; start some"
-        gone += f": dask worker {where}, and then the same command"
+        workplace, loss = _workers_of(scheduler, where), f"{where}: this scheduler has lost all its workers; start some"
+        loss += f": dask worker {where}, and then the same command"
     with workplace as client:
         suspects = []
-        for task, row in _computed(client, gone, tasks, settings):
+        for task, row in _compute(client, loss, tasks, settings):
             if row is None:
                 suspects.append(task)
             else:
                 yield task, row
         for task in suspects:
-            tried = (row for _ in range(TRIALS) for _, row in _computed(client, gone, iter([task]), settings))
-            died = failed_row(task.name, "the process that worked on it died, perhaps for lack of memory")
-            yield task, next((row for row in tried if row is not None), died)
+            trials = (row for _ in range(TRIALS) for _, row in _compute(client, loss, iter([task]), settings))
+            failure = failed_row(task.name, "the process that worked on it died, perhaps for lack of memory")
+            yield task, next((row for row in trials if row is not None), failure)
 
 
 @contextmanager
@@ -111,7 +111,7 @@ def _own_workers(workers: int) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     with dask.config.set(_OWN_CLUSTER), ExitStack() as stack:
-        with _interrupts_kept_back():
+        with _hold_back_interrupts():
             try:
                 cluster = LocalCluster(
                     n_workers=workers,
@@ -136,7 +136,7 @@ def _end(cluster: Any) -> None:
 
 
 @contextmanager
-def _interrupts_kept_back() -> Iterator[None]:
+def _hold_back_interrupts() -> Iterator[None]:
     """Keep Ctrl-C back, and from the threads that begin meanwhile for ever, which hand this on to their processes.
 
     A terminal sends it to every process, and those that begin do not know yet what to do about it.
@@ -144,10 +144,10 @@ def _interrupts_kept_back() -> Iterator[None]:
     if os.name != "posix" or threading.current_thread() is not threading.main_thread():
         yield
         return
-    interrupted = []
+    interrupts = []
     before = signal.getsignal(signal.SIGINT)
     if callable(before):  # another thread may get the signal, about which Python does something here
-        signal.signal(signal.SIGINT, lambda *_: interrupted.append(True))
+        signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
     resource_tracker.ensure_running()  # would let the signal through when it starts
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -155,7 +155,7 @@ def _interrupts_kept_back() -> Iterator[None]:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         signal.signal(signal.SIGINT, before)
-        if interrupted:
+        if interrupts:
             raise KeyboardInterrupt
 
 
@@ -187,16 +187,16 @@ def _workers_of(scheduler: str, where: str) -> Iterator[Any]:
         yield client
 
 
-def _computed(client: Any, gone: str, tasks: Iterator[Task], settings: Settings) -> Iterator[tuple[Task, Row | None]]:
+def _compute(client: Any, loss: str, tasks: Iterator[Task], settings: Settings) -> Iterator[tuple[Task, Row | None]]:
     """Compute rows, a few ahead of the workers; None where the process that a graph was sent to has died."""
     from distributed import wait
 
     under_way: dict[Any, Task] = {}
-    asked, alive, threads = -math.inf, time.monotonic(), 0
+    query_time, alive, threads = -math.inf, time.monotonic(), 0
     while True:
         try:
-            if (now := time.monotonic()) > asked + 1:  # workers come and go
-                asked, threads = now, sum(client.nthreads().values())
+            if (now := time.monotonic()) > query_time + 1:  # workers come and go
+                query_time, threads = now, sum(client.nthreads().values())
                 alive = now if threads else alive
             while len(under_way) < AHEAD * max(threads, 1) and (task := next(tasks, None)) is not None:
                 data = pickle.dumps(task.payload)  # a scheduler need not know what is in it
@@ -204,15 +204,15 @@ def _computed(client: Any, gone: str, tasks: Iterator[Task], settings: Settings)
             if not under_way:
                 return
             with client.as_current():
-                done = wait(list(under_way), timeout=1, return_when="FIRST_COMPLETED").done
-            rows = [(under_way[future], _row_from(future, under_way[future].name)) for future in done]
+                ready = wait(list(under_way), timeout=1, return_when="FIRST_COMPLETED").done
+            rows = [(under_way[future], _row_from(future, under_way[future].name)) for future in ready]
         except TimeoutError:
             if now > alive + PATIENCE:
-                raise ParameterError(gone) from None
+                raise ParameterError(loss) from None
             continue
         except (CancelledError, OSError):
             raise ParameterError("the scheduler was lost; start it again, and the same command") from None
-        for future in done:
+        for future in ready:
             del under_way[future]
         yield from rows
 

@@ -90,7 +90,7 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, parquet
 
 
-def refuse_table(path: Path, chosen: Sequence[Source], replace: bool) -> None:
+def refuse_table(path: Path, selection: Sequence[Source], replace: bool) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
     name = shorten(os.fspath(path), 200)
     if path.suffix.lower() not in TABLES:
@@ -103,7 +103,7 @@ def refuse_table(path: Path, chosen: Sequence[Source], replace: bool) -> None:
         raise ParameterError(f"{name}: is a folder; name a file")
     if path.exists() and not path.is_file():
         raise ParameterError(f"{name}: is no regular file; name another file")
-    if any(isinstance(s.origin, str) and os.path.realpath(s.origin) == os.path.realpath(path) for s in chosen):
+    if any(isinstance(s.origin, str) and os.path.realpath(s.origin) == os.path.realpath(path) for s in selection):
         raise ParameterError(f"{name}: is one of the graphs; name another file")
     if path.exists() and not _is_table(path):
         raise ParameterError(f"{name}: is there already, and no table of ptcc batch; name another file")
@@ -139,10 +139,10 @@ class Journal:
     ``new`` tells whether there was none before.
     """
 
-    def __init__(self, path: Path, chosen: Sequence[Source], settings: Settings, restart: bool):
-        self.path, self.name, self._chosen = path, shorten(os.fspath(path), 200), chosen
+    def __init__(self, path: Path, selection: Sequence[Source], settings: Settings, restart: bool):
+        self.path, self.name, self._selection = path, shorten(os.fspath(path), 200), selection
         header = {"schema": SCHEMA, "version": package_version(), **settings.to_dict()}
-        self._file = _opened_alone(path, self.name)
+        self._file = _open_alone(path, self.name)
         self._rows: dict[str, Row] = {}
         try:
             self._read(header, restart)
@@ -165,9 +165,9 @@ class Journal:
         first, *lines = data[:whole].split(b"\n")[:-1]
         before = _entry(first)
         mend = "go on with that, name another -o, or drop the journal with --restart"
-        for key, wanted in header.items():
-            if before.get(key) != wanted:
-                old, new = (shorten(json.dumps(x), 60) for x in (before.get(key), wanted))
+        for key, value in header.items():
+            if before.get(key) != value:
+                old, new = (shorten(json.dumps(x), 60) for x in (before.get(key), value))
                 raise ParameterError(f"{self.name}: was begun with {key} {old}, not {new}; {mend}")
         for number, line in enumerate(lines, start=2):
             entry = _entry(line)
@@ -178,13 +178,13 @@ class Journal:
     def current(self) -> dict[int, Row]:
         """Return the rows of the graphs of the list, by their numbers in it; files must be what they were."""
         files = {mark.rpartition(" ")[0] for mark in self._rows}
-        found = {}
-        for number, source in enumerate(self._chosen):
+        rows = {}
+        for number, source in enumerate(self._selection):
             if source.mark or source.named in files:
                 row = self._rows.get(source.mark or source.task(number).mark)
                 if row is not None:  # under another name, perhaps
-                    found[number] = row | {"graph": printable(source.name)}
-        return found
+                    rows[number] = row | {"graph": printable(source.name)}
+        return rows
 
     def append(self, mark: str, row: Row) -> None:
         """Keep a row of the graph of this mark."""
@@ -235,7 +235,7 @@ def _fits(value: Any, kind: type) -> bool:
     return type(value) is kind and _FITTING[kind](value)
 
 
-def _opened_alone(path: Path, name: str) -> IO[bytes]:
+def _open_alone(path: Path, name: str) -> IO[bytes]:
     """Open a file to be read and continued, and lock it; the lock ends with the process, however that ends."""
     for _ in range(10):
         try:

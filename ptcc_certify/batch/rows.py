@@ -57,7 +57,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from lmi.exact.directed_rounding import float_down, float_up
-from ptcc_certify.batch.settings import Settings, Start
+from ptcc_certify.batch.settings import InitialState, Settings
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
@@ -158,28 +158,28 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
     return certify(
         graph,
         settings.protocol,
-        _start(settings.x0, seed, graph),
+        _read_initial_state(settings.x0, seed, graph),
         method=settings.method,
         simulation=settings.simulation,
         initial_set=settings.initial_bound,
         time_limit=None if settings.time_limit is None else float(settings.time_limit),
         expectations=Expectations(settings.expect, settings.min_rate),
         # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
-        sigma0=_start(settings.sigma0, [seed, 1], graph),
+        sigma0=_read_initial_state(settings.sigma0, [seed, 1], graph),
         disturbance=settings.disturbance_of(graph.n_nodes, seed),
     )
 
 
-def _start(start: Start, seed: Any, graph: SignedDigraph) -> Any:
-    if not isinstance(start, str):
-        return start
-    if start != "random":
-        return [Fraction(0)] * graph.n_nodes if start.strip() == "0" else read_state(start, graph)
+def _read_initial_state(initial_state: InitialState, seed: Any, graph: SignedDigraph) -> Any:
+    if not isinstance(initial_state, str):
+        return initial_state
+    if initial_state != "random":
+        return [Fraction(0)] * graph.n_nodes if initial_state.strip() == "0" else read_state(initial_state, graph)
     return [x for (x,) in random_states(seed, graph.n_nodes)]
 
 
 def _columns(certificate: Certificate) -> Row:
-    structure, effort, seen = certificate.structure, certificate.effort, certificate.comparison
+    structure, effort, comparison = certificate.structure, certificate.effort, certificate.comparison
     rate = certificate.rate
     result, reaching = certificate.final_state, certificate.reaching
     return {
@@ -207,8 +207,8 @@ def _columns(certificate: Certificate) -> Row:
         "largest_final_state": None if result is None else _finite(float(np.abs(result.values).max())),
         "degenerate": None if result is None else bool(result.degenerate),
         "reaching_time": None if reaching is None else max(r.time for r in reaching),
-        "worst_ratio": None if seen is None else _finite(seen.worst_ratio),
-        "bound_kept": None if seen is None else not seen.violated,
+        "worst_ratio": None if comparison is None else _finite(comparison.worst_ratio),
+        "bound_kept": None if comparison is None else not comparison.violated,
         "obligations": len(certificate.obligations),
         "cut_off": one_line("; ".join(certificate.cut_off)) or None,
         "note": one_line("; ".join(certificate.notes)) or None,

@@ -19,8 +19,8 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.parameters import parameter
 
-#: What a start may be given as.
-Start = str | Sequence[Any] | Mapping[Any, Any] | None
+#: What an initial state may be given as.
+InitialState = str | Sequence[Any] | Mapping[Any, Any] | None
 #: Seeds and numbers of workers are at most this.
 LARGEST_SETTING = 2**64 - 1
 #: How to get the packages that several workers, Dask and Parquet need.
@@ -54,9 +54,9 @@ class Settings:
     ----------
     protocol : NominalProtocol or SlidingModeProtocol
     x0 : "random", str, sequence of numbers, mapping, pandas Series or None
-        ``"random"``: a start of its own for every graph, uniform on [-10, 10] to three decimals, a function of ``seed``
-        and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does not fit has
-        an error.
+        ``"random"``: an initial state of its own for every graph, uniform on [-10, 10] to three decimals, a function
+        of ``seed`` and the graph. Otherwise as in :func:`ptcc_certify.certify`, the same for all; a graph that it does
+        not fit has an error.
     seed : int
         Of random initial states and telegraph signals.
     sigma0 : "random", str, sequence of numbers, mapping, pandas Series or None
@@ -92,9 +92,9 @@ class Settings:
     """
 
     protocol: Protocol
-    x0: Start = "random"
+    x0: InitialState = "random"
     seed: int = 0
-    sigma0: Start = None
+    sigma0: InitialState = None
     disturbance: str | None = None
     method: str = "best"
     simulation: bool | None = False
@@ -117,20 +117,20 @@ class Settings:
         sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
         refuse(one_node, self.protocol, self.method, sliding, ())
         self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
-        checked: dict[str, Any] = {
+        values: dict[str, Any] = {
             "seed": whole_number(self.seed, "seed", 0, LARGEST_SETTING),
-            "x0": _start(self.x0, "x0"),
-            "sigma0": _start(self.sigma0, "sigma0"),
+            "x0": _as_initial_state(self.x0, "x0"),
+            "sigma0": _as_initial_state(self.sigma0, "sigma0"),
         }
         for name in ("initial_bound", "min_rate", "time_limit"):
             if getattr(self, name) is not None:
-                checked[name] = parameter(name, getattr(self, name))
+                values[name] = parameter(name, getattr(self, name))
         if self.expect is not None:
             try:
-                checked["expect"] = behaviour_name(self.expect)
+                values["expect"] = behaviour_name(self.expect)
             except ValueError as error:
                 raise ParameterError(f"expect: {error}") from None
-        vars(self).update(checked)
+        vars(self).update(values)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the settings as JSON takes them."""
@@ -149,17 +149,17 @@ class Settings:
         return as_disturbance(text, n, self.protocol.reaching.delta, 2 * float(self.protocol.T), seed)
 
 
-def _start(start: Start, name: str) -> Start:
+def _as_initial_state(initial_state: InitialState, name: str) -> InitialState:
     """Return an initial state as a row takes it; refuse a file, and what is no number."""
-    if (labelled := by_label(start, name)) is not None:
-        start = labelled
-    if isinstance(start, str) and os.path.isfile(start):  # noqa: PTH113 - Path.is_file may raise
-        raise ParameterError(f'{name} = "{shorten(start)}" is a file; for a batch give numbers, or random')
+    if (by_node := by_label(initial_state, name)) is not None:
+        initial_state = by_node
+    if isinstance(initial_state, str) and os.path.isfile(initial_state):  # noqa: PTH113 - Path.is_file may raise
+        raise ParameterError(f'{name} = "{shorten(initial_state)}" is a file; for a batch give numbers, or random')
     try:
-        _plain(start)
+        _plain(initial_state)
     except NumberError as error:
         raise ParameterError(f"{name}: {error}") from None
-    return start
+    return initial_state
 
 
 def _plain(value: Any) -> Any:

@@ -71,28 +71,28 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
         sources = [sources]
     if not isinstance(sources, Iterable):
         raise ParameterError(f"{shorten(repr(sources))} is no graph; give paths, SignedDigraphs or Ensembles")
-    found: dict[Hashable, Source] = {}
-    given = ensembles = 0
+    selection: dict[Hashable, Source] = {}
+    graphs = ensembles = 0
     for source in sources:
         if isinstance(source, SignedDigraph):
-            own_sources = [Source(f"graph#{given}", source, ("graph", given), _mark_of_graph(source))]
-            given += 1
+            own_sources = [Source(f"graph#{graphs}", source, ("graph", graphs), _mark_of_graph(source))]
+            graphs += 1
         elif isinstance(source, Ensemble):
             ensembles += 1
             name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
             own_sources = _functions(name, source, ("ensemble", ensembles))
         elif isinstance(source, str | os.PathLike):
-            own_sources = _named(os.fspath(source), own)
+            own_sources = _expand(os.fspath(source), own)
         else:
             raise ParameterError(f"{shorten(repr(source))} is no graph; give paths, SignedDigraphs or Ensembles")
         for one in own_sources:
-            found.setdefault(one.key, one)
-    if not found:
+            selection.setdefault(one.key, one)
+    if not selection:
         raise ParameterError("there are no graphs; name files or patterns")
-    return list(found.values())
+    return list(selection.values())
 
 
-def _named(text: str, own: Sequence[Path]) -> list[Source]:
+def _expand(text: str, own: Sequence[Path]) -> list[Source]:
     """Return what a text stands for."""
     name, path = shorten(text, 200), Path(text)
     try:
@@ -104,8 +104,8 @@ def _named(text: str, own: Sequence[Path]) -> list[Source]:
             raise FormatError(f"{name}: is no regular file; save the graph as one")
         return _file(text)
     if text in GRAPHS:
-        packaged = str(graph_path(text))
-        return [Source(text, packaged, ("file", os.path.realpath(packaged)))]
+        file = str(graph_path(text))
+        return [Source(text, file, ("file", os.path.realpath(file)))]
     if folder:
         raise ParameterError(f"{name}: is a folder; write a pattern such as {Path(name, '*.csv')}")
     if not has_magic(text):
@@ -133,6 +133,6 @@ def _functions(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
 
 
 def _mark_of_graph(graph: SignedDigraph) -> str:
-    """Tell a graph from others, and from itself with its nodes in another order, which starts obey."""
+    """Tell a graph from others, and from itself with its nodes in another order, which initial states obey."""
     order = hashlib.sha256(json.dumps(graph.labels).encode()).hexdigest()
     return f"graph {graph.sha256} {order}"

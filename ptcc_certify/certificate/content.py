@@ -113,7 +113,7 @@ class Content:
 
     structure: Structure
     protocol: Protocol
-    start: tuple[Fraction, ...] | None
+    initial_state: tuple[Fraction, ...] | None
     sigma0: tuple[Fraction, ...] | None
     reaching: tuple[ReachingTime, ...] | None
     lyapunov: LyapunovFunction | None
@@ -351,9 +351,9 @@ class Content:
     @property
     def longest_way(self) -> float | None:
         """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
-        if self.start is None or self.final_state is None:
+        if self.initial_state is None or self.final_state is None:
             return None
-        return float(np.abs(np.array([float(x) for x in self.start]) - self.final_state.values).max())
+        return float(np.abs(np.array([float(x) for x in self.initial_state]) - self.final_state.values).max())
 
     @cached_property
     def envelope(self) -> Envelope:
@@ -409,9 +409,9 @@ class Content:
         return self.envelope.deviation_bound(remaining, self._known_start())
 
     def _known_start(self) -> tuple[Fraction, ...]:
-        if self.start is None:
+        if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the graph with x0")
-        return self.start
+        return self.initial_state
 
     def best_possible_residual(self, remaining: float) -> float | None:
         """``e^(-spectral rate s / 2)`` where ``1 - t/T`` is ``remaining``: what the slowest mode leaves (numerical).
@@ -438,7 +438,7 @@ class Content:
             self.forms,
             rate=self.rate,
             limit=self.upper_bound,
-            start=self.start,
+            initial_state=self.initial_state,
             initial_set=self.initial_set,
             sigma0=self.sigma0,
             reaching=None if self.reaching is None else [r.z for r in self.reaching],

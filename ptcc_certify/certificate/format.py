@@ -70,7 +70,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
             "upper_bound": text(content.upper_bound),
         },
         "overshoot": _write_overshoot(content),
-        "initial_state": out.state("start", content.start),
+        "initial_state": out.state("start", content.initial_state),
         "sliding_variable": out.state("sigma", content.sigma0),
         "influence": influence,
         "final_state": final,
@@ -101,7 +101,7 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
     return {
         "structure": structure,
         "protocol": protocol,
-        "start": start,
+        "initial_state": start,
         "sigma0": data.state(document["sliding_variable"]),
         "reaching": _read_reaching(document["reaching_time"], protocol),
         "lyapunov": lyapunov,
@@ -267,9 +267,9 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     left_null_vectors, containment_weights = influence_balls(matrix)
     followers = structure.followers.tolist()
     ends: dict[str, Any] | None = None
-    if content.final_state is not None and content.start is not None:
+    if content.final_state is not None and content.initial_state is not None:
         sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
-        first = [(x - s, Fraction(0)) for x, s in zip(content.start, sigma0, strict=True)]
+        first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
         groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
         values = [weighted_sum(null_vector, [first[v] for v in c.nodes]) for c, null_vector in groups]
         final = dict.fromkeys(range(len(labels)), (Fraction(0), Fraction(0)))

@@ -33,7 +33,14 @@ from ptcc_certify.bounds.final_state import (
 from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.content import Observations
-from ptcc_certify.certificate.request import Expectations, Request, initial_state, read_request, refuse, sliding_start
+from ptcc_certify.certificate.request import (
+    Expectations,
+    Request,
+    read_initial_state,
+    read_request,
+    read_sliding_variable,
+    refuse,
+)
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -167,8 +174,8 @@ ReachingTime(0, 1 before T_r)))
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
     request = read_request(structure, protocol, {**asked, "time_limit": time_limit, "expectations": expectations})
-    start = None if x0 is None else initial_state(structure, x0, "x0")
-    manifold, reaching = sliding_start(structure, protocol, sigma0)
+    start = None if x0 is None else read_initial_state(structure, x0, "x0")
+    manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, start, manifold, progress)
     runs = case.simulated(simulation) and start is not None
     if not runs and disturbance is not None and (sliding := protocol.reaching) is not None:
@@ -185,7 +192,7 @@ ReachingTime(0, 1 before T_r)))
     certificate = Certificate(
         structure=structure,
         protocol=protocol,
-        start=start,
+        initial_state=start,
         sigma0=manifold,
         reaching=reaching,
         lyapunov=lyapunov,
@@ -244,7 +251,7 @@ class Case:
     structure: Structure
     protocol: Protocol
     request: Request
-    start: tuple[Fraction, ...] | None
+    initial_state: tuple[Fraction, ...] | None
     sigma0: tuple[Fraction, ...] | None
     progress: Callable[[str], None]
     notes: list[str] = field(default_factory=list)
@@ -267,7 +274,7 @@ class Case:
             more |= {"sigma0": [float(x) for x in self.sigma0], "disturbance": disturbance}
         with share_of_time(SHARES[0], STEPS[0], self.cut_off):
             try:
-                return simulate(graph, self.protocol, [float(x) for x in self.start or ()], **more)
+                return simulate(graph, self.protocol, [float(x) for x in self.initial_state or ()], **more)
             except SimulationError as error:
                 self.notes.append(f"simulation: {error}")
         return None
@@ -304,7 +311,7 @@ class Case:
     def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
-        structure, matrix, start = self.structure, influence(self.structure), self.start
+        structure, matrix, start = self.structure, influence(self.structure), self.initial_state
         sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
         first = None if start is None else [x - s if s else x for x, s in zip(start, sigma0, strict=True)]
         result = None

@@ -200,7 +200,9 @@ def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[
             )
 
 
-def initial_state(structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str) -> tuple[Fraction, ...]:
+def read_initial_state(
+    structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str
+) -> tuple[Fraction, ...]:
     """Return ``X(0)`` or ``sigma(0)`` in rationals, or refuse it."""
     start = tuple(exact_initial_state(structure, values, name))
     for label, value in zip(structure.graph.labels, start, strict=True):
@@ -213,7 +215,7 @@ def initial_state(structure: Structure, values: Sequence[Any] | Mapping[Any, Any
     return start
 
 
-def sliding_start(
+def read_sliding_variable(
     structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
 ) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
     """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
@@ -221,7 +223,9 @@ def sliding_start(
     if sliding is None:
         return None, None
     start = (
-        (Fraction(0),) * len(structure.graph.labels) if sigma0 is None else initial_state(structure, sigma0, "sigma0")
+        (Fraction(0),) * len(structure.graph.labels)
+        if sigma0 is None
+        else read_initial_state(structure, sigma0, "sigma0")
     )
     return start, certified_reaching_times(sliding, start)
 

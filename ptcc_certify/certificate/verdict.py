@@ -334,7 +334,7 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
-    effort, start, way = certificate.effort, certificate.start, certificate.longest_way
+    effort, start, way = certificate.effort, certificate.initial_state, certificate.longest_way
     residual = () if effort is None else effort.residual
     region = None if effort is None else effort.initial_set
     noisy = any(entry.noise is not None for entry in residual)

@@ -26,7 +26,7 @@ _SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "tim
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")
 @shared.number_option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
 @shared.method_option
-@shared.starts_option
+@shared.initial_bound_option
 @click.option("--simulation/--no-simulation", default=False, help="Compare with CVODES runs.")
 @shared.time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
@@ -71,7 +71,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
     protocol, total = shared.protocol_of(options, ()), 0
     where: dict[str, Any] = {"workers": workers or many.default_workers(), "scheduler": scheduler}
     try:
-        with counting() as show, _interrupted_by_term():
+        with counting() as show, _interrupt_on_term():
 
             def progress(*counts: int) -> None:
                 nonlocal total
@@ -83,11 +83,11 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
             where |= {"output": output, "restart": restart, "progress": progress}
             rows = many.certify_many(pattern, protocol, **where, **settings)
     except BaseException as error:
-        found, stopped = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
-        if found or stopped:
-            kept = _kept(found, total, output, restart)
-            click.echo(f"{'ptcc: interrupted' if stopped else 'note: the batch failed'}; {kept}", err=True)
-        if stopped:
+        part, interrupt = getattr(error, "rows", []), isinstance(error, KeyboardInterrupt)
+        if part or interrupt:
+            text = _tell_rows(part, total, output, restart)
+            click.echo(f"{'ptcc: interrupted' if interrupt else 'note: the batch failed'}; {text}", err=True)
+        if interrupt:
             return ExitCode.INTERRUPTED
         raise
     if output is None:
@@ -101,7 +101,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
 
 
 @contextmanager
-def _interrupted_by_term() -> Iterator[None]:
+def _interrupt_on_term() -> Iterator[None]:
     """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():  # which alone handles signals
         yield
@@ -113,7 +113,7 @@ def _interrupted_by_term() -> Iterator[None]:
         signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
 
 
-def _kept(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
+def _tell_rows(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:
     """Tell, after a batch ended before its time, which rows there are and how it goes on; print them without a file."""
     from ptcc_certify.batch import table_bytes
 
@@ -134,14 +134,14 @@ def _exit_code(rows: Sequence[dict[str, Any]]) -> int:
     violated = sum(row["bound_kept"] is False for row in rows)
     refuted = sum(row["asked"] == REFUTED for row in rows)
     undecided = sum(row["verdict"] == "undecided" or row["asked"] == OPEN for row in rows)
-    said = (
+    remarks = (
         (sum(row["cut_off"] is not None for row in rows), "the time limit ended searches, column cut_off"),
         (violated, "violated: the simulated run exceeds the proved bound; please report"),
         (refuted, "refuted: what was asked does not hold"),
         (undecided, "undecided, or what was asked is left open"),
         (len(failed), "" if not failed else f"no certificate, such as {failed[0]['error']}"),
     )
-    for count, text in said:
+    for count, text in remarks:
         if count:
             click.echo(f"note: {count} of {len(rows)} graphs: {text}", err=True)
     return exit_code(bool(violated), bool(refuted), bool(undecided or failed))

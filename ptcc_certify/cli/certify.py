@@ -20,7 +20,7 @@ from ptcc_certify.errors import ParameterError
 )
 @shared.method_option
 @shared.limit_options
-@shared.starts_option
+@shared.initial_bound_option
 @shared.number_option(
     "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
 )
@@ -45,7 +45,7 @@ def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> in
     refuse_output(output, graph)
     protocol = shared.protocol_of(options)
     signed = shared.read(graph, options)
-    start = shared.start_of(options["x0"], options["seed"], signed)
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more = shared.sliding_keywords(protocol, options, signed)
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
@@ -56,16 +56,16 @@ def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> in
     more |= {"initial_set": options["initial_bound"]}
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most)}
     with progress(STEPS) as begin:
-        certificate = run(signed, protocol, start, progress=begin, **more)
+        certificate = run(signed, protocol, x0, progress=begin, **more)
     if output:
         certificate.save(output)
-    found = certificate.assessment
+    assessment = certificate.assessment
     if as_json:
         print_json(certificate.to_dict())
-        if found.exit_code:
-            click.echo(f"verdict    {found.text}", err=True)
+        if assessment.exit_code:
+            click.echo(f"verdict    {assessment.text}", err=True)
     else:
         print_lines(certificate_lines(certificate, graph))
         if output:
             click.echo(f"written    {output}")
-    return found.exit_code
+    return assessment.exit_code

@@ -57,10 +57,10 @@ def _same_graph(
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
     source = click.get_current_context().get_parameter_source
-    asked = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
-    given = {"orientation" if name == "edges" else name: options[name] for name in asked}
-    signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **given)
-    way = "as the options say" if given else "as the certificate says"
+    names = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
+    overrides = {"orientation" if name == "edges" else name: options[name] for name in names}
+    signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **overrides)
+    way = "as the options say" if overrides else "as the certificate says"
     how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
     if signed.sha256 == report.sha256:
         return report, how

@@ -43,46 +43,46 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, **o
         refuse_output(path, graph)
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
-    asked: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}
-    found = run(read(graph, options), input_norm=2 if options["input_norm"] else None, **asked)
-    if output and found.certificate is not None:
-        found.certificate.save(output)
+    request: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}
+    answer = run(read(graph, options), input_norm=2 if options["input_norm"] else None, **request)
+    if output and answer.certificate is not None:
+        answer.certificate.save(output)
     if curve:
-        _save_curve(found, curve)
-    command = _certify_command(found, graph, options)
+        _save_curve(answer, curve)
+    command = _certify_command(answer, graph, options)
     if as_json:
-        print_json(found.to_dict() | {"command": command})
+        print_json(answer.to_dict() | {"command": command})
     else:
-        print_lines(found.lines())
-        if output and found.certificate is not None:
+        print_lines(answer.lines())
+        if output and answer.certificate is not None:
             click.echo(f"written    {output}")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
             click.echo(f"to prove it again{again}:\n{command}")
-        elif found.protocol is not None:
+        elif answer.protocol is not None:
             why = "certify finds other functions for these gains, which prove less"
             click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
-    return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(found.verdict, ExitCode.UNDECIDED)
+    return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 
-def _certify_command(found: Design, graph: str, options: Options) -> str | None:
+def _certify_command(answer: Design, graph: str, options: Options) -> str | None:
     """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
-    if found.certify_options is None:
+    if answer.certify_options is None:
         return None
     flags = [] if options["edges"] is None else ["--edges", options["edges"]]
     flags += [] if options["duplicates"] == "refuse" else ["--duplicates", options["duplicates"]]
     flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
-    flags += found.certify_options
+    flags += answer.certify_options
     words = [*flags, "--", graph] if graph.startswith("-") and graph != "-" else [graph, *flags]
     return shlex.join(["ptcc", "certify", *words])
 
 
-def _save_curve(found: Design, path: str) -> None:
+def _save_curve(answer: Design, path: str) -> None:
     """Write peak input against deadline: CSV, or a figure."""
     from ptcc_certify.graphs.io import write_atomically
 
     if Path(path).suffix.lower() == ".csv":
-        curve = found.trade_off(found.deadlines())
+        curve = answer.trade_off(answer.deadlines())
         rows = zip(*(values.tolist() for values in curve), strict=True)
         lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
         write_atomically(path, "\n".join(lines) + "\n")
@@ -90,4 +90,4 @@ def _save_curve(found: Design, path: str) -> None:
         from ptcc_certify.report.plots.style import save_figure
         from ptcc_certify.report.plots.trade_off import plot_trade_off
 
-        save_figure(plot_trade_off(found).figure, path)
+        save_figure(plot_trade_off(answer).figure, path)

@@ -21,16 +21,16 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     """
     from ptcc_certify.certificate.verdict import worst_code
     from ptcc_certify.examples import select
-    from ptcc_certify.report.example_results import RESULTS_HEAD, certified, result_line, results_csv
+    from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_line, results_csv
 
-    chosen, runs = select(name), []
+    selection, runs = select(name), []
     if output:
         try:
             Path(output).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ParameterError(f"{output}: cannot make this folder ({error.strerror})") from None
     click.echo(RESULTS_HEAD)
-    for run in map(certified, chosen):
+    for run in map(certify_example, selection):
         click.echo(result_line(run))
         runs.append(run)
         if output:

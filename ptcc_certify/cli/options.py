@@ -1,4 +1,4 @@
-"""Options that several commands share, and what becomes of them: graphs, protocols, starts, numbers.
+"""Options that several commands share, and what becomes of them: graphs, protocols, initial states, numbers.
 
 Commands take theirs as keywords; the functions here take what they need from these.
 """
@@ -124,7 +124,7 @@ method_option = click.option(
     default="best",
     help="Lyapunov functions searched beside the paper's.",
 )
-starts_option = number_option(
+initial_bound_option = number_option(
     "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
 )
 memory_option = click.option(
@@ -152,8 +152,8 @@ def graph_file(graph: str) -> Any:
 
     if graph == "-" and sys.stdin is None:
         raise ParameterError("standard input is closed; name a file")
-    packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
-    return graph_path(graph) if packaged else graph
+    is_packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
+    return graph_path(graph) if is_packaged else graph
 
 
 def read(graph: str, options: Options) -> SignedDigraph:
@@ -213,10 +213,10 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
             return [Fraction(0)] * graph.n_nodes
     except NumberError:
         pass
-    return start_of(text or "", [seed, 1], graph, "--sigma0: ")
+    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: ")
 
 
-def start_of(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
+def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
     """Return the initial state that ``--x0`` gives, or draw one."""
     from ptcc_certify.graphs.io import random_states, read_state
 
@@ -228,15 +228,15 @@ def start_of(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list
         raise type(error)(f"{option}{error}") from None
 
 
-def start_columns(options: Options, graph: SignedDigraph) -> Any:
-    """Return the start of agents of ``--dimension`` components, one column for each."""
+def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
+    """Return the initial states of agents of ``--dimension`` components, one column for each."""
     import numpy as np
 
     from ptcc_certify.graphs.io import random_states
 
     x0, seed, n, dimension = options["x0"], options["seed"], graph.n_nodes, options["dimension"]
     if dimension == 1:
-        return start_of(x0, seed, graph)
+        return read_initial_state(x0, seed, graph)
     if x0 == "random":
         return random_states(seed, n, dimension)
     texts = x0.split(",")

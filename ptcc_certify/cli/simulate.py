@@ -47,7 +47,7 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
     if nominal:
         more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
     more |= {name: options[name] for name in ("samples", "boundary_layer")}
-    trajectory = run(signed, protocol, shared.start_columns(options, signed), **more)
+    trajectory = run(signed, protocol, shared.read_initial_states(options, signed), **more)
     if output and suffix in FIGURES:
         from ptcc_certify.graphs.structure import analyse
         from ptcc_certify.report.plots.style import save_figure

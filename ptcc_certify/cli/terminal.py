@@ -67,11 +67,11 @@ def counting() -> Iterator[Callable[[int, int, int], None]]:
 def _bar(*columns: str) -> Iterator[Callable[..., Callable[..., None]]]:
     """Yield what adds a task to a bar and returns what updates it; without a terminal nothing is shown."""
     if not sys.stderr.isatty():
-        yield lambda description, **start: lambda **now: None
+        yield lambda description, **task: lambda **now: None
         return
     from rich import progress as rich
     from rich.console import Console
 
-    shown = (rich.BarColumn(), *(getattr(rich, name)() for name in columns), rich.TextColumn("{task.description}"))
-    with rich.Progress(*shown, console=Console(stderr=True), transient=True) as bar:
-        yield lambda description, **start: partial(bar.update, bar.add_task(description, **start))
+    layout = (rich.BarColumn(), *(getattr(rich, name)() for name in columns), rich.TextColumn("{task.description}"))
+    with rich.Progress(*layout, console=Console(stderr=True), transient=True) as bar:
+        yield lambda description, **task: partial(bar.update, bar.add_task(description, **task))

@@ -114,8 +114,8 @@ def select(name: str) -> list[tuple[Example, str, str]]:
         for example in EXAMPLES.values()
         for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
     ]
-    chosen = [run for run in runs if name in ("all", str(run[0].number), run[1])]
-    if not chosen:
+    selection = [run for run in runs if name in ("all", str(run[0].number), run[1])]
+    if not selection:
         numbers = ", ".join(map(str, EXAMPLES))
         raise ParameterError(f'no example "{name}"; use all, {numbers} or ' + ", ".join(GRAPHS))
-    return chosen
+    return selection

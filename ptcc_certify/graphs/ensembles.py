@@ -372,48 +372,48 @@ class _Drawing:
         keys = np.append(skeleton, self.further(low, high, skeleton, round(degree * n) - skeleton.size))
         return keys % n, keys // n
 
-    def further(self, low: np.ndarray, high: np.ndarray, taken: np.ndarray, wanted: int) -> np.ndarray:
-        """Choose ``wanted`` more edges: node ``t`` may listen to ``low[t] .. high[t] - 1`` but itself."""
+    def further(self, low: np.ndarray, high: np.ndarray, present: np.ndarray, count: int) -> np.ndarray:
+        """Choose ``count`` more edges: node ``t`` may listen to ``low[t] .. high[t] - 1`` but itself."""
         n = self.n
         itself = (low <= np.arange(n)) & (np.arange(n) < high)
         ends = np.cumsum(high - low - itself)
-        wanted = min(wanted, int(ends[-1]) - taken.size)
-        if wanted <= 0:
-            return taken[:0]
-        # As many besides as are taken: whatever is drawn twice, enough remain.
-        drawn = self.rng.choice(int(ends[-1]), wanted + taken.size, replace=False)
-        target = np.searchsorted(ends, drawn, side="right")
-        source = low[target] + drawn - np.append(0, ends)[target]
+        count = min(count, int(ends[-1]) - present.size)
+        if count <= 0:
+            return present[:0]
+        # As many besides as are present: whatever is drawn twice, enough remain.
+        picks = self.rng.choice(int(ends[-1]), count + present.size, replace=False)
+        target = np.searchsorted(ends, picks, side="right")
+        source = low[target] + picks - np.append(0, ends)[target]
         source += itself[target] & (source >= target)
         keys = target * n + source
-        return keys[~np.isin(keys, taken)][:wanted]
+        return keys[~np.isin(keys, present)][:count]
 
     def ears(self, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
-        """Connect nodes strongly: a cycle, which comes first and whose length is told, and ears from it back to it."""
+        """Connect nodes strongly: first a cycle, whose length is returned too, and ears from it back to it."""
         if len(nodes) == 1:
             return [], 0
-        done = length = self.draw(2, len(nodes) + 1)
+        size = length = self.draw(2, len(nodes) + 1)
         edges = _cycle(nodes[:length])
-        while done < len(nodes):
-            new = nodes[done : done + self.draw(1, len(nodes) - done + 1)]
-            begin, end = (nodes[self.draw(0, done)] for _ in range(2))
+        while size < len(nodes):
+            new = nodes[size : size + self.draw(1, len(nodes) - size + 1)]
+            begin, end = (nodes[self.draw(0, size)] for _ in range(2))
             edges += pairwise([begin, *new, end])
-            done += len(new)
+            size += len(new)
         return edges, length
 
     def tree(self, nodes: list[int]) -> tuple[list[tuple[int, int]], int]:
         """Connect nodes by a tree, grown from a cycle of three nodes or more if it is not to be balanced."""
         length = 0 if self.balanced else self.draw(3, len(nodes) + 1)
-        grown = [(nodes[self.draw(0, i)], nodes[i]) for i in range(max(length, 1), len(nodes))]
-        return _cycle(nodes[:length]) + grown, length
+        branches = [(nodes[self.draw(0, i)], nodes[i]) for i in range(max(length, 1), len(nodes))]
+        return _cycle(nodes[:length]) + branches, length
 
     def links(self, blocks: list[_Block]) -> list[tuple[int, int]]:
         """Let the first block of followers listen to every leading block, and each later one to somebody before it."""
         leading = [(block.first, block.last) for block in blocks if block.leads]
         links = []
         for number, block in enumerate(blocks[len(leading) :]):
-            heard = leading if number == 0 else [(block.floor, block.first)]
-            links += [(self.draw(*span), self.draw(block.first, block.last)) for span in heard]
+            spans = leading if number == 0 else [(block.floor, block.first)]
+            links += [(self.draw(*span), self.draw(block.first, block.last)) for span in spans]
         return links
 
     def signs(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -429,14 +429,14 @@ class _Drawing:
     def sizes(self, m: int) -> list[Fraction]:
         (low, high), decades = self.ensemble.weight_range, self.ensemble.weight_decades
         if decades is not None:
-            drawn = (10.0 ** self.rng.uniform(-decades / 2, decades / 2, m)).tolist()
-            return [Fraction(f"{x:.2e}") for x in drawn]
+            samples = (10.0 ** self.rng.uniform(-decades / 2, decades / 2, m)).tolist()
+            return [Fraction(f"{x:.2e}") for x in samples]
         if low == high:
             return [low] * m
         if high - low < 10 * Fraction(10) ** (int(f"{float(high):e}".partition("e")[2]) - 2):
             return [low + (high - low) * Fraction(round(1000 * x), 1000) for x in self.rng.uniform(size=m).tolist()]
-        drawn = self.rng.uniform(float(low), float(high), m).tolist()
-        return [min(max(Fraction(f"{x:.2e}"), low), high) for x in drawn]
+        samples = self.rng.uniform(float(low), float(high), m).tolist()
+        return [min(max(Fraction(f"{x:.2e}"), low), high) for x in samples]
 
 
 def _cycle(nodes: list[int]) -> list[tuple[int, int]]:

@@ -396,16 +396,16 @@ def _weak_components(
     weak: np.ndarray, strong: np.ndarray, closed: tuple[ClosedComponent, ...], flags: np.ndarray
 ) -> tuple[WeakComponent, ...]:
     groups = _groups(weak)
-    held: list[list[int]] = [[] for _ in groups]
+    contents: list[list[int]] = [[] for _ in groups]
     for i, component in enumerate(closed):
-        held[weak[component.nodes[0]]].append(i)
+        contents[weak[component.nodes[0]]].append(i)
     _, first = np.unique(weak, return_index=True)
     whole = _none_of(weak, strong != strong[first[weak]])
     result = []
-    for nodes, closed_in, one, told in zip(groups, held, whole.tolist(), flags.tolist(), strict=True):
+    for nodes, closed_in, one, row in zip(groups, contents, whole.tolist(), flags.tolist(), strict=True):
         connectivity = "strong" if one else "quasi-strong" if len(closed_in) == 1 else "weak"
         balanced = any(closed[i].balanced for i in closed_in)
-        result.append(WeakComponent(tuple(nodes.tolist()), connectivity, tuple(closed_in), balanced, *told))
+        result.append(WeakComponent(tuple(nodes.tolist()), connectivity, tuple(closed_in), balanced, *row))
     return tuple(result)
 
 

@@ -111,7 +111,7 @@ def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate,
     n = saved.graph.n_nodes
     if simulation is False:
         return saved, "it was left out (--no-simulation)"
-    if saved.start is None:
+    if saved.initial_state is None:
         return saved, "the certificate names no initial state"
     if simulation is None and n > REPEATED_NODES:
         return saved, f"above {REPEATED_NODES} agents it is repeated only where that is asked for"

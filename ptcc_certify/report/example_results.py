@@ -29,9 +29,9 @@ class Run(NamedTuple):
     certificate: Certificate
 
 
-def certified(chosen: tuple[Example, str, str]) -> Run:
+def certify_example(entry: tuple[Example, str, str]) -> Run:
     """Certify an example on a graph, as :func:`ptcc_certify.examples.select` returns both, and what is expected."""
-    example, graph, reported = chosen
+    example, graph, reported = entry
     certificate = certify(
         load_graph(graph),
         example.protocol(),
@@ -52,7 +52,7 @@ def results_csv(runs: Sequence[Run]) -> str:
     """
     table = []
     for example, graph, certificate in runs:
-        claim, paper, seen = certificate.claim, certificate.proof.rate, certificate.comparison
+        claim, paper, comparison = certificate.claim, certificate.proof.rate, certificate.comparison
         ends, (last, proved, deadline) = certificate.final_state, _reaching_times(certificate)
         final = [] if ends is None else [f"{k}={x}" for k, x in zip(ends.labels, ends.states, strict=True)]
         row = {
@@ -67,7 +67,7 @@ def results_csv(runs: Sequence[Run]) -> str:
             "T_r": deadline,
             "final_state": "; ".join(final),
             "verdict": certificate.verdict,
-            "simulated_worst_ratio": seen and seen.worst_ratio,
+            "simulated_worst_ratio": comparison and comparison.worst_ratio,
             "simulated_reached": last,
         }
         table.append(row)
@@ -81,16 +81,17 @@ def results_csv(runs: Sequence[Run]) -> str:
 def result_line(run: Run) -> str:
     """Return the row of an example under :data:`RESULTS_HEAD`; what was proved is rounded to the safe side."""
     certificate = run.certificate
-    claim, rate, seen = certificate.claim, certificate.rate, certificate.comparison
+    claim, rate, comparison = certificate.claim, certificate.rate, certificate.comparison
     assert claim is not None
     last, proved, deadline = _reaching_times(certificate)
-    reached = f"{'-':>10}{'-':>11}{'-':>5}"
+    ratio = comparison.worst_ratio if comparison else 0
+    times = f"{'-':>10}{'-':>11}{'-':>5}"
     if last is not None and proved is not None:
-        reached = f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
+        times = f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
     return (
         f"{run.example.number} {run.graph:<7}{claim.theorem:<9}{claim.behaviour:<30}"
         f"{down(rate or Fraction(0)):>9}{down(certificate.optimality_ratio or 0.0, 4):>12}"
-        f"{seen.worst_ratio if seen else 0:>8.3f}{reached}  {_ends(certificate):<14}{certificate.assessment.word}"
+        f"{ratio:>8.3f}{times}  {_ends(certificate):<14}{certificate.assessment.word}"
     )
 
 

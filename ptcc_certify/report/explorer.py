@@ -61,7 +61,7 @@ _OWN = {"nominal": ("T", *_GAIN), "sliding-mode": tuple(name for name in _BEGIN 
 #: Lines of the certificate's screen that are shown, by their heads; a line without one belongs to the line before.
 _SHOWN = ("claim", "x(T)", "sliding", "disturbed", "rate", "error", "proof", "input", "INPUT", "simulated", "note")
 _SAMPLES, _DPI = 81, 120
-#: Share of the error at the start down to which the decay is drawn: below it the integrator resolves little.
+#: Share of the initial error down to which the decay is drawn: below it the integrator resolves little.
 _LEAST = 1e-8
 #: Changes of sign of each telegraph signal until the deadline, in the mean.
 _SWITCHES = 5
@@ -167,7 +167,7 @@ class View:
         """Claim, rate, run and verdict, or the refusal. The independent check is made when this is asked for."""
         if self.certificate is None:
             return self.refusal
-        return "\n".join(_shown(certificate_lines(self.certificate, self.settings.graph)))
+        return "\n".join(_select_lines(certificate_lines(self.certificate, self.settings.graph)))
 
     @property
     def unchecked(self) -> str:
@@ -250,20 +250,20 @@ class Explorer:
         if not protocol.prescribed:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         structure, n = base.structure, base.graph.n_nodes
-        drawn = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
-        start = exact_initial_state(structure, drawn[0])
+        draws = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
+        x0 = exact_initial_state(structure, draws[0])
         more: dict[str, Any] = {}
         if (sliding := protocol.reaching) is not None:
-            sigma0 = exact_initial_state(structure, drawn[1] if settings.reaching else [0] * n)
+            sigma0 = exact_initial_state(structure, draws[1] if settings.reaching else [0] * n)
             base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(sliding, sigma0))
             more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, sliding, n)}
-        run = simulate(base.graph, protocol, [float(x) for x in start], samples=_SAMPLES, **more)
-        gone = base.sigma0 or (Fraction(0),) * n
-        moved = [x - s for x, s in zip(start, gone, strict=True)]
+        run = simulate(base.graph, protocol, [float(x) for x in x0], samples=_SAMPLES, **more)
+        offset = base.sigma0 or (Fraction(0),) * n
+        shifted = [x - s for x, s in zip(x0, offset, strict=True)]
         return base.changed(
             protocol=protocol,
-            start=tuple(start),
-            final_state=final_state(structure, moved, matrix=base.influence),
+            initial_state=tuple(x0),
+            final_state=final_state(structure, shifted, matrix=base.influence),
             trajectory=run,
         )
 
@@ -295,14 +295,14 @@ class Explorer:
         if (graph, method) not in self._proved:
             base = self._proved[graph, "paper"]
             unit = float(base.upper_bound or 1)
-            found = search_functions(ErrorSystem(base.structure), method, [_CLOCK / unit])
-            notes = (*base.notes, *found.notes)
-            self._proved[graph, method] = base.changed(search=found, method=method, notes=notes)
+            search = search_functions(ErrorSystem(base.structure), method, [_CLOCK / unit])
+            notes = (*base.notes, *search.notes)
+            self._proved[graph, method] = base.changed(search=search, method=method, notes=notes)
         return self._proved[graph, method]
 
 
 def explore(graph: SignedDigraph | None = None, settings: Settings | None = None) -> VBox | View:
-    """Show controls for graph, protocol, disturbance, start and class of bounds; bound and run follow them.
+    """Show controls for graph, protocol, disturbance, initial state and class of bounds; bound and run follow them.
 
     Certificates of graphs of up to 24 nodes are checked at every change; larger ones when the button is pressed, and
     until then nothing is called certified. Without ipywidgets, or outside a notebook, a line says how to get the
@@ -371,7 +371,7 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
     image, text = widgets.Image(format="png"), widgets.HTML()
     button, box = widgets.Button(description="check"), widgets.HBox(layout={"flex_flow": "row wrap"})
 
-    def wanted() -> Settings:
+    def read_settings() -> Settings:
         return Settings(**{name: control.value for name, control in panel.items()})
 
     def tell(words: str) -> None:
@@ -383,17 +383,17 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
 
     def update(_: object = None) -> None:
         tell("verdict    none: not computed yet")  # nothing of the settings before may stay
-        settings = wanted()
+        settings = read_settings()
         names = ("graph", "kind", "method", "seed", *_OWN[settings.kind])
         names += ("reaching", "disturbance") if settings.kind == "sliding-mode" else ()
-        shown = tuple(panel[name] for name in names)
-        if box.children != shown:
-            box.children = shown
+        children = tuple(panel[name] for name in names)
+        if box.children != children:
+            box.children = children
         cheap = explorer.graphs[settings.graph].n_nodes <= CHECKED_NODES
         button.layout.display = "none" if cheap else None
         if not explorer.knows(settings):  # the paper's function is there at once
-            searched = f"\nbounds     the paper's; the class {settings.method} is being searched"
-            show(explorer.view(settings.changed(method="paper")), searched)
+            remark = f"\nbounds     the paper's; the class {settings.method} is being searched"
+            show(explorer.view(settings.changed(method="paper")), remark)
         view = explorer.view(settings)
         show(view)
         if cheap:
@@ -401,7 +401,7 @@ def controls(explorer: Explorer, settings: Settings) -> VBox:
 
     for control in panel.values():
         control.observe(update, names="value")
-    button.on_click(lambda _: tell(explorer.view(wanted()).text))
+    button.on_click(lambda _: tell(explorer.view(read_settings()).text))
     update()
     return widgets.VBox([box, button, text, image])
 
@@ -438,9 +438,9 @@ def _in_notebook() -> bool:
     return shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None
 
 
-def _refuse_unknown(name: str, value: str, known: Iterable[str]) -> None:
-    if value not in known:
-        raise ParameterError(f'{name} "{value}" is unknown; one of {", ".join(known)}')
+def _refuse_unknown(name: str, value: str, choices: Iterable[str]) -> None:
+    if value not in choices:
+        raise ParameterError(f'{name} "{value}" is unknown; one of {", ".join(choices)}')
 
 
 def _decimal(value: Any) -> Any:
@@ -458,13 +458,13 @@ def _disturbance(settings: Settings, protocol: ReachingProtocol, n: int) -> Dist
     return as_disturbance(settings.disturbance, n, protocol.delta, until)
 
 
-def _shown(lines: list[str]) -> list[str]:
+def _select_lines(lines: list[str]) -> list[str]:
     """Keep the lines whose heads are shown, with those that belong to them."""
-    kept, head = [], ""
+    selection, head = [], ""
     for line in lines:
         head = line[:10].strip() or head
-        kept += [line] if head in (*_SHOWN, "verdict") else []
-    return kept
+        selection += [line] if head in (*_SHOWN, "verdict") else []
+    return selection
 
 
 def _unchecked_lines(certificate: Certificate) -> list[str]:

@@ -61,10 +61,10 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 
 @shows(Design)
-def design_html(found: Design) -> str:
+def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
     alt = "certified peak input against the deadline, and what no gains can stay below"
-    return _page(found.lines(), plot_trade_off(found).figure, alt)
+    return _page(answer.lines(), plot_trade_off(answer).figure, alt)
 
 
 def _structure_page(lines: Iterable[str], structure: Structure) -> str:

@@ -94,9 +94,9 @@ def rejected_html(error: RejectedCertificate) -> str:
     """
     name = printable(error.path.name, 200)
     title = f"REJECTED: {name}"
-    quoted = printable(shlex.quote(error.path.name), 200)
+    command = printable(shlex.quote(error.path.name), 200)
     template = _environment().get_template("rejected.html")
-    return template.render(title=title, name=name, quoted=quoted, report=error.report)
+    return template.render(title=title, name=name, quoted=command, report=error.report)
 
 
 @cache
@@ -115,8 +115,8 @@ def _environment() -> jinja2.Environment:
 def _view(saved: Certificate) -> dict[str, Any]:
     """Return everything that the template shows."""
     effort, report, labels = saved.effort, saved.report, saved.graph.labels
-    kept = "its state" if saved.direct else "x \u2212 \u03c3"
-    title = _title(saved, kept)
+    invariant = "its state" if saved.direct else "x \u2212 \u03c3"
+    title = _title(saved, invariant)
     name = shlex.quote(saved.path.name)
     name = f"./{name}" if name.startswith("-") else name
     more = f" --memory {math.ceil(report.memory)}" if report.memory > 1 else ""
@@ -126,7 +126,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
     named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "unbalanced": "unbalanced"}
     peaks = effort.peak.agents if effort and effort.peak else ()
     return texts.facts(saved) | {
-        **{"structure": saved.structure, "protocol": saved.protocol, "kept": kept},
+        **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
         "remarks": remarks_on(saved.structure),
         "equations": texts.equations(saved.protocol),
@@ -145,19 +145,19 @@ def _view(saved: Certificate) -> dict[str, Any]:
     }
 
 
-def _title(saved: Certificate, kept: str) -> Markup:
+def _title(saved: Certificate, invariant: str) -> Markup:
     """Say what the certificate is about."""
     claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
-    told = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
-    text = Markup("{} at {} = {}").format(told, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
+    behaviour = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
+    text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
-        text = Markup("every agent keeps {}").format(kept)
+        text = Markup("every agent keeps {}").format(invariant)
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
     """Return head and rows of the table of initial and final states."""
-    if saved.start is None:
+    if saved.initial_state is None:
         return [], []
     heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     numbers = texts.state_columns(saved, heads, ROWS, enclosed)
@@ -168,17 +168,17 @@ def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
 
 def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
-    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.start is None):
+    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.initial_state is None):
         return []
     instants = [(Fraction(str(f)), f"{f} T") for f in FRACTIONS]
     if not saved.direct:
         share = 1 - saved.protocol.span / saved.protocol.T
         instants = [(share, texts.indexed("T_r")), *(pair for pair in instants if pair[0] > share)]
-    left = [float(1 - f) for f, _ in instants]
-    bounds = map(saved.envelope.residual, left) if saved.direct else saved.norm_bound(left).tolist()
+    remaining = [float(1 - f) for f, _ in instants]
+    bounds = map(saved.envelope.residual, remaining) if saved.direct else saved.norm_bound(remaining).tolist()
     columns = [[above(x, 2) for x in bounds]]
-    if saved.start is not None and any(m.deviation is not None for m in saved.envelope.functions):
-        columns.append([above(float(x), 2) for x in saved.deviation_bound(left).max(axis=0)])
+    if saved.initial_state is not None and any(m.deviation is not None for m in saved.envelope.functions):
+        columns.append([above(float(x), 2) for x in saved.deviation_bound(remaining).max(axis=0)])
     return list(zip((name for _, name in instants), *columns, strict=True))
 
 

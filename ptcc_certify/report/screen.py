@@ -38,17 +38,17 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
 
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
-        yield "nodes", _listed(labels)
+        yield "nodes", _shorten_list(labels)
         yield "structure", structure_text(structure)
         for number, component in enumerate(structure.closed_components[:4], start=1):
             yield f"leaders {number}", _leaders_text(component, labels)
         if len(structure.closed_components) > 4:
             yield "", f"... {len(structure.closed_components)} closed components in all"
         if structure.followers.size:
-            yield "followers", _listed([labels[v] for v in structure.followers.tolist()])
+            yield "followers", _shorten_list([labels[v] for v in structure.followers.tolist()])
         yield from _claim_lines([component.claim for component in structure.components])
 
-    return _written(lines())
+    return _format_lines(lines())
 
 
 def certificate_lines(certificate: Certificate, name: str) -> list[str]:
@@ -62,8 +62,8 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         yield from _claim_lines(certificate.claims, f" {when}")
         names = [name for name in p.to_dict() if name != "kind"]
         yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
-        if certificate.start is not None:
-            yield "x(0)", _pairs(structure.graph.labels, certificate.start)
+        if certificate.initial_state is not None:
+            yield "x(0)", _pairs(structure.graph.labels, certificate.initial_state)
         for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines):
             yield from part(certificate)
         yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
@@ -73,7 +73,7 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 
-    return _written(lines())
+    return _format_lines(lines())
 
 
 def _graph_lines(structure: Structure, name: str) -> Lines:
@@ -88,10 +88,10 @@ def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
     if component.negative_cycle is not None:
         steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
         more = " ..." if len(component.negative_cycle) > 12 else ""
-        return f"{_listed(nodes)}: unbalanced, negative cycle {steps}{more}"
-    found = camps(component)
-    text = " against ".join("{" + _listed([labels[v] for v in camp], 40) + "}" for camp in found)
-    return f"balanced, {'camps ' if len(found) > 1 else 'one camp '}{text}"
+        return f"{_shorten_list(nodes)}: unbalanced, negative cycle {steps}{more}"
+    sides = camps(component)
+    text = " against ".join("{" + _shorten_list([labels[v] for v in camp], 40) + "}" for camp in sides)
+    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{text}"
 
 
 def camps(component: ClosedComponent) -> list[list[int]]:
@@ -124,8 +124,8 @@ def _rate_lines(certificate: Certificate) -> Lines:
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
         best += f" ({spectral:.6g}, numerical)"
     if certificate.constant:
-        kept = "its state" if certificate.direct else "x - sigma"
-        yield "rate", f"no agent listens to another, each keeps {kept}: there is nothing to decay"
+        invariant = "its state" if certificate.direct else "x - sigma"
+        yield "rate", f"no agent listens to another, each keeps {invariant}: there is nothing to decay"
         return
     if rate is None:
         numerical = certificate.numerical_rate
@@ -137,25 +137,25 @@ def _rate_lines(certificate: Certificate) -> Lines:
     yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     yield from _deviation_lines(certificate)
     arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
-    said, report = f"{len(certificate.obligations)} proof obligations proved in {arithmetic}", certificate.checked
+    text, report = f"{len(certificate.obligations)} proof obligations proved in {arithmetic}", certificate.checked
     if report is not None:
-        said += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
-    yield "proof", said
+        text += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
+    yield "proof", text
 
 
 def _class_lines(certificate: Certificate) -> Lines:
     """Tell the Lyapunov functions of the envelope: class, rate, overshoot; what was searched; the paper's formula."""
-    V, found = certificate.lyapunov, certificate.search
+    V, search = certificate.lyapunov, certificate.search
     if V is not None and certificate.proof.rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
         yield "", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
-    if found.tried:
-        tried = [f"{kind} {rate:.4g}" for kind, rate in found.tried.items()]
-        limit = "" if found.diagonal_limit is None else f"; diagonal upper bound {found.diagonal_limit:.4g}"
+    if search.tried:
+        searched = [f"{kind} {rate:.4g}" for kind, rate in search.tried.items()]
+        limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
-        yield "", f"searched {', '.join(tried)} (numerical{limit}{time})"
-        used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in found.functions]
+        yield "", f"searched {', '.join(searched)} (numerical{limit}{time})"
+        used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in search.functions]
         yield "", f"used {', '.join(used) or 'none, no rate was proved'}"
 
 
@@ -166,18 +166,18 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
 
 def _deviation_lines(certificate: Certificate) -> Lines:
     """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
-    if certificate.start is None or not any(V.deviation for V in certificate.functions):
+    if certificate.initial_state is None or not any(V.deviation for V in certificate.functions):
         return
     instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
     worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
     if instants:
         numerical = "" if certificate.direct else " (numerical, rounded up)"
-        said = _at_instants(worst, (name for _, name in instants))
-        yield "deviation", f"of every agent from its final state at most {said}{numerical}"
+        bounds = _at_instants(worst, (name for _, name in instants))
+        yield "deviation", f"of every agent from its final state at most {bounds}{numerical}"
     if certificate.at is not None:
         each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
-        listed = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
-        yield "", f"at t = {near(certificate.at, 12)}: {_listed(listed)}"
+        entries = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
+        yield "", f"at t = {near(certificate.at, 12)}: {_shorten_list(entries)}"
 
 
 def _effort_lines(certificate: Certificate) -> Lines:
@@ -208,7 +208,7 @@ def _effort_lines(certificate: Certificate) -> Lines:
         whom = "" if effort.initial_set is None else " for all these initial states"
         part = " (integrals of the nominal part)" if effort.sliding is not None else ""
         yield "effort", ", ".join(sizes) + whom + part
-    other = bool(certificate.limits) or not certificate.direct  # the found start is of neither
+    other = bool(certificate.limits) or not certificate.direct  # the initial state that is found is of neither
     worst = None if effort.peak is None or other else certificate.worst_initial_state
     if worst is not None and math.isfinite(worst.size):
         labels = certificate.graph.labels
@@ -230,11 +230,11 @@ def _effort_lines(certificate: Certificate) -> Lines:
 def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
     """Tell what is proved under limits of the gain, and under noise with them."""
     for entry in effort.residual:
-        named = (("gain <= ", entry.limits.gain_cap), ("switched off at T - ", entry.limits.stop_before))
-        said = [f"{what}{near(x)}" for what, x in (*named, ("zero-order hold ", entry.limits.sample_period)) if x]
+        names = (("gain <= ", entry.limits.gain_cap), ("switched off at T - ", entry.limits.stop_before))
+        limits = [f"{what}{near(x)}" for what, x in (*names, ("zero-order hold ", entry.limits.sample_period)) if x]
         agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
-        yield "limited", f"{', '.join(said)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
+        yield "limited", f"{', '.join(limits)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
             yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
@@ -266,37 +266,39 @@ def _residual_lines(certificate: Certificate) -> Lines:
 
 def _reaching_lines(certificate: Certificate) -> Lines:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
-    if certificate.start is None:
+    if certificate.initial_state is None:
         return
     share = _sliding_share(certificate)
-    chosen = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
-    said = _at_instants(certificate.norm_bound([q for q, _ in chosen]), (name for _, name in chosen))
+    instants = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
+    bounds = _at_instants(certificate.norm_bound([q for q, _ in instants]), (name for _, name in instants))
     z = certificate.envelope.coordinates
-    yield "error", f"||{z}(t)|| at most {said}; T = T_r + T_s (numerical, rounded up)"
+    yield "error", f"||{z}(t)|| at most {bounds}; T = T_r + T_s (numerical, rounded up)"
 
 
 def _simulated(certificate: Certificate) -> Iterator[str]:
     """Tell what the run showed."""
-    run, seen = certificate.trajectory, certificate.comparison
+    run, comparison = certificate.trajectory, certificate.comparison
     if run is None:
         return
-    if seen is not None and not certificate.constant:
-        said = "VIOLATED" if seen.violated else "kept" if seen.judged else "not tested, all is below the floor"
-        resolved = f"until 1 - t/T = {seen.resolved_until:.1e}" if seen.resolved_until else "throughout"
-        ratio = f"worst ratio {seen.worst_ratio:.4g}, above integrator tolerance {resolved}"
-        yield f"CVODES to 1 - t/T = {seen.stop:.0e}: bound {said}, {ratio}"
-    if seen is not None and (slid := run.sliding) is not None and not certificate.direct:
+    if comparison is not None and not certificate.constant:
+        verdict = (
+            "VIOLATED" if comparison.violated else "kept" if comparison.judged else "not tested, all is below the floor"
+        )
+        resolved = f"until 1 - t/T = {comparison.resolved_until:.1e}" if comparison.resolved_until else "throughout"
+        ratio = f"worst ratio {comparison.worst_ratio:.4g}, above integrator tolerance {resolved}"
+        yield f"CVODES to 1 - t/T = {comparison.stop:.0e}: bound {verdict}, {ratio}"
+    if comparison is not None and (slid := run.sliding) is not None and not certificate.direct:
         last = int(slid.reaching_z.argmax())
         when = "at T_r only"
         if math.isfinite(slid.reaching_z[last]):
             when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
-        kept = "kept" if seen.reaching_kept else "VIOLATED"
-        ratio = f"worst |sigma| ratio {seen.sliding_ratio or 0:.4g}"
-        yield f"reaching times {kept}, the last {when} (agent {run.labels[last]}); {ratio}"
+        reaching = "kept" if comparison.reaching_kept else "VIOLATED"
+        ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
+        yield f"reaching times {reaching}, the last {when} (agent {run.labels[last]}); {ratio}"
     if certificate.final_state is not None:
         gap = float(abs(run.final_state - certificate.final_state.values).max())
-        settled = "" if run.deadline_resolved else " (the run had not settled)"
-        yield f"end state within {gap:.1e} of the final state{settled}"
+        remark = "" if run.deadline_resolved else " (the run had not settled)"
+        yield f"end state within {gap:.1e} of the final state{remark}"
 
 
 def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:
@@ -316,11 +318,11 @@ def _sliding_lines(certificate: Certificate) -> Lines:
         yield "sigma(0)", _pairs(labels, certificate.sigma0)
         late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
         last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
-        said = []
+        clauses = []
         if last is not None and last.z:
             agent = labels[reaching.index(last)]
-            left = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
-            said.append(f"{'others' if late else 'all'} by t = {up(last.time, 6)}, {left} (agent {agent})")
+            margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
+            clauses.append(f"{'others' if late else 'all'} by t = {up(last.time, 6)}, {margin} (agent {agent})")
         if late and (p := certificate.protocol.reaching) is not None:
             pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r
             why = "0 is reached nearer to T_r than can be written"
@@ -328,8 +330,8 @@ def _sliding_lines(certificate: Certificate) -> Lines:
                 why = "mu3 kappa < 1 and sigma(0) is large"
             if push + pole > LARGEST_PUSH:
                 why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
-            said.append(f"only at T_r for {_listed(late, 40)}: {why}")
-        yield "sliding", f"sigma_k = 0 proved: {'; '.join(said)}"
+            clauses.append(f"only at T_r for {_shorten_list(late, 40)}: {why}")
+        yield "sliding", f"sigma_k = 0 proved: {'; '.join(clauses)}"
     if run is not None and (slid := run.sliding) is not None:
         yield "disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"
 
@@ -368,7 +370,7 @@ def remarks_on(structure: Structure) -> list[str]:
 
 
 def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:
-    return _listed([f"{label}={_digits(value)}" for label, value in zip(labels, values, strict=True)])
+    return _shorten_list([f"{label}={_digits(value)}" for label, value in zip(labels, values, strict=True)])
 
 
 def _digits(value: object) -> str:
@@ -376,7 +378,7 @@ def _digits(value: object) -> str:
     return f"{float(value):.5g}"  # type: ignore[arg-type]
 
 
-def _listed(words: Sequence[str], width: int = 90) -> str:
+def _shorten_list(words: Sequence[str], width: int = 90) -> str:
     text = ""
     for word in words:
         if len(text) + len(word) > width:
@@ -385,5 +387,5 @@ def _listed(words: Sequence[str], width: int = 90) -> str:
     return text
 
 
-def _written(lines: Lines) -> list[str]:
+def _format_lines(lines: Lines) -> list[str]:
     return [f"{head:<10} {''.join(c if c.isprintable() else '?' for c in text)}" for head, text in lines]

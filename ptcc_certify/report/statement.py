@@ -72,7 +72,7 @@ def _shares(saved: Certificate) -> list[tuple[float, float]]:
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:
     """Return heads and rows of the table of initial and final states."""
-    if saved.start is None:
+    if saved.initial_state is None:
         return [], []
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     numbers = texts.state_columns(

@@ -37,8 +37,8 @@ _LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4
 
 def printable(text: str, limit: int = CHARACTERS) -> str:
     """Return a text of the file fit to be shown: cut, and what is not printable written as its code."""
-    cut = text if len(text) <= limit else text[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    return "".join(c if c.isprintable() else f"\\u{{{ord(c):x}}}" for c in cut)
+    short = text if len(text) <= limit else text[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    return "".join(c if c.isprintable() else f"\\u{{{ord(c):x}}}" for c in short)
 
 
 def label(text: str) -> Markup:
@@ -48,8 +48,8 @@ def label(text: str) -> Markup:
 
 def labels(nodes: Sequence[Any], names: Sequence[str] | None = None) -> Markup:
     """Return up to 30 labels, or those of nodes, and how many more there are."""
-    shown = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:LISTED])
-    return shown + (f" and {len(nodes) - LISTED:,} more" if len(nodes) > LISTED else "")
+    listing = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:LISTED])
+    return listing + (f" and {len(nodes) - LISTED:,} more" if len(nodes) > LISTED else "")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -62,11 +62,11 @@ def plural(number: int, what: str) -> str:
 
 def rational(x: Fraction) -> str:
     """Write a rational: as a decimal or a quotient if that is short, else with six digits, marked as near."""
-    left = x.denominator
+    cofactor = x.denominator
     for prime in (2, 5):
-        while left % prime == 0:
-            left //= prime
-    if left == 1 and writable(x):
+        while cofactor % prime == 0:
+            cofactor //= prime
+    if cofactor == 1 and writable(x):
         with localcontext(prec=5000):
             text = f"{Decimal(x.numerator) / Decimal(x.denominator):f}"
         if len(text) <= 12:
@@ -129,9 +129,9 @@ def symbol(name: str) -> Markup:
 def equations(protocol: Protocol) -> Markup:
     """Return the equations of a protocol in MathML; their LaTeX is the text in their place."""
     source = protocol.latex()
-    known = re.sub(r"\\(operatorname|mathrm)\b", r"\\text", source.replace("{aligned}", "{align*}"))
+    latex = re.sub(r"\\(operatorname|mathrm)\b", r"\\text", source.replace("{aligned}", "{align*}"))
     opening = Markup('<math display="block" alttext="{}">').format(" ".join(source.split()))
-    return opening + Markup(convert(known, display="block").partition(">")[2])
+    return opening + Markup(convert(latex, display="block").partition(">")[2])
 
 
 # ---------------------------------------------------------------------- words
@@ -160,7 +160,7 @@ def state_columns(
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    columns = {heads[0]: [rational(x) for x in (saved.start or ())[:rows]]}
+    columns = {heads[0]: [rational(x) for x in (saved.initial_state or ())[:rows]]}
     if not saved.direct:
         columns[heads[1]] = [rational(x) for x in (saved.sigma0 or ())[:rows]]
     if saved.final_state is not None:
@@ -180,7 +180,7 @@ def _common_bound(initial_set: InitialSet) -> Fraction | None:
 
 def environment(finalize: Callable[[str], str], **syntax: Any) -> jinja2.Environment:
     """Return the templates; what is printed is finalized unless it is Markup, and an unknown name is an error."""
-    made = jinja2.Environment(
+    result = jinja2.Environment(
         loader=jinja2.PackageLoader("ptcc_certify.report"),
         finalize=lambda value: value if isinstance(value, Markup) else finalize(str(value)),
         undefined=jinja2.StrictUndefined,
@@ -188,8 +188,8 @@ def environment(finalize: Callable[[str], str], **syntax: Any) -> jinja2.Environ
         lstrip_blocks=True,
         **syntax,
     )
-    made.globals |= {"AUTHORS": AUTHORS, "TITLE": TITLE, "LISTED": LISTED, "producer": producer()}
-    return made
+    result.globals |= {"AUTHORS": AUTHORS, "TITLE": TITLE, "LISTED": LISTED, "producer": producer()}
+    return result
 
 
 def facts(saved: Certificate) -> dict[str, Any]:

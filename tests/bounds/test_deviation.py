@@ -57,8 +57,8 @@ def slow() -> Certificate:
 
 def largest_at_start(cert: Certificate) -> Fraction:
     """``max_k |x_k(0) - x_k(T)|``, exactly."""
-    assert cert.start is not None and cert.final_state is not None
-    return max(abs(x - Fraction(end)) for x, end in zip(cert.start, cert.final_state.states, strict=True))
+    assert cert.initial_state is not None and cert.final_state is not None
+    return max(abs(x - Fraction(end)) for x, end in zip(cert.initial_state, cert.final_state.states, strict=True))
 
 
 # ---------------------------------------------------------------------- bounds
@@ -71,8 +71,8 @@ def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str
     cert = certify(graph, NOMINAL, numbers(rng, graph.n_nodes), method="perron", simulation=False)
     bounds = cert.deviation_bound(REMAINING)
     assert (bounds <= float(largest_at_start(cert)) * (1 + 1e-14)).all()
-    assert cert.start is not None
-    assert (bounds <= 2 * float(max(map(abs, cert.start))) * (1 + 1e-14)).all()
+    assert cert.initial_state is not None
+    assert (bounds <= 2 * float(max(map(abs, cert.initial_state))) * (1 + 1e-14)).all()
     cert.save(tmp_path / "c.json")
     assert np.array_equal(read_certificate(tmp_path / "c.json").deviation_bound(REMAINING), bounds)
 
@@ -82,9 +82,9 @@ def test_the_deviation_bound_is_above_the_exact_motion_and_at_half_time_it_says_
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
         cert = slow()
-        assert cert.start is not None and cert.final_state is not None
+        assert cert.initial_state is not None and cert.final_state is not None
         for q in (Fraction(9, 10), Fraction(1, 2), Fraction(1, 10), Fraction(1, 100)):
-            X, bound = states(cert.graph, clock(NOMINAL, q), cert.start), cert.deviation_bound([float(q)])[:, 0]
+            X, bound = states(cert.graph, clock(NOMINAL, q), cert.initial_state), cert.deviation_bound([float(q)])[:, 0]
             gaps = [abs(x - ball(Fraction(end))) for x, end in zip(X, cert.final_state.states, strict=True)]
             assert not any(gap > flint.arb(float(b)) for gap, b in zip(gaps, bound, strict=True))
             if q == Fraction(1, 2):
@@ -110,11 +110,11 @@ def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(di
 
 def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
     cert = slow()
-    assert cert.start is not None
-    size = float(largest_at_start(cert)) * len(cert.start) ** 0.5
-    assert cert.envelope.deviation_norm(0.0, cert.start) <= size * (1 + 1e-12)
-    d = [float(x) - float(end) for x, end in zip(cert.start, cert.final_state.states, strict=True)]  # type: ignore[union-attr]
-    assert cert.envelope.deviation_norm(0.0, cert.start) >= np.linalg.norm(d)
+    assert cert.initial_state is not None
+    size = float(largest_at_start(cert)) * len(cert.initial_state) ** 0.5
+    assert cert.envelope.deviation_norm(0.0, cert.initial_state) <= size * (1 + 1e-12)
+    d = [float(x) - float(end) for x, end in zip(cert.initial_state, cert.final_state.states, strict=True)]  # type: ignore[union-attr]
+    assert cert.envelope.deviation_norm(0.0, cert.initial_state) >= np.linalg.norm(d)
 
 
 # ---------------------------------------------------------------------- a Lyapunov function for deviations
@@ -123,7 +123,7 @@ def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
 def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monkeypatch: pytest.MonkeyPatch):
     cert = slow()
     monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
-    plain = certify(cert.graph, NOMINAL, cert.start, method="full", simulation=False)
+    plain = certify(cert.graph, NOMINAL, cert.initial_state, method="full", simulation=False)
     assert (cert.rate, cert.overshoot, cert.diagonal_rate) == (plain.rate, plain.overshoot, plain.diagonal_rate)
     more, fewer = cert.envelope.functions, plain.envelope.functions
     assert len(more) == len(fewer) + 1
@@ -229,7 +229,7 @@ def test_what_a_limited_gain_leaves_is_capped_by_the_start_and_the_check_knows_i
     """A gain that hardly acts: every agent is as far from its final state as it was, and no farther."""
     cert = slow()
     for actuator, capped in ((Actuator(gain_cap="0.01"), True), (Actuator(stop_before="0.999"), True)):
-        limited = certify(cert.graph, NOMINAL, cert.start, method="full", simulation=False, limits=[actuator])
+        limited = certify(cert.graph, NOMINAL, cert.initial_state, method="full", simulation=False, limits=[actuator])
         assert limited.effort is not None and limited.verdict == "certified"
         (entry,) = limited.effort.residual
         assert entry.agents is not None

@@ -266,7 +266,9 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
     # From x(0) = sigma(0) it is the sliding variables alone that move the agents.
     for sigma0, begin in ((push, x0), (push, push), ([F(0)] * n, x0)):
         for initial_set in (None, InitialSet(begin, [F(1)] * n)):
-            cert = proved.changed(start=tuple(begin), sigma0=tuple(sigma0), reaching=None, initial_set=initial_set)
+            cert = proved.changed(
+                initial_state=tuple(begin), sigma0=tuple(sigma0), reaching=None, initial_set=initial_set
+            )
             effort = cert.effort
             assert effort is not None and effort.sliding is not None and effort.path_length is not None
             assert effort.bounded

@@ -149,7 +149,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     plain, x0 = [3.5, 2.5, 1.5], pd.Series({"eve": 1.5, "bob": 2.5, "ann": 3.5})
     cert = certify(team, protocol, x0, simulation=False)
-    assert [float(x) for x in cert.start] == plain
+    assert [float(x) for x in cert.initial_state] == plain
     assert cert.envelope.norm_bound([0.5], x0) == cert.norm_bound([0.5])
     assert (cert.envelope.deviation_bound([0.5], x0) == cert.deviation_bound([0.5])).all()
     assert cert.final_state.states == final_state(analyse(team), x0).states
@@ -158,7 +158,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     assert run.states[:, :, 0].tolist() == [[x, 2 * x] for x in plain]
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     slid = certify(team, robust, x0, sigma0=x0, simulation=False)
-    assert slid.sigma0 == slid.start == cert.start
+    assert slid.sigma0 == slid.initial_state == cert.initial_state
     assert simulate(team, robust, x0, sigma0=x0).sigma[:, 0].tolist() == plain
     row, other = certify_many(team, protocol, x0=x0)[0], certify_many(team, protocol, x0=plain)[0]
     assert row | {"seconds": 0} == other | {"seconds": 0}

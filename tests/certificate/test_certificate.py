@@ -105,7 +105,7 @@ def test_the_examples_behave_as_the_paper_reports(name: str):
 def test_at_the_last_instant_the_run_lacks_what_the_exact_clock_leaves(name: str):
     """x - Qx0 at 1 - t/T = 1e-8 is exp(-L s) x0 - Q x0, to the integrator's accuracy."""
     cert = example(name)
-    run, final_state, start = cert.trajectory, cert.final_state, cert.start
+    run, final_state, start = cert.trajectory, cert.final_state, cert.initial_state
     assert run is not None and final_state is not None and start is not None
     last = int(np.flatnonzero(run.remaining > 0)[-1])
     assert run.remaining[last] == pytest.approx(1e-8)

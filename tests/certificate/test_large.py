@@ -69,7 +69,7 @@ def test_every_class_is_certified_as_a_large_graph(name: str, kwargs: dict):
         assert spectral is not None and 0 < float(cert.rate) <= spectral * (1 + 1e-9)
         assert cert.limit is None or cert.rate <= cert.limit.value
         assert {step["kind"] for step in data["proof"]} >= {"dominance", "final-state"}
-    exact = final_state(cert.structure, cert.start or (), exact=True)
+    exact = final_state(cert.structure, cert.initial_state or (), exact=True)
     for value, said in zip(exact.states, data["final_state"].values(), strict=True):
         if isinstance(said, dict):
             assert abs(Fraction(value) - Fraction(said["mid"])) <= Fraction(said["radius"]) < Fraction(1, 10**8)
@@ -439,7 +439,9 @@ def test_a_forged_tree_is_rejected():
 def mean_of_start(cert: Certificate) -> list[Fraction]:
     """Return the end of a balanced undirected graph, of all agents alike."""
     camps = cert.structure.closed_components[0].gauge or ()
-    mean = sum((g * Fraction(x) for g, x in zip(camps, cert.start or (), strict=True)), Fraction(0)) / len(camps)
+    mean = sum((g * Fraction(x) for g, x in zip(camps, cert.initial_state or (), strict=True)), Fraction(0)) / len(
+        camps
+    )
     return [g * mean for g in camps]
 
 

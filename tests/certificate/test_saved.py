@@ -64,7 +64,7 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
     """Everything that a file states is what the certificate has."""
     assert saved.graph == made.graph and saved.graph.labels == made.graph.labels
     assert structure_document(saved.structure) == structure_document(made.structure)
-    assert (saved.protocol, saved.start, saved.sigma0) == (made.protocol, made.start, made.sigma0)
+    assert (saved.protocol, saved.initial_state, saved.sigma0) == (made.protocol, made.initial_state, made.sigma0)
     assert (saved.reaching, saved.verdict, saved.claims) == (made.reaching, made.verdict, made.claims)
     assert (saved.rate, saved.overshoot, saved.paper_rate) == (made.rate, made.overshoot, made.proof.rate)
     assert saved.upper_bound == made.upper_bound and saved.optimality_ratio == made.optimality_ratio
@@ -132,7 +132,7 @@ def test_the_bound_is_never_below_what_the_exact_numbers_say(tmp_path: Path):
     for name in ("1.1", "2.1 K>=2 reducible followers", "3.1 mixed several"):
         saved = written(certified(name), tmp_path)
         p, L = saved.protocol, saved.graph.exact_laplacian()
-        n, start = len(L), saved.start or ()
+        n, start = len(L), saved.initial_state or ()
         E = [-sum(L[i][j] * start[j] for j in range(n)) for i in range(n)]
         for k, said in enumerate(saved.document["lyapunov"]["functions"]):
             alone = replace(saved.envelope, functions=saved.envelope.functions[k : k + 1])

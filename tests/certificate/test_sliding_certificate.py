@@ -58,7 +58,7 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     protocol = cert.protocol
     assert isinstance(protocol, SlidingModeProtocol)
     assert cert.claim is not None and cert.comparison is not None and cert.final_state is not None
-    assert cert.reaching is not None and cert.start is not None and cert.sigma0 is not None
+    assert cert.reaching is not None and cert.initial_state is not None and cert.sigma0 is not None
     assert cert.claim.behaviour == reported
     assert cert.claim.theorem == cert.theorem.number == f"{number}.{1 if reported != 'stability' else 2}"
     assert cert.verdict == "certified"
@@ -71,7 +71,7 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
         assert (row[at >= z] == 0).all() and (row[at < z] != 0).all()
     assert not cert.comparison.violated and cert.comparison.reaching_kept
     # The end state is Q (X(0) - sigma(0)), not Q X(0), up to what the clock leaves at the last sample before T.
-    start = [x - s for x, s in zip(cert.start, cert.sigma0, strict=True)]
+    start = [x - s for x, s in zip(cert.initial_state, cert.sigma0, strict=True)]
     assert cert.final_state.states == final_state(cert.structure, start).states
     spectrum = laplacian_spectrum(cert.structure).spectral_rate
     assert spectrum is not None
@@ -261,8 +261,8 @@ def test_the_bound_cannot_be_asked_as_a_multiple_of_the_start_while_sigma_drives
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_bound_of_the_state_holds_along_the_run_and_falls_after_T_r(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))
-    assert isinstance(cert.envelope, SlidingEnvelope) and cert.start is not None and cert.lyapunov is not None
-    x0 = np.array([float(x) for x in cert.start])
+    assert isinstance(cert.envelope, SlidingEnvelope) and cert.initial_state is not None and cert.lyapunov is not None
+    x0 = np.array([float(x) for x in cert.initial_state])
     before = run.remaining > 1e-7
     bound = cert.envelope.state_bound(run.remaining[before], x0)
     function = cert.envelope.functions[0]

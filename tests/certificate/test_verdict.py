@@ -65,7 +65,7 @@ def test_the_gains_that_are_named_leave_one_percent(k: int, sliding: bool):
     assert product == rho2 * cert.protocol.kappa and rho2 > cert.protocol.rho2
     p = {name: getattr(cert.protocol, name) for name in cert.protocol.to_dict() if name not in ("kind", "disturbance")}
     protocol = type(cert.protocol)(**{**p, "rho2": said[1]})
-    again = certify(cert.graph, protocol, cert.start, sigma0=cert.sigma0, simulation=False)
+    again = certify(cert.graph, protocol, cert.initial_state, sigma0=cert.sigma0, simulation=False)
     assert again.assessment.useful and again.assessment.exit_code == 0
     left = re.search(r"\|\| <= (\S+) \|\|", again.assessment.text)
     assert left is not None and float(left[1]) <= 0.01

@@ -1121,11 +1121,11 @@ def test_odd_labels_in_a_start(put):
         ('a=1,"b=2,c=3', ["quote"]),
     ],
 )
-def test_a_wrong_start_is_refused(content, words):
+def test_a_wrong_initial_state_is_refused(content, words):
     with pytest.raises(ParameterError) as caught:
         read_state(content, GRAPH)
     message = one_line(caught.value)
-    assert message.startswith("start")
+    assert message.startswith("initial state")
     for word in words:
         assert word in message
 

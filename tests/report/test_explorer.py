@@ -148,7 +148,7 @@ def test_what_is_shown_is_what_certify_certifies(explorer: Explorer):
         load_graph("fig3a"), settings.protocol(), start, sigma0=sigma0, disturbance="1*sin(2*k*t)", method="paper"
     )
     shown = explorer.certificate(settings)
-    for part in ("rate", "overshoot", "start", "sigma0", "reaching", "claim", "verdict"):
+    for part in ("rate", "overshoot", "initial_state", "sigma0", "reaching", "claim", "verdict"):
         assert getattr(shown, part) == getattr(whole, part), part
     assert shown.final_state is not None
     assert whole.final_state is not None

@@ -178,18 +178,18 @@ def test_the_input_of_the_sliding_mode() -> None:
 def test_a_certificate_of_something_else_is_refused() -> None:
     cert, structure = certified("fig1a"), certified("fig1a").structure
     run = cert.trajectory
-    assert run is not None and cert.start is not None
+    assert run is not None and cert.initial_state is not None
     other = certified("fig3b")
     with pytest.raises(ValueError, match="another graph than"):
         plot_input(run, structure, other)
     with pytest.raises(ValueError, match="another protocol than"):
-        plot_input(run, structure, certify(cert.graph, PROTOCOL, cert.start, simulation=False))
-    with pytest.raises(ValueError, match="another start than"):
+        plot_input(run, structure, certify(cert.graph, PROTOCOL, cert.initial_state, simulation=False))
+    with pytest.raises(ValueError, match="another initial state than"):
         plot_input(run, structure, certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
     without = certify(cert.graph, cert.protocol, simulation=False)
     assert "certified peak" not in labelled(plot_input(run, structure, without))
     columns = simulate(cert.graph, cert.protocol, np.eye(6)[:, :2], times=[0])
-    with pytest.raises(ValueError, match="holds 2 starts; draw the input of one"):
+    with pytest.raises(ValueError, match="holds 2 initial states; draw the input of one"):
         plot_input(columns, structure)
 
 
@@ -448,7 +448,7 @@ def test_the_energy_grows_and_stays_under_its_bound(name: str) -> None:
         assert bound == float(cert.effort.energy.value)
         assert spent[-1] <= bound
     columns = simulate(cert.graph, cert.protocol, np.ones((cert.graph.n_nodes, 2)), times=[0])
-    with pytest.raises(ValueError, match="holds 2 starts"):
+    with pytest.raises(ValueError, match="holds 2 initial states"):
         plot_effort(columns)
 
 
@@ -480,7 +480,7 @@ def test_no_certified_line_for_a_run_from_elsewhere() -> None:
         assert ("certified bound" in labels) == draw.get_ylabel().startswith("energy")
         assert "certified peak" not in labels
     near = certify(pair, PROTOCOL, [10**13, 10**13 + 1], simulation=False)
-    with pytest.raises(ValueError, match="another start than"):
+    with pytest.raises(ValueError, match="another initial state than"):
         plot_input(simulate(pair, PROTOCOL, [1e13, 1e13 + 8]), near.structure, near)
 
 

@@ -86,7 +86,7 @@ class InputRequest:
     forms: Sequence[Form | None]
     rate: Fraction | None
     limit: Fraction | None
-    start: Sequence[Fraction] | None = None
+    initial_state: Sequence[Fraction] | None = None
     initial_set: InitialSet | None = None
     sigma0: Sequence[Fraction] | None = None
     reaching: Sequence[Fraction | None] | None = None
@@ -105,10 +105,10 @@ def bound_effort(asked: InputRequest) -> Effort:
     lower, upper = (None if r is None else gain.pole * r / 2 for r in (asked.rate, asked.limit))
     sliding = _sliding_part(asked)
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(asked.forms), sliding=sliding)
-    if (asked.start is None and asked.initial_set is None) or still or n > INPUT_NODES:
+    if (asked.initial_state is None and asked.initial_set is None) or still or n > INPUT_NODES:
         return effort
     constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in asked.forms)
-    region = asked.initial_set or InitialSet(tuple(asked.start or ()))
+    region = asked.initial_set or InitialSet(tuple(asked.initial_state or ()))
     rows = structure.graph.exact_rows(range(n))
     bounds = InputBounds(rows, gain.exact, asked.forms, constants, region, _reaching(asked))
     usable = usable_functions(bounds)

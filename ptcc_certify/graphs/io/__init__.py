@@ -1,4 +1,4 @@
-"""Files in and out: signed digraphs in every common format, starts, and writing that is whole or not at all.
+"""Files in and out: signed digraphs in every common format, initial states, and writing that is whole or not at all.
 
 Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.graphs.io.graph_from_rows`) checks the
 rows and builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.

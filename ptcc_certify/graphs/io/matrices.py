@@ -78,9 +78,9 @@ def _the_matrix(shapes: Mapping[str, tuple[int, ...]], variables: Iterable[str],
     square = [k for k, shape in shapes.items() if len(shape) == 2 and shape[0] == shape[1]]
     square = [k for k in square if shapes[k][0] > 1] or square
     if len(square) != 1:
-        held = ", ".join(shorten(k) for k in (square or list(variables))[:20]) or "nothing"
+        names = ", ".join(shorten(k) for k in (square or list(variables))[:20]) or "nothing"
         what = "several square matrices" if square else "no square numeric matrix"
-        raise FormatError(f"{name}: {what} among its variables ({held}); keep one")
+        raise FormatError(f"{name}: {what} among its variables ({names}); keep one")
     return square[0]
 
 

@@ -51,7 +51,7 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
     """
     if not isinstance(text_or_path, str) or os.path.isfile(text_or_path):  # noqa: PTH113 - Path.is_file may raise
         return _state_of_file(text_or_path, graph)
-    place = f'start "{shorten(text_or_path)}"'
+    place = f'initial state "{shorten(text_or_path)}"'
     try:
         items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
     except csv.Error as error:
@@ -96,17 +96,17 @@ def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
     >>> in_node_order({"b": 2, "a": 1}, graph), in_node_order([1, 2], graph)
     ([1, 2], [1, 2])
     """
-    found = by_label(values, name)
-    if found is None:
+    entries = by_label(values, name)
+    if entries is None:
         return values
-    missing = [label for label in graph.labels if label not in found]
-    unknown = [label for label in found if label not in graph.index]
+    missing = [label for label in graph.labels if label not in entries]
+    unknown = [label for label in entries if label not in graph.index]
     if missing or unknown:
         wrong = [f"no value for {_some(missing)}"] * bool(missing)
         wrong += [f"{_some(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
         mend = "give each node one value, or values without labels in node order"
         raise ParameterError(f"the initial state {name}: {', and '.join(wrong)}; {mend}")
-    return [found[label] for label in graph.labels]
+    return [entries[label] for label in graph.labels]
 
 
 def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
@@ -128,15 +128,15 @@ def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
         labels, entries = beside, list(values.to_numpy())
     else:
         return None
-    found = dict(zip(labels, entries, strict=True))
-    if len(found) < len(labels):
-        twice = next(label for label in found if labels.count(label) > 1)
+    result = dict(zip(labels, entries, strict=True))
+    if len(result) < len(labels):
+        twice = next(label for label in result if labels.count(label) > 1)
         raise ParameterError(f"the initial state {name} has two values for node {shorten(twice)}; keep one")
-    return found
+    return result
 
 
 def random_states(seed: Any, n: int, dimension: int = 1) -> list[list[Fraction]]:
-    """Draw starts uniform on [-10, 10], to three decimals, so that they can be written down.
+    """Draw initial states uniform on [-10, 10], to three decimals, so that they can be written down.
 
     Parameters
     ----------

@@ -52,25 +52,25 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     """
     if axis not in _DECAY_AXES:
         raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
-    run, envelope, start = certificate.trajectory, certificate.envelope, certificate.start
-    if run is None or start is None or certificate.comparison is None or not envelope.functions:
+    run, envelope, x0 = certificate.trajectory, certificate.envelope, certificate.initial_state
+    if run is None or x0 is None or certificate.comparison is None or not envelope.functions:
         raise ValueError("the certificate holds no simulated run with a proved bound")
     ax, before = axes_of(ax), run.remaining > 0
     unit = float(np.abs(run.states).max(initial=0)) or 1.0  # in which squares neither overflow nor vanish
     remaining, states = run.remaining[before], run.states[:, before] / unit
     place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
-    shown = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
-    norm = np.linalg.norm(shown[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
-    bound = envelope.norm_bound(remaining, start) / unit
+    functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
+    norm = np.linalg.norm(functions[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
+    bound = envelope.norm_bound(remaining, x0) / unit
     scale = float(norm[0]) or float(bound[0])
     if scale == 0:
         raise ValueError("the agents begin where they end: nothing decays")
-    for number, function in enumerate(shown if len(shown) > 1 else ()):
-        alone = replace(envelope, functions=(function,)).norm_bound(remaining, start) / unit / scale
+    for number, function in enumerate(functions if len(functions) > 1 else ()):
+        alone = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit / scale
         if function.kind == "paper":
             ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
         else:
-            label = "each Lyapunov function" if all(m.kind == "paper" for m in shown[:number]) else None
+            label = "each Lyapunov function" if all(m.kind == "paper" for m in functions[:number]) else None
             ax.plot(place, alone, color=BOUND, linewidth=0.7, alpha=0.55, label=label)
     ax.plot(place, bound / scale, color=BOUND, linewidth=1.6, label="proved bound")
     if norm[0] > 0:

@@ -127,8 +127,8 @@ def _layout(graph: SignedDigraph) -> np.ndarray:
         place = nx.spring_layout(plain, seed=1)
     else:
         hops = dict(nx.all_pairs_shortest_path_length(plain))
-        apart = 2 + max(max(row.values()) for row in hops.values())  # between components
-        place = nx.kamada_kawai_layout(plain, {u: {v: hops[u].get(v, apart) for v in plain} for u in plain})
+        gap = 2 + max(max(row.values()) for row in hops.values())  # between components
+        place = nx.kamada_kawai_layout(plain, {u: {v: hops[u].get(v, gap) for v in plain} for u in plain})
     points = np.array([place[v] for v in range(graph.n_nodes)])
     width, height = np.ptp(points, axis=0)
     return points if width >= height else points[:, ::-1]  # lying, as axes are wider than high

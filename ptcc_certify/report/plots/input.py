@@ -14,7 +14,7 @@ from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
 RESOLVED_ERROR = 10
-#: Decades of the input that are drawn below its size at the start; changes of sign go further down.
+#: Decades of the input that are drawn below its initial size; changes of sign go further down.
 INPUT_DECADES = 3
 
 
@@ -24,7 +24,7 @@ def plot_input(
 ) -> Axes:
     """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same initial state proves.
 
-    The axis of the input is logarithmic, from three decades below its size at the start. Behind an actuator it is the
+    The axis of the input is logarithmic, from three decades below its initial size. Behind an actuator it is the
     input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn
     where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol,
     boundary layers. Under caps and stops that ``certificate`` judges, theirs is drawn.
@@ -36,7 +36,7 @@ def plot_input(
     structure : Structure
         Of the same graph.
     certificate : Certificate, optional
-        Of the same graph, protocol and start. One of a set of initial states adds nothing.
+        Of the same graph, protocol and initial state. One of a set of initial states adds nothing.
     ax : Axes, optional
 
     Returns
@@ -46,7 +46,7 @@ def plot_input(
     Raises
     ------
     ValueError
-        The trajectory holds several starts, or the certificate is of another graph, protocol or start.
+        The trajectory holds several initial states, or the certificate is of another graph, protocol or initial state.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def plot_input(
     >>> len(ax.lines), ax.get_ylabel()
     (3, 'input $|u_k|$')
     """
-    _need_one_start(trajectory)
+    _require_one_initial_state(trajectory)
     peak = None if certificate is None else _certified_peak(trajectory, certificate)
     ax, u = axes_of(ax), _resolved_input(trajectory)
     size = np.where(np.isnan(u), 0.0, np.abs(u))
@@ -66,8 +66,8 @@ def plot_input(
         ax.set_yscale("log", nonpositive="clip")
         first = float(size[:, 0].max(initial=0)) if u.shape[1] else 0.0
         ax.set_ylim((first or top) * 10.0**-INPUT_DECADES, top * 2)
-    held = trajectory.held_input is not None
-    draw_agents(trajectory, np.abs(u), structure, ax, drawstyle="steps-post" if held else "default")
+    hold = trajectory.held_input is not None
+    draw_agents(trajectory, np.abs(u), structure, ax, drawstyle="steps-post" if hold else "default")
     if peak is not None:
         ax.axhline(peak, color="black", linewidth=0.9, linestyle="--", label="certified peak")
     return finished(ax, "time $t$", "input $|u_k|$")
@@ -86,7 +86,7 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     trajectory : Trajectory
         Of one initial state.
     certificate : Certificate, optional
-        Of the same graph, protocol and start.
+        Of the same graph, protocol and initial state.
     ax : Axes, optional
 
     Returns
@@ -96,8 +96,8 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     Raises
     ------
     ValueError
-        The trajectory holds several starts, its samples do not settle the energy, or the certificate is of another
-        graph, protocol or start.
+        The trajectory holds several initial states, its samples do not settle the energy, or the certificate is of
+        another graph, protocol or initial state.
 
     Examples
     --------
@@ -108,22 +108,22 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     >>> [line.get_label() for line in ax.lines]
     ['simulated (CVODES)', 'certified bound', 'deadline']
     """
-    _need_one_start(trajectory)
-    proved, bound = None if certificate is None else _certified_effort(trajectory, certificate), None
-    if proved is not None and proved.energy is not None and not (trajectory.actuator or trajectory.sliding):
-        bound = float(proved.energy.value)
-    ax, spent = axes_of(ax), _energy(trajectory)
-    ax.plot(trajectory.t, spent, color=RUN, label="simulated (CVODES)")
+    _require_one_initial_state(trajectory)
+    effort, bound = None if certificate is None else _certified_effort(trajectory, certificate), None
+    if effort is not None and effort.energy is not None and not (trajectory.actuator or trajectory.sliding):
+        bound = float(effort.energy.value)
+    ax, energy = axes_of(ax), _energy(trajectory)
+    ax.plot(trajectory.t, energy, color=RUN, label="simulated (CVODES)")
     if bound is not None:
         ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
-    ax.set_ylim(0, 1.1 * max(bound or 0.0, float(spent.max(initial=0))) or 1)
+    ax.set_ylim(0, 1.1 * max(bound or 0.0, float(energy.max(initial=0))) or 1)
     draw_deadlines(trajectory, ax)
     return finished(ax, "time $t$", r"energy spent, $\int \|u\|^2\, dt$")
 
 
-def _need_one_start(trajectory: Trajectory) -> None:
+def _require_one_initial_state(trajectory: Trajectory) -> None:
     if trajectory.states.ndim != 2:
-        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} starts; draw the input of one")
+        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} initial states; draw the input of one")
 
 
 def _resolved_input(trajectory: Trajectory) -> np.ndarray:
@@ -133,11 +133,11 @@ def _resolved_input(trajectory: Trajectory) -> np.ndarray:
         return u
     weights = abs(trajectory.graph.laplacian())
     floor = RESOLVED_ERROR * trajectory.rtol * np.asarray(weights @ np.abs(trajectory.states))
-    lost = np.abs(trajectory.error) < floor
+    below = np.abs(trajectory.error) < floor
     if trajectory.sliding:  # what answers the disturbance is resolved
-        u[lost] -= (trajectory.protocol.gain.value_at_remaining(trajectory.remaining) * trajectory.error)[lost]
-        lost &= u == 0
-    u[lost] = np.nan
+        u[below] -= (trajectory.protocol.gain.value_at_remaining(trajectory.remaining) * trajectory.error)[below]
+        below &= u == 0
+    u[below] = np.nan
     return u
 
 
@@ -152,26 +152,26 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
     power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
     if trajectory.held_input is not None:
         return np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(trajectory.t))])
-    T, t, left = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
+    T, t, remaining = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
     full = (trajectory.input**2).sum(axis=0)
-    every, some = (_integrated(power[::k], full[::k], t[::k], left[::k], T) for k in (1, 2))
+    every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
     if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
         raise ValueError("these samples do not settle the energy: simulate with more, unless it is infinite")
     return every
 
 
-def _integrated(power: np.ndarray, full: np.ndarray, t: np.ndarray, left: np.ndarray, T: float) -> np.ndarray:
-    """Integrate over time, before ``T`` over ``tau = -ln(left)``: exact for exponentials of ``tau``.
+def _integrated(power: np.ndarray, full: np.ndarray, t: np.ndarray, remaining: np.ndarray, T: float) -> np.ndarray:
+    """Integrate over time, before ``T`` over ``tau = -ln(remaining)``: exact for exponentials of ``tau``.
 
     ``full`` holds besides ``power`` what is not resolved: it tells how fast ``power`` fell to there.
     """
     power = power.copy()
-    lost = 1 + np.flatnonzero((power[1:] == 0) & (power[:-1] > 0))
-    power[lost] = np.minimum(full[lost], power[lost - 1])
-    late = left[1:] <= 0
+    below = 1 + np.flatnonzero((power[1:] == 0) & (power[:-1] > 0))
+    power[below] = np.minimum(full[below], power[below - 1])
+    late = remaining[1:] <= 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        tau = np.where(late, 0.0, np.log(left[:-1] / left[1:]))
-    early = _logarithmic_mean(power[:-1] * left[:-1], power[1:] * left[1:]) * T * tau
+        tau = np.where(late, 0.0, np.log(remaining[:-1] / remaining[1:]))
+    early = _logarithmic_mean(power[:-1] * remaining[:-1], power[1:] * remaining[1:]) * T * tau
     pieces = np.where(late, np.minimum(power[:-1], power[1:]) * np.diff(t), early)
     return np.concatenate([[0.0], np.cumsum(pieces)])
 
@@ -190,7 +190,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
     Raises
     ------
     ValueError
-        The certificate is of another graph, protocol or start.
+        The certificate is of another graph, protocol or initial state.
     """
     effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
     if effort is None or (actuator is not None and actuator.sample_period is not None):
@@ -210,23 +210,23 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     Raises
     ------
     ValueError
-        The certificate is of another graph, protocol or start.
+        The certificate is of another graph, protocol or initial state.
     """
     for name in ("graph", "protocol"):
         if getattr(certificate, name) != getattr(trajectory, name):
             raise ValueError(f"the certificate is of another {name} than the trajectory")
-    starts = [("start", certificate.start, trajectory.states[:, :1])]
+    initial_values = [("initial state", certificate.initial_state, trajectory.states[:, :1])]
     rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the initial state
-    unproved = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
+    unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     if (slid := trajectory.sliding) is not None:
         sigma0 = slid.sigma0[:, None]
-        starts.append(("sigma(0)", certificate.sigma0, sigma0))
-        unproved = unproved or slid.boundary_layer is not None
+        initial_values.append(("sigma(0)", certificate.sigma0, sigma0))
+        unknown = unknown or slid.boundary_layer is not None
         rounding = rounding + np.abs(sigma0)  # the states are sums of two parts
-    for name, proved, run in starts if 0.0 in trajectory.t[:1] else ():
+    for name, proved, run in initial_values if 0.0 in trajectory.t[:1] else ():
         at = run if proved is None else np.array([[float(x)] for x in proved])
         if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
             raise ValueError(f"the certificate is of another {name} than the trajectory")
     effort = certificate.effort
-    unproved = unproved or effort is None or effort.initial_set is not None or certificate.start is None
-    return None if unproved else effort
+    unknown = unknown or effort is None or effort.initial_set is not None or certificate.initial_state is None
+    return None if unknown else effort

@@ -146,14 +146,14 @@ def draw_agents(
 ) -> None:
     """Draw a line for every agent, leaders first and thick, and the deadlines."""
     group = camp_groups(structure)
-    seen: set[str] = set()
+    names: set[str] = set()
     for node in np.argsort(group == "followers", kind="stable"):
         name = str(group[node])
         line, width = ("--", 0.9) if name == "followers" else ("-", 1.6)
         looks: dict[str, Any] = {"color": CAMP_COLOURS[name], "linestyle": line, "linewidth": width}
-        label = None if name in seen else name
+        label = None if name in names else name
         ax.plot(trajectory.t, values[node], drawstyle=drawstyle, label=label, **looks)
-        seen.add(name)
+        names.add(name)
     draw_deadlines(trajectory, ax)
 
 
