@@ -37,7 +37,7 @@ from ptcc_certify.theorems.matrices import (
     symmetric_product,
     without_last,
 )
-from ptcc_certify.theorems.theorem import KEPT, ExactInterval, Obligation, RateProof, Theorem
+from ptcc_certify.theorems.theorem import CONSTANT, ExactInterval, Obligation, RateProof, Theorem
 
 #: A left null vector is kept exact when its entries are shorter than this, otherwise rounded to 53 bits.
 EXACT_VECTOR_BITS = 64
@@ -120,12 +120,12 @@ class Composite(Theorem):
         lemmas: list[Obligation] = []
         for block in V.blocks:
             if not block.times_rho:
-                found = self._proved_leader_decrease(structure, block)
-                if found is None:
+                decrease = self._proved_leader_decrease(structure, block)
+                if decrease is None:
                     failed = f"{self.positive.format(block=block.name)} is not proved positive"
                     return RateProof(None, tuple(lemmas), failed=failed)
-                gamma.append(found[0])
-                lemmas += found[1]
+                gamma.append(decrease[0])
+                lemmas += decrease[1]
         phi = _exact_phi(structure, V, gamma)
         m = _prove_margin(phi(V.rho or Fraction(1)))
         if m is None:
@@ -162,10 +162,10 @@ class BalancedComposite(Composite):
         L, F = structure.graph.dense_laplacian(), structure.followers
         components = [(k, c) for k, c in enumerate(structure.closed_components, start=1) if len(c.nodes) > 1]
         if not components and F.size == 0:
-            return LyapunovFunction("paper", "E", (), objective=KEPT)
+            return LyapunovFunction("paper", "E", (), objective=CONSTANT)
         if not components:
-            found = lmi.h_matrix_lyapunov(float_block(L, F, F))
-            block = self._follower_block(structure, found.omega, False)
+            solution = lmi.h_matrix_lyapunov(float_block(L, F, F))
+            block = self._follower_block(structure, solution.omega, False)
             objective = f"lmin({self.follower} L_F + L_F' {self.follower}) / lmax({self.follower})"
             return LyapunovFunction("paper", "E", (block,), objective=objective)
         fixed: dict[int, tuple[Fraction, ...]] = {}
@@ -206,14 +206,14 @@ class BalancedComposite(Composite):
         share: Sequence[Fraction] = [Fraction(1)] * len(block.nodes)
         if _balanced(structure, block):
             kind, number, share = "leader-decrease", "b", self._share(block.diagonal)
-            proved = prove_connectivity(graph, block.diagonal, connectivity_rate(graph, block.diagonal))
+            bound = prove_connectivity(graph, block.diagonal, connectivity_rate(graph, block.diagonal))
         else:
             kind, number = "leader-margin", "m"
-            proved = _prove_margin(symmetric_product(block.diagonal, graph.exact_laplacian()))
-        if proved is None:
+            bound = _prove_margin(symmetric_product(block.diagonal, graph.exact_laplacian()))
+        if bound is None:
             return None
-        obligation = Obligation(kind, f"paper.{block.name}", {number: proved})
-        return diagonal_matrix(proved * x for x in share), (obligation,)
+        obligation = Obligation(kind, f"paper.{block.name}", {number: bound})
+        return diagonal_matrix(bound * x for x in share), (obligation,)
 
 
 def left_vector_diagonal(graph: SignedDigraph) -> tuple[Fraction, ...]:
