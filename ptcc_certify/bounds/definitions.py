@@ -63,7 +63,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     Parameters
     ----------
     x : sequence of N numbers, mapping or pandas Series by label, FinalState or Trajectory
-        A trajectory is judged at its deadline and at every later sample, relative to its largest start.
+        A trajectory is judged at its deadline and at every later sample, relative to its largest initial value.
     structure : Structure
     tolerance : float
         0 asks for equality, which makes sense for exact final states.

@@ -147,7 +147,7 @@ def ways(influence: Influence) -> list[Linear]:
 
 
 def largest_deviation(initial_set: InitialSet, influence: Influence) -> Fraction:
-    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the initial states, which nominal motions never exceed.
 
     Parameters
     ----------
