@@ -26,7 +26,7 @@ from ptcc_certify.protocols.nominal import Protocol
 from ptcc_certify.theorems.theorem import Obligation
 
 Steps = Mapping[tuple[str, str], Obligation]
-Said = Mapping[str, Any]
+Section = Mapping[str, Any]
 
 ENDS = ("lower", "upper")
 LIMITS = ("gain_cap", "stop_before", "sample_period")
@@ -67,28 +67,30 @@ def effort_section(effort: Effort | None, out: Writer) -> Any:
     }
 
 
-def peak_witness(peak: Peak, out: Writer) -> Said:
+def peak_witness(peak: Peak, out: Writer) -> Section:
     """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
     agents = {label: [how.function, text(how.z)] for label, how in zip(out.labels, peak.how, strict=True)}
     return {"agents": agents, "norm": peak.norm_how.function}
 
 
-def energy_witness(energy: EnergyIntegral) -> Said:
+def energy_witness(energy: EnergyIntegral) -> Section:
     """Return the lower triangles of the matrices that prove the energy."""
     first, second = ([list(map(text, row[: i + 1])) for i, row in enumerate(W)] for W in energy.matrices)
     return {"W0": first, "W1": second}
 
 
-def read_effort(document: Said, structure: Structure, protocol: Protocol, data: Reader, steps: Steps) -> Effort | None:
+def read_effort(
+    document: Section, structure: Structure, protocol: Protocol, data: Reader, steps: Steps
+) -> Effort | None:
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
-    section, start = document["input"], data.state(document["initial_state"])
+    section, initial_state = document["input"], data.state(document["initial_state"])
     if section is None:
         return None
     region, initial_set, sliding = section["initial_set"], None, section["sliding"]
     if region is not None:
         axes = tuple(map(data.agents, region.get("axes", ())))
         initial_set = InitialSet(data.agents(region["center"]), () if axes else data.agents(region["radius"]), axes)
-    begin = initial_set or (None if start is None else InitialSet(start))
+    states = initial_set or (None if initial_state is None else InitialSet(initial_state))
     lower, upper = (number(section["threshold"][key]) for key in ENDS)
     return Effort(
         bounded=section["bounded"],
@@ -105,7 +107,7 @@ def read_effort(document: Said, structure: Structure, protocol: Protocol, data: 
             for k, entry in enumerate(section["residual"])
         ),
         disturbed=_disturbed(section["disturbed"], data, steps),
-        first=None if begin is None else first_input(structure, protocol, begin),
+        first=None if states is None else first_input(structure, protocol, states),
     )
 
 
@@ -125,7 +127,7 @@ def _energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | Non
     return EnergyIntegral(exact(section), p, (first, second), (m0, m1))
 
 
-def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
+def _peak(section: Section | None, data: Reader, steps: Steps) -> Peak | None:
     if section is None:
         return None
     step, agents, norm = steps["input-peak", "input"], data.agents(section["agents"]), exact(section["norm"])
@@ -134,7 +136,7 @@ def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
     return Peak(agents, each, norm, Witness(norm, step.witness["norm"], step.numbers["z"]))
 
 
-def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
+def _limited(section: Section, step: Obligation, data: Reader) -> Limited:
     noise = section["noise"] or {}
     first, second = step.witness if noise else (step.witness, None)
     return Limited(
@@ -150,7 +152,7 @@ def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
     )
 
 
-def _disturbed(section: Said | None, data: Reader, steps: Steps) -> Disturbed | None:
+def _disturbed(section: Section | None, data: Reader, steps: Steps) -> Disturbed | None:
     if section is None:
         return None
     function = steps["nominal-disturbed", "input"].witness
