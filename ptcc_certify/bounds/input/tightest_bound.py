@@ -90,7 +90,7 @@ def least_bound(bounds: InputBounds, of: Of, functions: Sequence[int]) -> Witnes
 
 
 def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
-    """Return ``z`` where the constant bound meets that which decays, the best instant for the bounds; 0 while driven."""
+    """Return ``z`` where the constant bound meets the decaying one, the best instant for the bounds; 0 while driven."""
     if bounds.reaching is not None:
         return 0.0
     constant = bounds.held_norm if agent is None else bounds.held[agent]
