@@ -22,7 +22,7 @@ _MODULES = {
     "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite",
     "sparse_definiteness_proofs": "DominanceProof SparseDefinitenessProof "
     "prove_dominance prove_sparse_positive_definite",
-    "exact.numbers": "dyadic_integers round_to_bits",
+    "dyadic": "dyadic_integers round_to_bits",
 }
 _EXPORTS = {name: f"lmi.{module}" for module, names in _MODULES.items() for name in names.split()}
 __all__ = sorted(_EXPORTS)

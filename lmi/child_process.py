@@ -6,19 +6,19 @@ import contextlib
 import ctypes
 import os
 import pickle
-import select
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from typing import Any
 
 from lmi.errors import LMIError
 from lmi.search_time import checkpoint, seconds_left
 
-_HEAD = 8
 _ITEM, _ERROR, _END = range(3)
 #: Whether another thread than the main one may copy its process: all others are idle, and hold nothing.
 any_thread: ContextVar[bool] = ContextVar("any_thread", default=False)
@@ -62,7 +62,7 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
     if sys.platform != "linux" or not (main or any_thread.get()):
         yield from work()
         return
-    here, there = os.pipe()
+    here, there = Pipe(duplex=False)
     parent = os.getpid()
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # until either process is ready for it
     try:
@@ -71,14 +71,14 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
             child = os.fork()
     except OSError:  # no more processes
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        os.close(here)
-        os.close(there)
+        here.close()
+        there.close()
         yield from work()
         return
     if child == 0:
         _work(work, here, there, parent)
     try:
-        os.close(there)
+        there.close()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while True:
             kind, value = _received(here)
@@ -88,13 +88,13 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
                 raise value
             yield value
     finally:
-        os.close(here)
+        here.close()
         with contextlib.suppress(ProcessLookupError, ChildProcessError):  # where children are not waited for
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
 
 
-def _work(work: Callable[[], Iterable[Any]], here: int, there: int, parent: int) -> None:
+def _work(work: Callable[[], Iterable[Any]], here: Connection, there: Connection, parent: int) -> None:
     """Do the work in the child, send what it yields, and leave without cleaning up what belongs to the parent."""
     try:
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)  # ends with the parent, however that ends
@@ -102,13 +102,13 @@ def _work(work: Callable[[], Iterable[Any]], here: int, there: int, parent: int)
             os._exit(0)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is told, and ends the child
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        os.close(here)
+        here.close()
         try:
             for value in work():
-                _send(there, _ITEM, value)
-            _send(there, _END, None)
+                there.send((_ITEM, value))
+            there.send((_END, None))
         except BaseException as error:
-            _send(there, _ERROR, _portable(error))
+            there.send((_ERROR, _portable(error)))
     finally:
         os._exit(0)
 
@@ -121,27 +121,12 @@ def _portable(error: BaseException) -> BaseException:
         return LMIError(f"{type(error).__name__}: {error}")
 
 
-def _send(there: int, kind: int, value: Any) -> None:
-    content = pickle.dumps((kind, value))
-    content = len(content).to_bytes(_HEAD, "little") + content
-    while content:
-        content = content[os.write(there, content) :]
-
-
-def _received(here: int) -> tuple[int, Any]:
-    size = int.from_bytes(_bytes(here, _HEAD), "little")
-    return pickle.loads(_bytes(here, size))  # noqa: S301  from the process that was started above
-
-
-def _bytes(here: int, count: int) -> bytearray:
-    """Read so many bytes before the time limit."""
-    content, ready = bytearray(), select.poll()  # select() knows no descriptors above 1023
-    ready.register(here, select.POLLIN)
-    while len(content) < count:
+def _received(here: Connection) -> Any:
+    """Return what the child sent, as soon as it comes before the time limit."""
+    checkpoint()
+    while not here.poll(min(seconds_left(), 3600.0)):
         checkpoint()
-        if ready.poll(1000 * min(seconds_left(), 3600.0)):
-            part = os.read(here, min(count - len(content), 1 << 20))
-            if not part:
-                raise LMIError("its process ended without an answer")
-            content += part
-    return content
+    try:
+        return here.recv()
+    except (EOFError, OSError):  # before or amid an item
+        raise LMIError("its process ended without an answer") from None

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import ArpackError, eigsh, splu
+from scipy.sparse.linalg import ArpackError, eigsh
 
 from lmi.diagonal_certificate import DiagonalCertificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
-from lmi.matrix_classes import comparison_matrix, m_matrix_witness, square
+from lmi.matrix_classes import block_depths, m_matrix_witness, sparse_square
 from lmi.search_time import checkpoint
+from lmi.sparse_h_matrix import diagonal_factor
 
 #: Up to this many rows a tight rate is the eigenvalue of a dense matrix.
 DENSE_ROWS = 1500
@@ -62,18 +64,11 @@ def h_matrix_diagonal(A: Any) -> np.ndarray:
     >>> h_matrix_diagonal([[2.0, 0.0], [-1.0, 1.0]])
     array([1.        , 0.33333333])
     """
-    A = square(A)
-    if len(A) == 0:
-        raise MatrixError("A has no rows")
-    if (low := np.flatnonzero(np.diag(A) <= 0)).size:
-        i = int(low[0])
-        raise NotAnHMatrix(f"diagonal entry {i} is {A[i, i]:.6g}, not positive")
-    M = comparison_matrix(A)
-    scale = np.diag(A)
+    M = _comparison(sparse_square(A)).toarray()
     # Rows scaled to unit diagonal: the class does not change, and the witness is confirmed at any magnitude.
-    if m_matrix_witness(M / scale[:, None]) is None:
+    if m_matrix_witness(M / np.diag(M)[:, None]) is None:
         raise NotAnHMatrix("no positive u with M(A) u > 0 was confirmed in float64")
-    u, v = np.linalg.solve(M, np.ones(len(A))), np.linalg.solve(M.T, np.ones(len(A)))
+    u, v = (np.linalg.solve(B, np.ones(len(M))) for B in (M, M.T))
     if not ((u > 0).all() and (v > 0).all()):
         raise NotAnHMatrix("the comparison matrix M(A) is too near a singular one for float64")
     omega = v / u
@@ -142,25 +137,20 @@ class _ClosedForm:
     """The witnesses of an M-matrix at several losses of rate, each made once."""
 
     def __init__(self, A: Any, u: Any = None, v: Any = None):
-        self.A = _sparse(A)
+        self.A = sparse_square(A)
         _require_z_matrix(self.A)
         self._right, self._left = _Components(self.A), _Components(self.A.T)
         self._low = max(self._right.smallest(), self._left.smallest())
         self._upper = 2 * float(min(self._right.high.min(), self._left.high.min()))
         self._log_u, self._log_v = _checked(self.A, u, "A u", "u"), _checked(self.A.T, v, "A' v", "v")
-        self._found: dict[float, DiagonalCertificate] = {}
+        self._at = cache(self._certificate)
 
-    def _at(self, loss: float) -> DiagonalCertificate:
-        if loss not in self._found:
-            checkpoint()
-            rate = self._low * (1 - loss)
-            self._found[loss] = _from_witness(
-                self.A,
-                self._right.log_witness(rate) if self._log_u is None else self._log_u,
-                self._left.log_witness(rate) if self._log_v is None else self._log_v,
-                self._upper,
-            )
-        return self._found[loss]
+    def _certificate(self, loss: float) -> DiagonalCertificate:
+        checkpoint()
+        rate = self._low * (1 - loss)
+        log_u = self._right.log_witness(rate) if self._log_u is None else self._log_u
+        log_v = self._left.log_witness(rate) if self._log_v is None else self._log_v
+        return _from_witness(self.A, log_u, log_v, self._upper)
 
     def best(self, max_condition: float | None) -> DiagonalCertificate:
         """Return the certificate of :func:`m_matrix_certificate`."""
@@ -257,7 +247,7 @@ def h_matrix_frontier(A: Any, conditions: Sequence[float | None]) -> Iterator[Di
     >>> wide.rate > narrow.rate, narrow.condition <= 100
     (True, True)
     """
-    A = _sparse(A)
+    A = sparse_square(A)
     try:
         closed = _ClosedForm(_comparison(A))
         for max_condition in conditions:
@@ -311,7 +301,7 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     >>> round(found.rate, 9), found.omega.round(9).tolist()
     (2.0, [0.333333333, 1.0])
     """
-    A = _sparse(A)
+    A = sparse_square(A)
     log_u, log_v = perron_vectors(A)
     log_omega = log_v - log_u
     log_omega -= log_omega.max()
@@ -352,7 +342,7 @@ def perron_vectors(A: Any) -> tuple[np.ndarray, np.ndarray]:
     >>> u.tolist(), round(float(v[1] - v[0]), 9)
     ([0.0, 0.0], 1.098612289)
     """
-    M = _comparison(_sparse(A))
+    M = _comparison(sparse_square(A))
     if connected_components(M, connection="strong")[0] > 1:
         raise NotAnHMatrix("the matrix is reducible")
     rows = np.zeros(M.shape[0])
@@ -380,8 +370,8 @@ class _Components:
     """
 
     def __init__(self, A: sparse.csr_array, singular: bool = False) -> None:
-        count, label = connected_components(A, connection="strong")
-        level, size = _levels(A, label, count), np.bincount(label)
+        label, level = block_depths(sparse.csr_array(A))
+        size = np.bincount(label)
         self.order = np.lexsort((label, size[label] > 1, level[label]))
         label = label[self.order]
         self.start = np.flatnonzero(np.diff(label, prepend=-1))
@@ -445,7 +435,7 @@ class _Components:
     def _solve(self, rows: np.ndarray, log_r: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Solve ``(R^-1 A R - t I) z = 1`` on whole blocks."""
         B = _similar(self.blocks[rows][:, rows], log_r)
-        return _factor(B - sparse.diags_array(t)).solve(np.ones(len(rows)))
+        return diagonal_factor(B - sparse.diags_array(t)).solve(np.ones(len(rows)))
 
     def _bounds(self, log_r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         ratio, error = _ratios(self.blocks, log_r)
@@ -495,7 +485,7 @@ class _Components:
         """
         diagonal = self.diagonal[rows] - t
         try:
-            factor = _factor(self.blocks[rows, rows] - sparse.diags_array(np.full(len(log_c), t)))
+            factor = diagonal_factor(self.blocks[rows, rows] - sparse.diags_array(np.full(len(log_c), t)))
             flat = factor.solve(diagonal)
             if (flat > 0).all():
                 log_w = np.maximum(np.log(diagonal) - np.log(flat.max()), log_c)
@@ -506,22 +496,6 @@ class _Components:
             pass
         log_r = self._log_r[rows]
         return log_r + max(0.0, float((log_c - log_r).max()) - math.log(self.low[k] - t))
-
-
-def _levels(A: sparse.csr_array, label: np.ndarray, count: int) -> np.ndarray:
-    """Return the depth of each strong component: 1 + that of the deepest one its rows are coupled to, 0 if none."""
-    entries = sparse.coo_array(A)
-    rows, columns = label[entries.row], label[entries.col]
-    keep = rows != columns
-    graph = sparse.csr_array((np.ones(keep.sum()), (rows[keep], columns[keep])), shape=(count, count))
-    waiting, dependents = np.diff(graph.indptr), graph.tocsc()
-    level, frontier, depth = np.zeros(count, dtype=int), np.flatnonzero(waiting == 0), 0
-    while frontier.size:
-        level[frontier] = depth
-        touched, hits = np.unique(dependents[:, frontier].indices, return_counts=True)
-        waiting[touched] -= hits.astype(waiting.dtype)
-        frontier, depth = touched[waiting[touched] == 0], depth + 1
-    return level
 
 
 def _ratios(A: sparse.csr_array, log_u: np.ndarray, blur: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -600,7 +574,7 @@ def _log_left_vector(M: sparse.csr_array) -> np.ndarray:
     """
     n = M.shape[0]
     if n > ELIMINATION_ROWS:
-        v = np.append(_factor(sparse.csr_array(M.T)[:-1, :-1]).solve(-M[[n - 1]].toarray().ravel()[:-1]), 1.0)
+        v = np.append(diagonal_factor(sparse.csr_array(M.T)[:-1, :-1]).solve(-M[[n - 1]].toarray().ravel()[:-1]), 1.0)
         if not (np.isfinite(v).all() and (v > 0).all()):
             raise NoCertificate("no positive left null vector was found in float64")
         return np.log(v)
@@ -624,12 +598,6 @@ def _similar(A: sparse.csr_array, log_u: np.ndarray) -> sparse.csr_array:
     with np.errstate(over="ignore"):
         size = np.exp(np.log(np.abs(entries.data)) + log_u[entries.col] - log_u[entries.row])
     return sparse.csr_array((np.sign(entries.data) * size, (entries.row, entries.col)), shape=A.shape)
-
-
-def _factor(A: Any) -> Any:
-    """Factor an M-matrix with its diagonal entries as pivots, which keeps solutions of positive systems positive."""
-    options = {"SymmetricMode": True}
-    return splu(sparse.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def _checked(A: sparse.csr_array, u: Any, product: str, name: str) -> np.ndarray | None:
@@ -665,28 +633,3 @@ def _comparison(A: sparse.csr_array) -> sparse.csr_array:
     entries = sparse.coo_array(A)
     data = np.where(entries.row == entries.col, 1.0, -1.0) * np.abs(entries.data)
     return sparse.csr_array((data, (entries.row, entries.col)), shape=A.shape)
-
-
-def _sparse(A: Any) -> sparse.csr_array:
-    """Return ``A`` as a sparse float64 matrix without stored zeros.
-
-    Raises
-    ------
-    MatrixError
-        ``A`` is not a real, finite, square matrix, or has no rows.
-    """
-    if sparse.issparse(A):
-        if A.dtype.kind not in "biuf":
-            raise MatrixError("A is not a matrix of real numbers")
-        if A.ndim != 2 or A.shape[0] != A.shape[1]:
-            raise MatrixError(f"A has shape {A.shape}, not (n, n)")
-        A = sparse.csr_array(A, dtype=np.float64, copy=True)
-        if not np.isfinite(A.data).all():
-            raise MatrixError("A has an entry that is not finite")
-    else:
-        A = sparse.csr_array(square(A))
-    if A.shape[0] == 0:
-        raise MatrixError("A has no rows")
-    A.sum_duplicates()
-    A.eliminate_zeros()
-    return A

@@ -11,14 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Rational
+from operator import mul
 from typing import Any
 
 import numpy as np
 
+from lmi.dyadic import odd_parts
 from lmi.errors import MatrixError
 from lmi.exact import arithmetic, fast
-from lmi.exact import row_dominance as dominance
-from lmi.exact.definite import LARGEST_SHIFT, eliminate, refutes
+from lmi.exact.definite import LARGEST_SHIFT
+from lmi.exact.numbers import integers
 from lmi.exact.polynomials import characteristic
 from lmi.search_time import checkpoint
 
@@ -167,12 +169,47 @@ def prove_positive_definite(S: Any) -> DefinitenessProof:
         if n > ELIMINATION_ROWS and (x := _refuting_direction(rows)) is not None:
             x = tuple(value << power - min(shift) for value, power in zip(x, shift, strict=True))
             return DefinitenessProof(False, n, direction=x)
-    failed_at = eliminate(rows, checkpoint)
+    failed_at = eliminate(rows)
     return DefinitenessProof(failed_at is None, n, failed_at)
 
 
+def eliminate(S: IntegerRows) -> int | None:
+    """Return the first ``k`` for which the leading minor of ``k + 1`` rows is not positive; None: ``S > 0``.
+
+    Fraction-free symmetric elimination: every pivot is a leading principal minor (Sylvester). Always decides; seconds
+    at 100 rows, minutes at 300.
+
+    Parameters
+    ----------
+    S : n rows of n integers
+        Symmetric; only the lower triangle is read.
+
+    References
+    ----------
+    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
+
+    Examples
+    --------
+    >>> eliminate([[2, 1], [1, 1]]), eliminate([[1, 1], [1, 1]])
+    (None, 1)
+    """
+    rows, previous = [list(row[: i + 1]) for i, row in enumerate(S)], 1
+    for k in range(len(rows)):
+        checkpoint()
+        pivot = rows[k][k]
+        if pivot <= 0:
+            return k
+        column = [row[k] for row in rows[k + 1 :]]
+        for i, (row, head) in enumerate(zip(rows[k + 1 :], column, strict=True)):
+            row[k + 1 :] = [
+                (x * pivot - head * y) // previous for x, y in zip(row[k + 1 :], column[: i + 1], strict=True)
+            ]
+        previous = pivot
+    return None
+
+
 def _refuting_direction(rows: Any) -> tuple[int, ...] | None:
-    """Find ``x`` with ``x' S x <= 0`` along the float eigenvector of the smallest eigenvalue; the kernel decides."""
+    """Find ``x`` with ``x' S x <= 0`` along the float eigenvector of the smallest eigenvalue, in integers."""
     if any(row[i] <= 0 for i, row in enumerate(rows)):
         return None
     T, halves = fast.unit_diagonal(rows)
@@ -181,7 +218,8 @@ def _refuting_direction(rows: Any) -> tuple[int, ...] | None:
         return None
     whole = [round(math.ldexp(float(value), 40)) for value in vectors[:, 0]]
     x = tuple(value << max(halves) - half for value, half in zip(whole, halves, strict=True))
-    return x if refutes(rows, x) else None
+    form = sum(a * sum(map(mul, row, x)) for a, row in zip(x, rows, strict=True) if a)
+    return x if any(x) and form <= 0 else None
 
 
 def _long(rows: Any) -> bool:
@@ -197,7 +235,8 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
 
     Scaling rows and columns alike keeps definiteness and keeps entries of very different size short.
     """
-    if _is_plain(S):
+    # An array of numbers that float64 or int64 hold.
+    if isinstance(S, np.ndarray) and S.dtype.kind in "fiub" and S.dtype.itemsize <= 8 and S.dtype != np.uint64:
         if S.ndim != 2 or S.shape[0] != S.shape[1]:
             raise MatrixError("the matrix is not square")
         if S.dtype.kind == "f" and not np.isfinite(S).all():
@@ -215,48 +254,15 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
     return moved, shift, scale << power
 
 
-def _is_plain(S: Any) -> bool:
-    """Tell whether something is an array of numbers that float64 or int64 hold."""
-    return isinstance(S, np.ndarray) and S.dtype.kind in "fiub" and S.dtype.itemsize <= 8 and S.dtype != np.uint64
-
-
 def _array_integers(S: np.ndarray) -> tuple[np.ndarray, list[int], int]:
     """Return what :func:`_integers` does, of an array."""
     if not (S == S.T).all():
         raise MatrixError("the matrix is not symmetric")
-    whole, power = _odd(S)
+    whole, power = odd_parts(S)
     half = (np.frexp(np.abs(np.diag(S).astype(float)))[1].astype(np.int64) - 1) // 2
     places = np.where(whole != 0, power - half[:, None] - half[None, :], 0)
     up = max(0, -int(places.min(initial=0)))
     return whole.astype(object) << (places + up).astype(object), (-half).tolist(), 1 << up
-
-
-def dyadic_array(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return an array of floats or ints as integers over one power of two, in int64 if they fit.
-
-    Examples
-    --------
-    >>> dyadic_array(np.array([0.75, -2.0, 0.0]))
-    (array([ 3, -8,  0]), -2)
-    """
-    whole, power = _odd(values)
-    some = whole != 0
-    least = int(power[some].min(initial=2**20)) if some.any() else 0
-    up = np.where(some, power - least, 0)
-    if int((np.frexp(whole.astype(float))[1] + up).max(initial=0)) < 62:
-        return whole << up, least
-    return whole.astype(object) << up.astype(object), least
-
-
-def _odd(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``values = whole 2^power`` in int64, ``whole`` odd or 0."""
-    whole, power = values, np.zeros(values.shape, dtype=np.int64)
-    if values.dtype.kind == "f":
-        mantissa, exponent = np.frexp(values.astype(float))
-        whole, power = np.ldexp(mantissa, 53), exponent.astype(np.int64) - 53
-    whole = whole.astype(np.int64)
-    zeros = np.frexp(np.abs((whole & -whole).astype(float)))[1].astype(np.int64) - 1
-    return np.where(whole != 0, whole >> np.maximum(zeros, 0), 0), np.where(whole != 0, power + zeros, 0)
 
 
 def _rationals(S: Rows) -> list[list[Fraction]]:
@@ -406,8 +412,11 @@ def definite_by_polynomial(S: Rows) -> bool:
 def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     """Check in rationals that ``Y`` proves: no diagonal ``Omega > 0`` decays faster than ``rate``.
 
-    That is, ``Omega A + A' Omega >= b Omega`` needs ``b <= rate``; the proof is that of
-    :func:`lmi.exact.row_dominance.bounds_diagonal_rates`. With ``rate = 0``: no diagonal Lyapunov matrix exists.
+    That is, ``Omega A + A' Omega >= b Omega`` needs ``b <= rate``. With ``rate = 0``: no diagonal Lyapunov matrix
+    exists.
+
+    ``X = Y Y'`` is positive semidefinite; if it is not zero and ``diag(A X) <= (rate/2) diag(X)``, then such an
+    ``Omega`` would give ``b sum_i omega_i X_ii <= 2 sum_i omega_i (A X)_ii <= rate sum_i omega_i X_ii``.
 
     Parameters
     ----------
@@ -442,4 +451,11 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     n = len(A)
     if n == 0 or len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
         raise MatrixError("A is not square, is empty, or Y has not as many rows")
-    return dominance.bounds_diagonal_rates(_fractions(A), _fractions(Y), _fractions([[rate]])[0][0])
+    (a, unit), (y, _), ((bound,),) = integers(_fractions(A)), integers(_fractions(Y)), _fractions([[rate]])
+    sizes = [sum(map(mul, row, row)) for row in y]
+    columns = list(zip(*y, strict=True))
+    moved = [
+        sum(x * sum(map(mul, row, column)) for x, column in zip(own, columns, strict=True))
+        for row, own in zip(a, y, strict=True)
+    ]
+    return any(sizes) and all(2 * m <= bound * unit * size for m, size in zip(moved, sizes, strict=True))

@@ -1,4 +1,4 @@
-"""The search for diagonal Lyapunov matrices, with cvxpy and Clarabel or, for larger ones, :mod:`lmi.interior_point`.
+"""The search for diagonal Lyapunov matrices: the best rate by :mod:`lmi.interior_point`, small margins by Clarabel.
 
 The solver only proposes: every result is recomputed from eigenvalues of the matrices that it returns, and a
 certificate is proved elsewhere (:mod:`lmi.definiteness_proofs`).
@@ -9,38 +9,31 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
-from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, normalised, scaled
+from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
+from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, MatrixError, NoCertificate
-from lmi.exact.numbers import round_to_bits
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks
 from lmi.search_time import checkpoint, seconds_left
 
-if TYPE_CHECKING:
-    import cvxpy as cp
-
-
 #: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
 RESOLVED = 100.0
-#: Up to this many rows Clarabel climbs to the best rate; above, on a subspace, and in the blocks of a larger matrix,
-#: :mod:`lmi.interior_point` does.
-CLARABEL_ROWS = 20
 #: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
 #: :mod:`lmi.interior_point`.
 CLARABEL_MARGIN_ROWS = 32
 #: Tolerance of a step, the relative gain that is worth another one, and how many steps there are at most, at a given
-#: condition of a larger matrix.
-_COARSE, _COARSE_GAIN, _COARSE_STEPS = 1e-6, 1e-4, 8
+#: condition of a matrix of more than so many rows.
+_COARSE, _COARSE_GAIN, _COARSE_STEPS, _FINE_ROWS = 1e-6, 1e-4, 8, 20
 #: Solvers of the margin that may be asked for by name.
 SOLVERS = ("clarabel", "interior-point", "sdpa")
 #: Share of the smallest block rate that is given up when blocks are coupled.
@@ -132,112 +125,201 @@ def diagonal_lyapunov(
     (2.0, 1.7639, True)
     """
     A = square(A)
-    n = len(A)
-    if objective not in ("margin", "rate"):
-        raise MatrixError(f'objective "{objective}" is unknown; use "margin" or "rate"')
-    if max_condition is not None and not max_condition >= 1:
-        raise MatrixError(f"max_condition = {max_condition} is below 1")
-    max_condition = None if max_condition == math.inf else max_condition
-    if solver is not None and solver not in SOLVERS:
-        raise MatrixError(f'solver "{solver}" is unknown; use one of {", ".join(SOLVERS)}')
+    n, rate = len(A), objective == "rate"
+    refusals = {
+        f'objective "{objective}" is unknown; use "margin" or "rate"': objective not in ("margin", "rate"),
+        f"max_condition = {max_condition} is below 1": max_condition is not None and not max_condition >= 1,
+        f'solver "{solver}" is unknown; use one of {", ".join(SOLVERS)}': solver not in (None, *SOLVERS),
+        "A has no rows": n == 0,
+        'solver belongs to objective="margin"': rate and solver is not None,
+        'basis and start belong to objective="rate"': not rate and (basis is not None or start is not None),
+    }
+    if refusal := next((text for text, holds in refusals.items() if holds), None):
+        raise MatrixError(refusal)
     if solver == "sdpa" and importlib.util.find_spec("sdpap") is None:
         raise LMIError('solver "sdpa" needs the package sdpa-python: pip install sdpa-python')
-    if n == 0:
-        raise MatrixError("A has no rows")
-    if objective == "rate":
-        if solver is not None:
-            raise MatrixError('solver belongs to objective="margin"')
-        if start is not None and (np.shape(start) != (n,) or not np.isfinite(np.asarray(start, dtype=float)).all()):
+    max_condition = None if max_condition == math.inf else max_condition
+    if rate:
+        known = None if start is None else np.asarray(start, dtype=float)
+        if known is not None and not (known.shape == (n,) and np.isfinite(known).all()):
             raise MatrixError(f"start is not a finite vector of {n} entries")
-        return _rate_optimum(A, max_condition, _basis(basis, n), tolerance, start)
-    if basis is not None or start is not None:
-        raise MatrixError('basis and start belong to objective="rate"')
+        return _RateSearch(A, _basis(basis, n), tolerance, max_condition).optimum(known)
     if n == 1 or max_condition == 1:
         return _margin_certificate(A, np.ones(n))
     scale, least = largest_entry(A), 0.0 if max_condition is None else 1 / max_condition
     solver = solver or ("clarabel" if n <= CLARABEL_MARGIN_ROWS else "interior-point")
     if solver == "interior-point":
         return _margin_certificate(A, maximise_margin(A / scale, np.ones(n), tolerance=tolerance, least=least).omega)
-
-    def problem(cp: Any) -> tuple[cp.Problem, cp.Variable]:
-        omega, t = cp.Variable(n), cp.Variable()
-        S = symmetric_product(cp, omega, A / scale)
-        return cp.Problem(cp.Maximize(t), [S - t * np.eye(n) >> 0, omega >= least, omega <= 1]), omega
-
-    omega = positive(solve(problem, tolerance, solver))
+    omega = positive(solve(A / scale, least, tolerance, solver))
     return _margin_certificate(A, np.maximum(omega, least * omega.max()))
 
 
 # ---------------------------------------------------------------------- best rate
 
 
-def _rate_optimum(
-    A: np.ndarray,
-    max_condition: float | None,
-    basis: np.ndarray | None,
-    tolerance: float,
-    start: np.ndarray | None = None,
-) -> DiagonalCertificate:
-    """Search block by block where the matrix is reducible, otherwise at once."""
-    if max_condition is not None:
-        known = None if start is None else np.asarray(start, dtype=float)
-        if known is None and len(irreducible_blocks(A)) > 1:
-            with contextlib.suppress(NoCertificate):
-                known = _rate_optimum(A, None, basis, tolerance).log_omega
-        _, found = _climb(A, max_condition, basis, tolerance, known=known)
-        if not found.rate > _rounding(A, found.log_omega):
-            raise NoCertificate(f"the best rate found at condition {max_condition:.3g} is {found.rate:.3g}")
-        return found
-    parts = irreducible_blocks(A)
-    bases = [None if basis is None else block_columns(basis, part) for part in parts]
-    blocks = [
-        (part, b, _with_upper(A[np.ix_(part, part)], b, tolerance, len(A) <= CLARABEL_MARGIN_ROWS))
-        for part, b in zip(parts, bases, strict=True)
-        if b is None or b.shape[1]
-    ]
-    if not blocks:
-        raise MatrixError("the basis has no columns: there is nothing to decay")
-    worst = min(blocks, key=lambda block: block[2].rate)
-    part = worst[0]
-    if not worst[2].rate > _rounding(A[np.ix_(part, part)], worst[2].log_omega):
-        raise NoCertificate(f"the best rate found is {worst[2].rate:.3g}, which is not positive")
-    limit = min(blocks, key=lambda block: block[2].upper)
-    witness = None
-    if limit[2].witness is not None:
-        witness = (np.zeros((len(A), limit[2].witness[0].shape[1])),)
-        witness[0][limit[0]] = limit[2].witness[0]
-    if len(parts) == 1:
-        return worst[2]
-    log_omega = np.zeros(len(A))
-    for part, _, found in blocks:
-        log_omega[part] = found.log_omega
-    coupled = couple_blocks(A, parts, log_omega, worst[2].rate * (1 - COUPLING_LOSS), basis)
-    return DiagonalCertificate(coupled, diagonal_rate(A, coupled, basis), limit[2].upper, witness)
+@dataclass(frozen=True, eq=False)
+class _RateSearch:
+    """The search for the best rate of ``A``, on a subspace and within a largest condition where these are given."""
 
+    A: np.ndarray
+    basis: np.ndarray | None
+    tolerance: float
+    max_condition: float | None = None
 
-def _with_upper(
-    A: np.ndarray, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
-) -> DiagonalCertificate:
-    """Return the optimum of an irreducible block with a dual bound on all diagonal rates."""
-    if len(A) == 1:
-        rate = 2 * float(A[0, 0])
-        return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
-    if len(A) == 2 and basis is None:
-        return _two_rows(A)
-    frame, found = _climb(A, None, basis, tolerance, clarabel=clarabel)
-    if not found.rate > 0:
+    def optimum(self, known: np.ndarray | None) -> DiagonalCertificate:
+        """Search block by block where the matrix is reducible, otherwise at once.
+
+        ``known`` is a diagonal from which to climb besides, within a largest condition.
+        """
+        A, parts = self.A, irreducible_blocks(self.A)
+        if self.max_condition is not None:
+            if known is None and len(parts) > 1:
+                with contextlib.suppress(NoCertificate):
+                    known = replace(self, max_condition=None).optimum(None).log_omega
+            _, found = self.climb(known)
+            if not found.rate > _rounding(A, found.log_omega):
+                raise NoCertificate(f"the best rate found at condition {self.max_condition:.3g} is {found.rate:.3g}")
+            return found
+        blocks = []
+        for part in parts:
+            own = None if self.basis is None else block_columns(self.basis, part)
+            if own is None or own.shape[1]:
+                blocks.append((part, replace(self, A=A[np.ix_(part, part)], basis=own).with_upper()))
+        if not blocks:
+            raise MatrixError("the basis has no columns: there is nothing to decay")
+        part, worst = min(blocks, key=lambda block: block[1].rate)
+        if not worst.rate > _rounding(A[np.ix_(part, part)], worst.log_omega):
+            raise NoCertificate(f"the best rate found is {worst.rate:.3g}, which is not positive")
+        if len(parts) == 1:
+            return worst
+        part, limit = min(blocks, key=lambda block: block[1].upper)
+        witness = None
+        if limit.witness is not None:
+            witness = (np.zeros((len(A), limit.witness[0].shape[1])),)
+            witness[0][part] = limit.witness[0]
+        log_omega = np.zeros(len(A))
+        for part, found in blocks:
+            log_omega[part] = found.log_omega
+        coupled = couple_blocks(A, parts, log_omega, worst.rate * (1 - COUPLING_LOSS), self.basis)
+        return DiagonalCertificate(coupled, diagonal_rate(A, coupled, self.basis), limit.upper, witness)
+
+    def with_upper(self) -> DiagonalCertificate:
+        """Return the optimum of an irreducible matrix with a dual bound on all diagonal rates."""
+        A = self.A
+        if len(A) == 1:
+            rate = 2 * float(A[0, 0])
+            return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
+        if len(A) == 2 and self.basis is None:
+            return _two_rows(A)
+        frame, found = self.climb()
+        if not found.rate > 0:
+            return found
+        # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
+        finer = self.tolerance / 100
+        attempts = [(frame, self.tolerance), (_balanced(A), finer), (frame, finer), (found.log_omega, finer)]
+        for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
+            for log_omega, accuracy in attempts:
+                for Y in self.dual_factors(log_omega, found.rate * (1 + excess), accuracy):
+                    if (upper := diagonal_rate_limit(A, Y)) < found.upper:
+                        found = replace(found, upper=max(upper, found.rate), witness=(Y,))
+                if found.gap <= 1.5 * excess:
+                    return found
         return found
-    # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
-    attempts = [(frame, tolerance), (_balanced(A), tolerance / 100), (frame, tolerance / 100)]
-    attempts.append((found.log_omega, tolerance / 100))
-    for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
-        for log_omega, accuracy in attempts:
-            for Y in _dual_factors(A, log_omega, found.rate * (1 + excess), basis, accuracy, clarabel):
-                if (upper := diagonal_rate_limit(A, Y)) < found.upper:
-                    found = replace(found, upper=max(upper, found.rate), witness=(Y,))
-            if found.gap <= 1.5 * excess:
-                return found
-    return found
+
+    def climb(self, known: np.ndarray | None = None, steps: int = 40) -> tuple[np.ndarray, DiagonalCertificate]:
+        """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative."""
+        best = self.start(known)
+        frame, least, tolerance = best.log_omega, 1e-7, self.tolerance
+        # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
+        if self.max_condition is not None and len(self.A) > _FINE_ROWS:
+            least, tolerance, steps = _COARSE_GAIN, max(tolerance, _COARSE), min(steps, _COARSE_STEPS)
+        for _ in range(steps):
+            checkpoint()
+            try:
+                log_omega = np.log(positive(self.step(frame, best, tolerance)[0]))
+            except NoCertificate:
+                break
+            proposal = log_omega - log_omega.max() + frame
+            proposal -= proposal.max()
+            if self.max_condition is not None:
+                proposal = np.maximum(proposal, -math.log(self.max_condition))
+            found = self.rated(proposal)
+            if found is None or not found.rate > best.rate + _rounding(self.A, proposal):
+                break
+            gained, best = found.rate - best.rate, found
+            if gained <= least * abs(best.rate):
+                break
+        return frame, best
+
+    def start(self, known: np.ndarray | None = None) -> DiagonalCertificate:
+        """Return the best of the identity, a balanced scaling, the Perron vectors of ``M(A)`` and a known diagonal."""
+        candidates = [np.zeros(len(self.A)), _balanced(self.A), *([] if known is None else [known])]
+        with contextlib.suppress(LMIError, np.linalg.LinAlgError):
+            log_u, log_v = perron_vectors(self.A)
+            candidates.append(log_v - log_u)
+        fitted = [one for log in candidates if np.isfinite(log).all() for one in self.fitted(log - log.max())]
+        rated = [found for one in fitted if (found := self.rated(one)) is not None]
+        if not rated:
+            raise NoCertificate("the entries lie too far apart for floating point")
+        return max(rated, key=lambda found: found.rate)
+
+    def fitted(self, log_omega: np.ndarray) -> list[np.ndarray]:
+        """Return the diagonal cut, and its power shrunk, to the largest condition."""
+        limit = math.inf if self.max_condition is None else math.log(self.max_condition)
+        if -log_omega.min() <= limit:
+            return [log_omega]
+        return [np.maximum(log_omega, -limit), log_omega * (limit / -log_omega.min())]
+
+    def rated(self, log_omega: np.ndarray) -> DiagonalCertificate | None:
+        """Return a diagonal with its rate; None where floating point ends."""
+        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+            rate = diagonal_rate(self.A, log_omega, self.basis)
+            return DiagonalCertificate(log_omega, rate) if math.isfinite(rate) else None
+        return None
+
+    def step(
+        self, frame: np.ndarray, current: DiagonalCertificate, tolerance: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Solve ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0`` for the rate ``b`` of the current matrix.
+
+        Rows and columns are scaled by the frame to the power -1/2, then by ``unit`` to unit diagonal, where weights of
+        many decades meet. Returns ``Omega`` relative to the frame, ``unit``, and a factor of the dual matrix in rows
+        so scaled: unscaled, its small rows would be lost.
+        """
+        B, apart = scaled(self.A, frame), current.log_omega - frame
+        diagonal = np.diag(B)
+        unit = 1 / np.sqrt(diagonal if (diagonal > 0).all() else np.full(len(B), largest_entry(B)))
+        square_unit = unit * unit
+        weight = square_unit * np.exp(apart - apart.max())
+        tail = None
+        if self.basis is not None:
+            tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * self.basis)[0]
+        C = unit[:, None] * B * unit - np.diag(current.rate / 2 * square_unit)
+        found = maximise_margin(C, weight / weight.max(), tail, tolerance, np.exp(frame), self.max_condition)
+        values, vectors = np.linalg.eigh((found.X + found.X.T) / 2)
+        factor = vectors * np.sqrt(np.maximum(values, 0.0))
+        return found.omega, unit, factor if tail is None else tail @ factor
+
+    def dual_factors(self, frame: np.ndarray, b: float, tolerance: float) -> list[np.ndarray]:
+        """Return matrices ``Y``, ``X = Y Y'`` of which may show that no diagonal rate exceeds ``b``; in original rows.
+
+        Rows in which the solver left noise are cleared at several levels: a row of zeros meets its condition.
+        """
+        try:
+            _, unit, factor = self.step(frame, DiagonalCertificate(frame, b), tolerance)
+        except NoCertificate:
+            return []
+        size = np.einsum("ij,ij->i", factor, factor)
+        found: list[np.ndarray] = []
+        for noise in (0.0, 1e-14, 1e-12, 1e-10, 1e-8) if self.basis is None else (0.0,):
+            kept = size > noise * size.max()
+            if found and kept.all():
+                continue
+            Y = np.where(kept[:, None], (unit * np.exp(-frame / 2))[:, None] * factor, 0.0)
+            top = np.abs(Y).max(initial=0.0)
+            if top > 0 and math.isfinite(top):
+                found.append(Y / top)
+        return found
 
 
 def _two_rows(A: np.ndarray) -> DiagonalCertificate:
@@ -255,76 +337,6 @@ def _two_rows(A: np.ndarray) -> DiagonalCertificate:
     return DiagonalCertificate(log_omega, rate, max(diagonal_rate_limit(A, Y), rate), (Y,))
 
 
-def _climb(
-    A: np.ndarray,
-    max_condition: float | None,
-    basis: np.ndarray | None,
-    tolerance: float,
-    steps: int = 40,
-    known: np.ndarray | None = None,
-    clarabel: bool = True,
-) -> tuple[np.ndarray, DiagonalCertificate]:
-    """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative.
-
-    ``known`` is a diagonal to start from besides; without ``clarabel`` a small matrix is left to
-    :mod:`lmi.interior_point` too.
-    """
-    frame, best = _start(A, basis, max_condition, known)
-    current = frame
-    # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
-    coarse = max_condition is not None and len(A) > CLARABEL_ROWS
-    least = _COARSE_GAIN if coarse else 1e-7
-    if coarse:
-        tolerance, steps = max(tolerance, _COARSE), min(steps, _COARSE_STEPS)
-    for _ in range(steps):
-        checkpoint()
-        try:
-            omega, _ = _step(A, frame, current, best, basis, max_condition, tolerance, clarabel)
-            proposal = normalised(positive(omega)) + frame
-        except NoCertificate:
-            break
-        proposal = proposal - proposal.max()
-        if max_condition is not None:
-            proposal = np.maximum(proposal, -math.log(max_condition))
-        rate = _rate_or_none(A, proposal, basis)
-        if rate is None or not rate > best:
-            break
-        gained, current, best = rate - best, proposal, rate
-        if gained <= least * abs(best):
-            break
-    return frame, DiagonalCertificate(current, best)
-
-
-def _start(
-    A: np.ndarray, basis: np.ndarray | None, max_condition: float | None, known: np.ndarray | None = None
-) -> tuple[np.ndarray, float]:
-    """Return the better of the identity, a balanced scaling and the Perron vectors of ``M(A)``, with its rate."""
-    candidates = [np.zeros(len(A)), _balanced(A), *([] if known is None else [known])]
-    with contextlib.suppress(LMIError, np.linalg.LinAlgError):
-        log_u, log_v = perron_vectors(A)
-        candidates.append(log_v - log_u)
-    rated = []
-    for log_omega in candidates:
-        if not np.isfinite(log_omega).all():
-            continue
-        log_omega = log_omega - log_omega.max()
-        for fitted in _fitted(log_omega, max_condition):
-            rate = _rate_or_none(A, fitted, basis)
-            if rate is not None:
-                rated.append((fitted, rate))
-    if not rated:
-        raise NoCertificate("the entries lie too far apart for floating point")
-    return max(rated, key=lambda pair: pair[1])
-
-
-def _fitted(log_omega: np.ndarray, max_condition: float | None) -> list[np.ndarray]:
-    """Return the diagonal cut, and its power shrunk, to a largest condition."""
-    limit = math.inf if max_condition is None else math.log(max_condition)
-    if -log_omega.min() <= limit:
-        return [log_omega]
-    return [np.maximum(log_omega, -limit), log_omega * (limit / -log_omega.min())]
-
-
 def _balanced(A: np.ndarray) -> np.ndarray:
     """Return ``log_omega`` with which the rows and columns of ``Omega^1/2 A Omega^-1/2`` have norms of a size."""
     from scipy.linalg import matrix_balance
@@ -332,84 +344,6 @@ def _balanced(A: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         log_omega = -2 * np.log(matrix_balance(A, permute=False, separate=True)[1][0])
     return log_omega - log_omega.max()
-
-
-def _step(
-    A: np.ndarray,
-    frame: np.ndarray,
-    current: np.ndarray,
-    b: float,
-    basis: np.ndarray | None,
-    max_condition: float | None,
-    tolerance: float,
-    clarabel: bool = True,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Solve ``maximise t: Omega A + A' Omega - b Omega >= t Omega_0``, ``Omega_0`` the current matrix.
-
-    Rows and columns are scaled by the frame to the power -1/2, then to unit diagonal, where weights of many decades
-    meet. Returns ``Omega`` relative to the frame and a factor of the dual matrix in rows scaled by the frame.
-    """
-    n = len(A)
-    B = scaled(A, frame)
-    diagonal = np.diag(B)
-    unit = 1 / np.sqrt(diagonal if (diagonal > 0).all() else np.full(n, largest_entry(B)))
-    S = unit[:, None] * B * unit
-    square_unit = unit * unit
-    weight = square_unit * np.exp(current - frame - (current - frame).max())
-    weight /= weight.max()
-    tail = None
-    if basis is not None:
-        tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * basis)[0]
-
-    if n > CLARABEL_ROWS or tail is not None or not clarabel:
-        C = S - np.diag(b / 2 * square_unit)
-        found = maximise_margin(C, weight, tail, tolerance, np.exp(frame), max_condition)
-        return found.omega, unit[:, None] * _dual_rows(found.X, tail)
-
-    def problem(cp: Any) -> tuple[cp.Problem, cp.Expression]:
-        omega, t = cp.Variable(n), cp.Variable()
-        form = symmetric_product(cp, omega, S) - cp.diag(cp.multiply(b * square_unit, omega)) - t * np.diag(weight)
-        constraints = [form >> 0, cp.sum(omega) == n, omega >= 0]
-        if max_condition is not None:
-            low = cp.Variable()
-            relative = np.exp(frame)
-            constraints += [cp.multiply(relative, omega) >= low, cp.multiply(relative, omega) <= max_condition * low]
-        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([omega, t])
-
-    solution = solve(problem, tolerance, dual=True)
-    return solution[0][:n], unit[:, None] * _dual_rows(solution[1], tail)
-
-
-def _dual_rows(X: np.ndarray, tail: np.ndarray | None) -> np.ndarray:
-    """Factor the dual matrix before it is scaled: afterwards its small rows would be lost."""
-    values, vectors = np.linalg.eigh((X + X.T) / 2)
-    factor = vectors * np.sqrt(np.maximum(values, 0.0))
-    return factor if tail is None else tail @ factor
-
-
-def _dual_factors(
-    A: np.ndarray, frame: np.ndarray, b: float, basis: np.ndarray | None, tolerance: float, clarabel: bool = True
-) -> list[np.ndarray]:
-    """Return matrices ``Y`` such that ``X = Y Y'`` may show that no diagonal rate exceeds ``b``; in the original rows.
-
-    Rows in which the solver left noise are cleared at several levels: a row of zeros meets its condition.
-    """
-    try:
-        _, scaled_factor = _step(A, frame, frame, b, basis, None, tolerance, clarabel)
-    except NoCertificate:
-        return []
-    unit = np.sqrt(np.diag(scaled(A, frame))) if (np.diag(A) > 0).all() else np.ones(len(A))
-    size = np.einsum("ij,ij->i", scaled_factor, scaled_factor) * unit**2  # of X in the solver's own rows
-    found: list[np.ndarray] = []
-    for noise in (0.0, 1e-14, 1e-12, 1e-10, 1e-8) if basis is None else (0.0,):
-        kept = size > noise * size.max()
-        if found and kept.all():
-            continue
-        Y = np.where(kept[:, None], np.exp(-frame / 2)[:, None] * scaled_factor, 0.0)
-        top = np.abs(Y).max(initial=0.0)
-        if top > 0 and math.isfinite(top):
-            found.append(Y / top)
-    return found
 
 
 def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
@@ -447,14 +381,10 @@ def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
     A, Y = square(A), np.asarray(Y, dtype=float)
     if Y.ndim != 2 or len(Y) != len(A):
         raise MatrixError(f"Y has shape {Y.shape}, not ({len(A)}, k)")
-    moved, size = 2 * np.einsum("ij,ij->i", A @ Y, Y), np.einsum("ij,ij->i", Y, Y)
-    # What rounding may have taken from these sums.
-    moved += (
-        (len(A) + Y.shape[1] + 4) * np.finfo(float).eps * 2 * np.einsum("ij,ij->i", np.abs(A) @ np.abs(Y), np.abs(Y))
-    )
-    if not size.any():
-        return math.inf
-    return float((moved[size > 0] / size[size > 0]).max())
+    moved, size, terms = ((M * N).sum(axis=1) for M, N in ((A @ Y, Y), (Y, Y), (np.abs(A) @ np.abs(Y), np.abs(Y))))
+    # What rounding may have taken from the sums is added.
+    moved += (len(A) + Y.shape[1] + 4) * np.finfo(float).eps * terms
+    return float((2 * moved[size > 0] / size[size > 0]).max()) if size.any() else math.inf
 
 
 def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e-9) -> list[list[Fraction]] | None:
@@ -500,13 +430,14 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
     exact = [[Fraction(float(x)) for x in row] for row in A]
     if (low := np.flatnonzero(2 * np.diag(A) <= rate)).size:
         return [[Fraction(int(i == low[0]))] for i in range(len(A))]
+    search = _RateSearch(A, None, tolerance)
     try:
-        log_omega, _ = _start(A, None, None)
+        log_omega = search.start().log_omega
     except NoCertificate:
         return None
     attempts = [(np.zeros(len(A)), tolerance), (log_omega, tolerance), (_balanced(A), tolerance / 100)]
     for frame, accuracy in attempts:
-        for Y in _dual_factors(A, frame, rate, None, accuracy):
+        for Y in search.dual_factors(frame, rate, accuracy):
             # Columns by size: small ones carry the solver's noise, and the sum often passes without them.
             order = np.argsort(-np.einsum("ij,ij->j", Y, Y))
             for count in sorted({len(order), 1, 2}):
@@ -568,11 +499,11 @@ def rate_frontier(
     A = square(A)
     if len(A) == 0:
         raise MatrixError("A has no rows")
-    basis = _basis(basis, len(A))
-    points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), basis))]
+    search = _RateSearch(A, _basis(basis, len(A)), tolerance)
+    points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), search.basis))]
     known = None if best is None else best.log_omega
     if conditions is None:
-        best = _rate_optimum(A, None, basis, tolerance) if best is None else best
+        best = search.optimum(None) if best is None else best
         known = best.log_omega
         top = min(best.log_condition, math.log(1e8))
         conditions = [math.exp(top * share) for share in (0.9, 0.7, 0.5, 0.35, 0.2, 0.1)]
@@ -580,7 +511,7 @@ def rate_frontier(
     for condition in conditions:
         if condition > 1:
             with contextlib.suppress(NoCertificate):
-                points.append(_climb(A, condition, basis, tolerance, steps=12, known=known)[1])
+                points.append(replace(search, max_condition=condition).climb(known, steps=12)[1])
                 known = points[-1].log_omega
     points.sort(key=lambda point: (point.log_condition, -point.rate))
     frontier: list[DiagonalCertificate] = []
@@ -604,14 +535,6 @@ def _basis(basis: Any, n: int) -> np.ndarray | None:
 def _rounding(A: np.ndarray, log_omega: np.ndarray) -> float:
     """Bound what rounding may add to :func:`diagonal_rate`; a smaller rate is none."""
     return len(A) * np.finfo(float).eps * float(np.abs(scaled(A, log_omega)).sum(axis=1).max())
-
-
-def _rate_or_none(A: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> float | None:
-    try:
-        rate = diagonal_rate(A, log_omega, basis)
-    except (NoCertificate, np.linalg.LinAlgError):
-        return None
-    return rate if math.isfinite(rate) else None
 
 
 def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate:
@@ -649,7 +572,8 @@ def h_matrix_lyapunov(A: Any, *, tolerance: float = 1e-9) -> DiagonalCertificate
 
 
 def _margin_certificate(A: np.ndarray, omega: np.ndarray) -> DiagonalCertificate:
-    log_omega = normalised(positive(omega))
+    log_omega = np.log(positive(omega))
+    log_omega -= log_omega.max()
     margin = diagonal_margin(A, np.exp(log_omega))
     if not margin > 0:
         raise NoCertificate(f"the best margin found is {margin:.3g}, which is not positive")
@@ -669,51 +593,33 @@ def largest_entry(A: np.ndarray) -> float:
     return float(np.abs(A).max(initial=0.0)) or 1.0
 
 
-def symmetric_product(cp: Any, omega: Any, A: np.ndarray) -> Any:
-    """Return ``Omega A + A' Omega`` as a cvxpy expression that keeps the zeros of ``A``."""
-    from scipy import sparse
-
-    product = cp.diag(omega) @ sparse.csr_array(A)
-    return product + product.T
-
-
-def solve(
-    problem: Callable[[Any], tuple[cp.Problem, cp.Expression]],
-    tolerance: float,
-    solver: str = "clarabel",
-    dual: bool = False,
-) -> Any:
-    """Solve with cvxpy and return the value of the expression; the status is not trusted, only its absence.
-
-    With ``dual`` the dual matrix of the first constraint comes with it.
-    """
+def solve(A: np.ndarray, least: float, tolerance: float, solver: str) -> np.ndarray:
+    """Maximise the margin with cvxpy, and return ``Omega``; the status is not trusted, only its absence."""
     import warnings
 
     import cvxpy as cp
+    from scipy import sparse
 
     checkpoint()
-    built, expression = problem(cp)
+    n = len(A)
+    omega, t = cp.Variable(n), cp.Variable()
+    product = cp.diag(omega) @ sparse.csr_array(A)  # keeps the zeros
+    form = product + product.T - t * np.eye(n)
+    problem = cp.Problem(cp.Maximize(t), [form >> 0, omega >= least, omega <= 1])
     options: dict[str, Any] = {}  # SDPA stops where its own precision ends, whatever it is asked for
     if solver == "clarabel":
         options = {"tol_gap_abs": tolerance * 1e-3, "tol_gap_rel": tolerance, "tol_feas": tolerance}
         # The default merge of chordal cliques does not end on some sparse matrices. Small ones need no decomposition.
-        rows = max(c.shape[0] for c in built.constraints if len(c.shape) == 2)
-        options["chordal_decomposition_enable"] = rows > CLARABEL_MARGIN_ROWS
+        options["chordal_decomposition_enable"] = n > CLARABEL_MARGIN_ROWS
         options["chordal_decomposition_merge_method"] = "parent_child"
         options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
-        _run(built, solver, options)
+        _run(problem, solver, options)
     checkpoint()
-    if expression.value is None or not np.isfinite(expression.value).all():
-        raise NoCertificate(f"the solver answered {built.status}")
-    value = np.atleast_1d(np.asarray(expression.value, dtype=np.float64))
-    if not dual:
-        return value
-    matrix = built.constraints[0].dual_value
-    if matrix is None or not np.isfinite(matrix).all():
-        raise NoCertificate("the solver returned no dual solution")
-    return value, np.atleast_2d(matrix)
+    if omega.value is None or not np.isfinite(omega.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    return omega.value
 
 
 def _run(built: Any, solver: str, options: dict[str, Any]) -> None:

@@ -71,20 +71,6 @@ class DiagonalCertificate:
         return self.upper / self.rate - 1 if self.rate > 0 else math.inf
 
 
-def normalised(omega: np.ndarray) -> np.ndarray:
-    """Return ``ln(omega / max(omega))`` of a positive diagonal.
-
-    Raises
-    ------
-    NoCertificate
-        An entry is not positive or not finite.
-    """
-    if not (np.isfinite(omega).all() and (omega > 0).all()):
-        raise NoCertificate("the solver returned no positive diagonal")
-    log = np.log(omega)
-    return log - log.max()
-
-
 def diagonal_margin(A: Any, omega: np.ndarray) -> float:
     """Return ``lmin(Omega A + A' Omega)`` with ``Omega = diag(omega)``.
 
@@ -166,8 +152,10 @@ def diagonal_rate(A: Any, log_omega: np.ndarray, basis: np.ndarray | None = None
     return float(np.linalg.eigvalsh((S + S.T) / 2)[0])
 
 
-def scaled(A: np.ndarray, log_omega: np.ndarray) -> np.ndarray:
+def scaled(A: np.ndarray, log_omega: np.ndarray, log_columns: np.ndarray | None = None) -> np.ndarray:
     """Return ``Omega^1/2 A Omega^-1/2``, formed entry by entry so that no factor overflows where the product does not.
+
+    With ``log_columns`` the columns of a block beside the diagonal have weights of their own.
 
     Raises
     ------
@@ -175,10 +163,12 @@ def scaled(A: np.ndarray, log_omega: np.ndarray) -> np.ndarray:
         An entry of the product itself overflows.
     """
     rows, columns = np.nonzero(A)
+    log_columns = log_omega if log_columns is None else log_columns
     B = np.zeros_like(A)
     with np.errstate(over="ignore"):
         values = A[rows, columns]
-        B[rows, columns] = np.sign(values) * np.exp(np.log(np.abs(values)) + (log_omega[rows] - log_omega[columns]) / 2)
+        apart = log_omega[rows] - log_columns[columns]
+        B[rows, columns] = np.sign(values) * np.exp(np.log(np.abs(values)) + apart / 2)
     if not np.isfinite(B).all():
         raise NoCertificate("the weights lie too far apart for floating point")
     return B

@@ -114,9 +114,8 @@ def full_frontier(
             continue
         tried.add(len(groups))
         checkpoint()
-        blocks = _Blocks.of(A, vectors, groups)
-        if blocks is not None:
-            found += [_certificate(A, blocks.lyapunov(decay * (1 - loss))) for loss in losses]
+        if blocks := _blocks(A, vectors, groups):
+            found += [_certificate(A, _lyapunov(blocks, decay * (1 - loss))) for loss in losses]
     points = sorted((c for c in found if c is not None), key=lambda c: (c.condition, -c.rate))
     frontier: list[FullCertificate] = []
     for point in points:
@@ -136,45 +135,37 @@ def _groups(decay: np.ndarray, split: float) -> list[np.ndarray]:
     return np.split(order, np.flatnonzero(faster) + 1)
 
 
-@dataclass(frozen=True)
-class _Blocks:
-    """``A`` in a basis of invariant subspaces, each with its real Schur form."""
+def _blocks(A: np.ndarray, vectors: np.ndarray, groups: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Split ``A`` by invariant subspaces: ``(T, R)`` of each with ``R A = T R``, ``T`` a real Schur form.
 
-    inverse: np.ndarray
-    forms: tuple[tuple[np.ndarray, np.ndarray], ...]  # (T, U) with A_i = U T U'
+    Empty where the basis is too ill-conditioned to be of use.
+    """
+    from scipy.linalg import schur
 
-    @classmethod
-    def of(cls, A: np.ndarray, vectors: np.ndarray, groups: list[np.ndarray]) -> _Blocks | None:
-        from scipy.linalg import schur
-
-        if len(groups) == 1:
-            return cls(np.eye(len(A)), (schur(A, output="real"),))
-        parts = []
-        for group in groups:
-            span = np.hstack([vectors[:, group].real, vectors[:, group].imag])
-            parts.append(np.linalg.svd(span, full_matrices=False)[0][:, : len(group)])
-        X = np.hstack(parts)
+    X: np.ndarray = np.eye(len(A))
+    inverse: np.ndarray = X
+    if len(groups) > 1:
+        spans = [np.hstack([vectors[:, group].real, vectors[:, group].imag]) for group in groups]
+        parts = [np.linalg.svd(span, full_matrices=False)[0] for span in spans]
+        X = np.hstack([part[:, : len(group)] for part, group in zip(parts, groups, strict=True)])
         size = np.linalg.svd(X, compute_uv=False)
         if not size[-1] * _LARGEST_BASIS > size[0]:
-            return None
-        inverse, used, forms = np.linalg.inv(X), 0, []
-        for part in parts:
-            rows = inverse[used : used + part.shape[1]]
-            forms.append(schur(rows @ A @ part, output="real"))
-            used += part.shape[1]
-        return cls(inverse, tuple(forms))
+            return []
+        inverse = np.linalg.inv(X)
+    blocks = []
+    for own in np.split(np.arange(len(A)), np.cumsum([len(group) for group in groups])[:-1]):
+        T, U = schur(inverse[own] @ A @ X[:, own], output="real")
+        blocks.append((T, U.T @ inverse[own]))
+    return blocks
 
-    def lyapunov(self, a: float) -> np.ndarray | None:
-        """Return ``P`` that decays at ``2 a``; None where floating point ends."""
-        P, used = np.zeros_like(self.inverse), 0
-        for T, U in self.forms:
-            block = _corrected_identity(T, a)
-            if block is None:
-                return None
-            rows = U.T @ self.inverse[used : used + len(T)]
-            P += rows.T @ block @ rows
-            used += len(T)
-        return (P + P.T) / 2
+
+def _lyapunov(blocks: list[tuple[np.ndarray, np.ndarray]], a: float) -> np.ndarray | None:
+    """Return ``P`` that decays at ``2 a``; None where floating point ends."""
+    own = [_corrected_identity(T, a) for T, _ in blocks]
+    if any(block is None for block in own):
+        return None
+    P = sum(R.T @ block @ R for block, (_, R) in zip(own, blocks, strict=True))
+    return (P + P.T) / 2
 
 
 def _corrected_identity(T: np.ndarray, a: float) -> np.ndarray | None:

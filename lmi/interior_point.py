@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,14 +65,12 @@ class Solution:
         Dual matrix, positive semidefinite up to rounding: ``<X, W> = 1``.
     value : float
         What ``X`` proves up to rounding, however inexact it is: no admissible ``omega`` has a larger ``t``.
-    iterations : int
     """
 
     omega: np.ndarray
     t: float
     X: np.ndarray
     value: float
-    iterations: int
 
 
 def maximise_margin(
@@ -221,14 +220,12 @@ class _Problem:
         n = len(weight)
         self.groups = np.arange(n) if groups is None else np.asarray(groups)
         self.count = int(self.groups.max()) + 1  # of the weights
-        self._order = np.argsort(self.groups, kind="stable")
-        self._starts = np.searchsorted(self.groups[self._order], np.arange(self.count))
         sparsely = n > _DENSE_ROWS and entries.nnz <= _SPARSE_SHARE * n * n
         self.C: Any = sparse.csr_array(entries) if sparsely else entries.toarray()
         self.weight, self._U = weight, U
         self._rows, self._columns, self._data = entries.row, entries.col, entries.data
 
-    def combine(self, y: np.ndarray) -> Any:
+    def form(self, y: np.ndarray) -> Any:
         """Return ``sum_i omega_i F_i - t W`` in n rows, not yet restricted; sparse if ``C`` is."""
         omega, t = y[self.groups], y[self.count]
         if isinstance(self.C, np.ndarray):
@@ -242,6 +239,10 @@ class _Problem:
 
     def lift(self, form: np.ndarray) -> np.ndarray:
         return form if self._U is None else self._U @ form @ self._U.T
+
+    def slack(self, y: np.ndarray) -> np.ndarray:
+        """Return ``S = sum_i omega_i F_i - t W``, restricted and dense."""
+        return _dense(self.restrict(self.form(y)))
 
     def inner(self, form: np.ndarray) -> np.ndarray:
         """Return ``<F_i, form>`` for every i and ``-<W, form>``; ``form`` need not be symmetric."""
@@ -258,8 +259,8 @@ class _Problem:
         pairs = CX * GC + CG * XC + (C @ XC) * G + (C @ GC) * X
         mixed = -np.einsum("ij,ij,j->i", CX, G, weight) - np.einsum("ij,ij,j->i", CG, X, weight)
         if n < len(weight):
-            pairs = np.add.reduceat(np.add.reduceat(pairs[self._order][:, self._order], self._starts), self._starts, 1)
-            mixed = np.add.reduceat(mixed[self._order], self._starts)
+            own = sparse.csr_array(np.eye(n)[:, self.groups])
+            pairs, mixed = own @ (own @ pairs).T, own @ mixed
         M[:n, :n] = pairs
         M[:n, n] = M[n, :n] = mixed
         M[n, n] = weight @ (X * G) @ weight
@@ -269,41 +270,50 @@ class _Problem:
 # ---------------------------------------------------------------------- the iteration
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """``y = (omega, t, low)``, multipliers ``z`` of the slacks, ``X``; Cholesky's factors of ``X`` and ``S``."""
+
+    X: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    own: np.ndarray
+    factor: np.ndarray
+
+
 def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution:
-    """Iterate on ``y = (omega, t, extra)`` with slacks ``s`` of the weights and their multipliers ``z``."""
     n = problem.count
     y = np.insert(weights.start, n, _first_t(problem, weights.start[:n]))
     X = problem.lift(np.eye(len(problem.restrict(np.eye(len(problem.weight))))))
     X /= problem.weight @ np.diag(X)
     z = (float(np.abs(problem.inner(X)[:n]).max()) or 1.0) / np.maximum(np.abs(weights.own), np.abs(weights.shared))
-    own, factor = _cholesky(problem.restrict(X)), _cholesky(_dense(problem.restrict(problem.combine(y))))
+    own, factor = _cholesky(problem.restrict(X)), _cholesky(problem.slack(y))
     if own is None or factor is None:
         raise NoCertificate("the interior-point method broke down at its start")
-    lower, upper, idle, iteration = y, (np.inf, X), 0, 0
-    while iteration < _MOST_ITERATIONS:
+    point: _Point | None = _Point(X, y, z, own, factor)
+    lower, upper, idle = y, (np.inf, X), 0
+    for _ in range(_MOST_ITERATIONS):
         checkpoint()
-        iteration += 1
+        if point is None:
+            break
         before = upper[0] - float(lower[n])
-        pull = problem.inner(X)
+        pull = problem.inner(point.X)
         value = weights.bound(pull[:n] / -pull[n])
         if value < upper[0]:
-            upper = value, X / -pull[n]
-        if y[n] > lower[n]:
-            lower = y
+            upper = value, point.X / -pull[n]
+        if point.y[n] > lower[n]:
+            lower = point.y
         gap, size = upper[0] - float(lower[n]), max(abs(upper[0]), _SMALL)
         idle = idle + 1 if 4 * gap > before and gap <= _NEAR * size else 0
         if gap <= tolerance * size or idle >= _PATIENCE:
             break
-        step = _Newton(problem, weights, X, y, z, own, factor).step()
-        if step is None:
-            break
-        X, y, z, own, factor = step
-    return Solution(lower[problem.groups], float(lower[n]), problem.restrict(upper[1]), upper[0], iteration)
+        point = _Newton(problem, weights, point).step()
+    return Solution(lower[problem.groups], float(lower[n]), problem.restrict(upper[1]), upper[0])
 
 
 def _first_t(problem: _Problem, omega: np.ndarray) -> float:
     """Return a ``t`` at which the form is well inside the cone."""
-    form = _dense(problem.restrict(problem.combine(np.append(omega, 0.0))))
+    form = problem.slack(np.append(omega, 0.0))
     low = float(np.linalg.eigvalsh(form)[0])
     t = min(low / problem.weight.min(), low / problem.weight.max())
     return t - 0.1 * abs(t) - 0.1 * float(np.abs(form).max())
@@ -325,37 +335,27 @@ class _Direction:
 class _Newton:
     """One linearisation, solved for a predictor and a corrector."""
 
-    def __init__(
-        self,
-        problem: _Problem,
-        weights: _Weights,
-        X: np.ndarray,
-        y: np.ndarray,
-        z: np.ndarray,
-        own: np.ndarray,
-        factor: np.ndarray,
-    ):
-        self.problem, self.weights, self.X, self.y, self.z = problem, weights, X, y, z
-        self.own, self.factor = own, factor
+    def __init__(self, problem: _Problem, weights: _Weights, point: _Point):
+        self.problem, self.weights, self.at = problem, weights, point
+        y, n = point.y, problem.count
         self.s = weights.slacks(y)
-        self.G = problem.lift(_inverse(factor))
-        K = problem.schur(X, self.G, len(y))
-        weights.add_to(K, z / self.s)
-        n = problem.count
-        border = np.append(np.ones(n), np.zeros(len(y) - n)) if weights.fixed else None
-        self.system = _System(K, border, n - float(y[:n].sum()))
+        self.G = problem.lift(_inverse(point.factor))
+        K = problem.schur(point.X, self.G, len(y))
+        weights.add_to(K, point.z / self.s)
+        self.solve = _solver(
+            K, np.append(np.full(n, float(weights.fixed)), np.zeros(len(y) - n)), n - float(y[:n].sum())
+        )
 
-    def step(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return the next ``X``, ``y``, ``z`` and the factors of ``X`` and ``S``; None where precision ends."""
-        X, y, z, s, problem = self.X, self.y, self.z, self.s, self.problem
-        order = len(self.factor) + s.size
-        mu = (self._pair(X, y) + float(np.vdot(z, s))) / order
+    def step(self) -> _Point | None:
+        """Return the next point; None where precision ends."""
+        X, y, z, s, problem = self.at.X, self.at.y, self.at.z, self.s, self.problem
+        order = len(self.at.factor) + s.size
+        mu = self._product(X, y, z, s) / order
         first = self._direction(0.0, None)
         if first is None:
             return None
         primal, dual = min(first.primal, 1.0), min(first.dual, 1.0)
-        after = self._pair(X + primal * first.X, y + dual * first.y)
-        after += float(np.vdot(z + primal * first.z, s + dual * first.s))
+        after = self._product(X + primal * first.X, y + dual * first.y, z + primal * first.z, s + dual * first.s)
         sigma = min(max(after / (order * mu), 1e-3) ** 2, 1.0)
         last = self._direction(sigma * mu, first)
         if last is None or not np.isfinite(last.X).all() or max(last.primal, last.dual) < 1e-8:
@@ -364,69 +364,40 @@ class _Newton:
         # Lanczos' method can overestimate a step, and all ends at the boundary: shorter until there are factors.
         for _ in range(20):
             own = _cholesky(problem.restrict(X + primal * last.X))
-            factor = _cholesky(_dense(problem.restrict(problem.combine(y + dual * last.y))))
+            factor = _cholesky(problem.slack(y + dual * last.y))
             if own is not None and factor is not None:
-                return X + primal * last.X, y + dual * last.y, z + primal * last.z, own, factor
+                return _Point(X + primal * last.X, y + dual * last.y, z + primal * last.z, own, factor)
             primal, dual = (0.8 * primal if own is None else primal), (0.8 * dual if factor is None else dual)
         return None
 
-    def _pair(self, X: np.ndarray, y: np.ndarray) -> float:
-        """Return ``<X, sum_i omega_i F_i - t W>``."""
+    def _product(self, X: np.ndarray, y: np.ndarray, z: np.ndarray, s: np.ndarray) -> float:
+        """Return ``<X, S> + <z, s>``."""
         pull = self.problem.inner(X)
-        return float(pull @ y[: len(pull)])
+        return float(pull @ y[: len(pull)]) + float(np.vdot(z, s))
 
     def _direction(self, target: float, predicted: _Direction | None) -> _Direction | None:
         """Aim at ``X S = target I``, ``z s = target``, with the second-order terms of a predicted step."""
-        problem, X, z, s = self.problem, self.X, self.z, self.s
+        problem, X, z, s = self.problem, self.at.X, self.at.z, self.s
         centre, plain = target * self.G, target / s
         second: Any = 0.0
         if predicted is not None:
             second = predicted.X @ predicted.moved
             plain = plain - predicted.z * predicted.s / s
         pull = problem.inner(centre - second)
-        rhs = self.weights.adjoint(plain, len(self.y))
+        rhs = self.weights.adjoint(plain, len(self.at.y))
         rhs[: len(pull)] += pull
         rhs[len(pull) - 1] += 1.0
-        dy = self.system.solve(rhs)
-        if dy is None or not np.isfinite(dy).all():
+        dy = self.solve(rhs)
+        if not np.isfinite(dy).all():
             return None
-        dS, ds = problem.combine(dy), self.weights.slacks(dy, 0.0)
+        dS, ds = problem.form(dy), self.weights.slacks(dy, 0.0)
         moved = dS @ self.G
         product = X @ moved + second
         dX = centre - X - (product + product.T) / 2
         dz = plain - z - z * ds / s
-        primal = min(_reach(self.own, problem.restrict(dX)), _reach_plain(z, dz))
-        dual = min(_reach(self.factor, problem.restrict(dS)), _reach_plain(s, ds))
+        primal = min(_reach(self.at.own, problem.restrict(dX)), _reach_plain(z, dz))
+        dual = min(_reach(self.at.factor, problem.restrict(dS)), _reach_plain(s, ds))
         return _Direction(dy, dX, dz, ds, moved, primal, dual)
-
-
-class _System:
-    """A positive definite system, factored once, with an optional condition ``border' dy = defect``.
-
-    Rows and columns are scaled to a unit diagonal: the weights of the blocks lie far apart near the end.
-    """
-
-    def __init__(self, K: np.ndarray, border: np.ndarray | None, defect: float):
-        self._unit = 1 / np.sqrt(np.maximum(np.diag(K), 1e-300))
-        K *= self._unit
-        K *= self._unit[:, None]
-        self._K, self._plain = K, _solver(K)
-        self._border, self._defect = (None if border is None else self._unit * border), defect
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray | None:
-        """Solve with two steps of iterative refinement; None if the system is singular."""
-        if self._plain is None:
-            return None
-        rhs = self._unit * rhs
-        x, multiplier = np.zeros(len(rhs)), 0.0
-        border = np.zeros(len(rhs)) if self._border is None else self._border
-        answer = self._plain(border)
-        for _ in range(3):
-            x = x + self._plain(rhs - self._K @ x - multiplier * border)
-            if self._border is not None:
-                more = float(border @ x - self._defect) / float(border @ answer)
-                x, multiplier = x - more * answer, multiplier + more
-        return self._unit * x
 
 
 # ---------------------------------------------------------------------- linear algebra
@@ -442,15 +413,29 @@ def _cholesky(S: np.ndarray) -> np.ndarray | None:
     return factor if info == 0 and np.isfinite(np.diag(factor)).all() else None
 
 
-def _solver(K: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Return what solves with ``K``: Cholesky's factor, or pivots where rounding has cost it its definiteness."""
-    factor = _cholesky(K)
-    if factor is not None:
-        return lambda rhs: lapack.dpotrs(factor, rhs, lower=1)[0]
-    lu, pivots, singular = lapack.dgetrf(K)
-    if singular or not np.isfinite(lu).all():
-        return None
-    return lambda rhs: lapack.dgetrs(lu, pivots, rhs)[0]
+def _solver(K: np.ndarray, border: np.ndarray, defect: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return what solves ``K dy + m border = rhs`` with two steps of iterative refinement.
+
+    ``m`` is such that ``border' dy = defect``, or 0 without a border. Rows and columns are scaled to a unit diagonal:
+    the weights of the blocks lie far apart near the end. By Cholesky's factor, or by pivots where rounding has cost
+    ``K`` its definiteness; what it returns is not finite if the system is singular.
+    """
+    unit = 1 / np.sqrt(np.maximum(np.diag(K), 1e-300))
+    K, border = unit[:, None] * (K * unit), unit * border
+    plain = partial(lapack.dpotrs, _cholesky(K), lower=1)
+    if plain.args[0] is None:
+        plain = partial(lapack.dgetrs, *lapack.dgetrf(K)[:2])
+
+    def solve(rhs: np.ndarray) -> np.ndarray:
+        x, multiplier, answer = np.zeros(len(rhs)), 0.0, plain(border)[0]
+        for _ in range(3):
+            x = x + plain(unit * rhs - K @ x - multiplier * border)[0]
+            if border.any():
+                more = float(border @ x - defect) / float(border @ answer)
+                x, multiplier = x - more * answer, multiplier + more
+        return unit * x
+
+    return solve
 
 
 def _inverse(factor: np.ndarray) -> np.ndarray:

@@ -8,16 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.diagonal import (
-    CLARABEL_MARGIN_ROWS,
-    RESOLVED,
-    diagonal_lyapunov,
-    h_matrix_lyapunov,
-    largest_entry,
-    positive,
-    solve,
-    symmetric_product,
-)
+from lmi.diagonal import RESOLVED, diagonal_lyapunov, h_matrix_lyapunov, largest_entry, positive
 from lmi.errors import MatrixError
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import square
@@ -117,7 +108,10 @@ def coupled_lyapunov(
 
         maximise t   subject to   [[Gamma, A_FL' Y], [Y A_FL, Y A_F + A_F' Y]] >= t I,   all diagonals <= 1,
 
-    whose optimum is the largest ``lmin(Pi) / lmax(H)`` of the paper over free blocks, ``Y = rho H_F`` and ``rho``.
+    whose optimum is the largest ``lmin(Pi) / lmax(H)`` of the paper over free blocks, ``Y = rho H_F`` and ``rho``. Of a
+    free block ``t_k`` alone enters, from 0 to its own best margin: that margin's ``H_k`` is found first and scaled, so
+    that each block of leaders is one weight, and the matrix is ``W C + C'W`` with half its decrease on the diagonal of
+    ``C``.
 
     Parameters
     ----------
@@ -167,101 +161,29 @@ def coupled_lyapunov(
         raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
     scale = max(largest_entry(A_F), *(largest_entry(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
-    fixed_top = max((float(b.omega.max()) for b in fixed), default=1.0)
-    if n_L + n_F > CLARABEL_MARGIN_ROWS:
-        return _coupled_large(leaders, A_FL / scale, A_F / scale, scale, fixed_top, tolerance)
-
-    def problem(cp: Any) -> tuple[Any, Any]:
-        s = cp.Variable() if fixed else cp.Constant(1.0)
-        t, Y = cp.Variable(), cp.Variable(n_F) if n_F else cp.Constant(np.zeros(0))
-        diagonal, constraints, free = [], [Y >= 0, Y <= 1] if n_F else [], []
-        if fixed:
-            constraints += [s >= 0, s <= 1]
-        for block, k in zip(leaders, sizes, strict=True):
-            if isinstance(block, FixedLeader):
-                diagonal.append(s * (block.decrease / (fixed_top * scale)))
-            else:
-                H, t_k = cp.Variable(k), cp.Variable()
-                constraints += [H >= 0, H <= 1]
-                if k > 1:
-                    constraints.append(symmetric_product(cp, H, square(block.A) / scale) - t_k * np.eye(k) >> 0)
-                else:
-                    constraints.append(2 * H[0] * float(np.squeeze(block.A)) / scale >= t_k)
-                diagonal.append(t_k * np.ones(k))
-                free.append(H)
-        if n_F:
-            followers = symmetric_product(cp, Y, A_F / scale)
-            coupling = cp.diag(Y) @ (A_FL / scale)
-            Pi = cp.bmat([[cp.diag(cp.hstack(diagonal)), coupling.T], [coupling, followers]])
-        else:
-            Pi = cp.diag(cp.hstack(diagonal))
-        constraints.append(Pi - t * np.eye(n_L + n_F) >> 0)
-        return cp.Problem(cp.Maximize(t), constraints), cp.hstack([s, t, Y, *free] if n_F else [s, t, *free])
-
-    values = solve(problem, tolerance)
-    s, t, Y, rest = values[0], values[1], values[2 : 2 + n_F], values[2 + n_F :]
-    if not (t > RESOLVED * tolerance and s > 0):
-        return _block_by_block(leaders, A_F, fixed_top, tolerance)
-    found, used = [], 0
-    unit = fixed_top / s if fixed else 1.0
-    for block, k in zip(leaders, sizes, strict=True):
-        if isinstance(block, FixedLeader):
-            found.append(block.omega)
-        else:
-            found.append(positive(rest[used : used + k]) * unit)
-            used += k
-    return CoupledCertificate(tuple(found), positive(Y) * unit if n_F else Y)
-
-
-def _coupled_large(
-    leaders: Sequence[FixedLeader | FreeLeader],
-    A_FL: np.ndarray,
-    A_F: np.ndarray,
-    scale: float,
-    top: float,
-    tolerance: float,
-) -> CoupledCertificate:
-    """Couple blocks by the interior-point method: free leader blocks at their own best margin, all scaled together.
-
-    The blocks are in units of ``scale``, fixed ones have ``top`` as their largest entry. A block of leaders is one
-    weight: ``Pi`` is ``W C + C'W`` with half its decrease on the diagonal of ``C``.
-    """
+    top = max((float(b.omega.max()) for b in fixed), default=1.0)
     omegas, halves, groups = [], [], []
     for k, block in enumerate(leaders, start=1):
         if isinstance(block, FixedLeader):
-            omegas.append(block.omega / top)
-            halves.append(block.decrease / (2 * top * scale))
+            group, omega, half = 0, block.omega / top, block.decrease / (2 * top * scale)
         else:
-            found = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
-            omegas.append(found.omega)
-            halves.append(np.full(len(found.omega), found.rate / (2 * scale)))
-        groups.append(np.full(len(omegas[-1]), 0 if isinstance(block, FixedLeader) else k))
-    shared, n_L = np.unique(np.concatenate(groups), return_inverse=True)[1], sum(map(len, omegas))
-    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, len(A_F)))], [A_FL, A_F]])
-    own = np.concatenate([shared, shared.max() + 1 + np.arange(len(A_F))])
+            best = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
+            group, omega, half = k, best.omega, np.full(len(best.omega), best.rate / (2 * scale))
+        omegas.append(omega)
+        halves.append(half)
+        groups.append(np.full(len(omega), group))
+    shared = np.unique(np.concatenate(groups), return_inverse=True)[1]
+    C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, n_F))], [A_FL / scale, A_F / scale]])
+    own = np.concatenate([shared, shared.max() + 1 + np.arange(n_F)])
     solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
-    weights = positive(solution.omega)
-    if not solution.t > RESOLVED * tolerance:
-        return _block_by_block(leaders, A_F * scale, top, tolerance)
-    fixed = [i for i, group in enumerate(groups) if not group[0]]
-    starts = np.cumsum([0, *map(len, omegas)])
-    unit = top / weights[starts[fixed[0]]] if fixed else 1.0
-    return CoupledCertificate(
-        tuple(
-            block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
-            for block, omega, start in zip(leaders, omegas, starts, strict=False)
-        ),
-        weights[n_L:] * unit,
-    )
-
-
-def _block_by_block(
-    leaders: Sequence[FixedLeader | FreeLeader], A_F: np.ndarray, top: float, tolerance: float
-) -> CoupledCertificate:
-    """Find each block by itself, for when the best joint rate lies below what the solver resolves."""
-    found = tuple(
-        block.omega if isinstance(block, FixedLeader) else top * diagonal_lyapunov(block.A, tolerance=tolerance).omega
-        for block in leaders
-    )
-    followers = top * h_matrix_lyapunov(A_F, tolerance=tolerance).omega if len(A_F) else np.zeros(0)
-    return CoupledCertificate(found, followers)
+    if solution.t > RESOLVED * tolerance:
+        weights = positive(solution.omega)
+    else:  # the best joint rate lies below what the method resolves: each block by itself
+        followers = h_matrix_lyapunov(A_F, tolerance=tolerance).omega if n_F else np.zeros(0)
+        weights = np.append(np.ones(n_L), followers)
+    unit = top / weights[:n_L][np.concatenate(groups) == 0][0] if fixed else 1.0
+    found = [
+        block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
+        for block, omega, start in zip(leaders, omegas, np.cumsum([0, *sizes[:-1]]), strict=True)
+    ]
+    return CoupledCertificate(tuple(found), weights[n_L:] * unit)

@@ -14,6 +14,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from lmi.errors import MatrixError
 
@@ -33,11 +35,36 @@ def square(A: Any, name: str = "A") -> np.ndarray:
         dense = dense.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         raise MatrixError(f"{name} is not a matrix of real numbers") from None
-    if dense.ndim != 2 or dense.shape[0] != dense.shape[1]:
-        raise MatrixError(f"{name} has shape {dense.shape}, not (n, n)")
-    if not np.isfinite(dense).all():
-        raise MatrixError(f"{name} has an entry that is not finite")
+    _require_square(dense.shape, dense, name)
     return dense
+
+
+def sparse_square(A: Any) -> sparse.csr_array:
+    """Return ``A`` as a sparse float64 matrix without stored zeros.
+
+    Raises
+    ------
+    MatrixError
+        ``A`` is not a real, finite, square matrix, or has no rows.
+    """
+    if not sparse.issparse(A):
+        A = square(A)
+    elif A.dtype.kind not in "biuf":
+        raise MatrixError("A is not a matrix of real numbers")
+    found = sparse.csr_array(A, dtype=np.float64, copy=True)
+    _require_square(found.shape, found.data, "A")
+    if found.shape[0] == 0:
+        raise MatrixError("A has no rows")
+    found.sum_duplicates()
+    found.eliminate_zeros()
+    return found
+
+
+def _require_square(shape: tuple[int, ...], entries: np.ndarray, name: str) -> None:
+    if len(shape) != 2 or shape[0] != shape[1]:
+        raise MatrixError(f"{name} has shape {shape}, not (n, n)")
+    if not np.isfinite(entries).all():
+        raise MatrixError(f"{name} has an entry that is not finite")
 
 
 def comparison_matrix(A: Any) -> np.ndarray:
@@ -223,30 +250,35 @@ def irreducible_blocks(A: Any) -> list[np.ndarray]:
     >>> irreducible_blocks([[1, 0, 2], [0, 1, 0], [3, 1, 1]])
     [array([1]), array([0, 2])]
     """
-    from scipy import sparse
-    from scipy.sparse.csgraph import connected_components
+    label, depth = block_depths(sparse.csr_array(A))
+    blocks = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1])
+    return sorted(blocks, key=lambda rows: (depth[label[rows[0]]], rows[0]))
 
-    pattern = sparse.csr_array(A)
-    count, part = connected_components(pattern, directed=True, connection="strong")
-    edges = pattern.tocoo()
-    driven, drives = part[edges.row], part[edges.col]
-    between = driven != drives
-    waits = sparse.csr_array(
-        (np.ones(int(between.sum())), (drives[between], driven[between])), shape=(count, count)
-    )  # summed: one entry for each pair
-    waits.data[:] = 1
-    missing = np.bincount(waits.indices, minlength=count)
-    order = np.argsort(part, kind="stable")
-    members = np.split(order, np.cumsum(np.bincount(part, minlength=count))[:-1])
-    ready = sorted(np.flatnonzero(missing == 0).tolist(), key=lambda k: int(members[k][0]))
-    blocks: list[np.ndarray] = []
-    for k in ready:  # grows while it is read
-        blocks.append(members[k])
-        for driven_part in waits.indices[waits.indptr[k] : waits.indptr[k + 1]].tolist():
-            missing[driven_part] -= 1
-            if missing[driven_part] == 0:
-                ready.append(driven_part)
-    return blocks
+
+def block_depths(A: sparse.csr_array) -> tuple[np.ndarray, np.ndarray]:
+    """Return the irreducible block of each row, and the depth of each block.
+
+    That is 0 of a block that nothing drives, otherwise 1 + that of the deepest one by which it is driven.
+
+    Examples
+    --------
+    >>> label, depth = block_depths(sparse.csr_array([[1, 0, 2], [0, 1, 0], [3, 1, 1]]))
+    >>> depth[label].tolist()
+    [1, 0, 1]
+    """
+    count, label = connected_components(A, connection="strong")
+    entries = A.tocoo()
+    rows, columns = label[entries.row], label[entries.col]
+    keep = rows != columns
+    graph = sparse.csr_array((np.ones(keep.sum()), (rows[keep], columns[keep])), shape=(count, count))
+    waiting, dependents = np.diff(graph.indptr), graph.tocsc()
+    depth, frontier, level = np.zeros(count, dtype=int), np.flatnonzero(waiting == 0), 0
+    while frontier.size:
+        depth[frontier] = level
+        touched, hits = np.unique(dependents[:, frontier].indices, return_counts=True)
+        waiting[touched] -= hits.astype(waiting.dtype)
+        frontier, level = touched[waiting[touched] == 0], level + 1
+    return label, depth
 
 
 def block_columns(basis: np.ndarray, part: np.ndarray) -> np.ndarray:

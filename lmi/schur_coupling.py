@@ -18,15 +18,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh, solve_triangular
 
 from lmi.diagonal_certificate import scaled
 from lmi.errors import MatrixError, NoCertificate
 from lmi.matrix_classes import block_columns
-
-
-def smallest_eigenvalue(S: np.ndarray) -> float:
-    """Return the smallest eigenvalue of a symmetric matrix."""
-    return float(np.linalg.eigvalsh(S)[0])
 
 
 @dataclass(frozen=True)
@@ -144,16 +140,11 @@ class Coupling:
         # In a unit of its own, so that a weak coupling does not underflow.
         unit = float(np.abs(self.A_FL).max())
         R = replace(self, A_FL=self.A_FL / unit).schur_term()
-        top = float(np.linalg.eigvalsh(R)[-1])
-        if not (top > 0 and smallest_eigenvalue(self.gamma) > 0):
+        top, low = float(np.linalg.eigvalsh(R)[-1]), float(np.linalg.eigvalsh(self.gamma)[0])
+        if not (top > 0 and low > 0):
             raise MatrixError("Gamma or the followers' decrease is not positive definite: no rho is admissible")
-        numerator = self.printed_numerator
-        if numerator is None:
-            numerator = smallest_eigenvalue(self.gamma)
-        factor = np.linalg.cholesky(self.gamma)
-        half = np.linalg.solve(factor, R)
-        whole = np.linalg.solve(factor, half.T)
-        ends = (numerator / top, 1 / float(np.linalg.eigvalsh((whole + whole.T) / 2)[-1]))
+        numerator = low if self.printed_numerator is None else self.printed_numerator
+        ends = (numerator / top, 1 / float(eigh(R, self.gamma, eigvals_only=True)[-1]))
         return RhoInterval(*(min(end / unit / unit, sys.float_info.max) for end in ends))
 
     def best_rho(self) -> float:
@@ -217,7 +208,7 @@ def golden_section(function: Any, low: float, high: float, tolerance: float = 1e
     ratio = (math.sqrt(5) - 1) / 2
     inner, outer = high - ratio * (high - low), low + ratio * (high - low)
     f_inner, f_outer = function(inner), function(outer)
-    best, f_best = max(((inner, f_inner), (outer, f_outer), (high, function(high))), key=lambda pair: pair[1])
+    best = max((f_inner, inner), (f_outer, outer), (function(high), high))
     while high - low > tolerance * high:
         if f_inner < f_outer:
             low, inner, f_inner = inner, outer, f_outer
@@ -227,10 +218,8 @@ def golden_section(function: Any, low: float, high: float, tolerance: float = 1e
             high, outer, f_outer = outer, inner, f_inner
             inner = high - ratio * (high - low)
             f_inner = function(inner)
-        for point, value in ((inner, f_inner), (outer, f_outer)):
-            if value > f_best:
-                best, f_best = point, value
-    return best
+        best = max(best, (f_inner, inner), (f_outer, outer))
+    return best[1]
 
 
 def couple_blocks(
@@ -273,8 +262,6 @@ def couple_blocks(
     >>> bool((np.linalg.eigvalsh(S + S.T - np.diag(np.exp(log_omega))) > 0).all())
     True
     """
-    from scipy.linalg import solve_triangular
-
     log_omega, n = np.array(log_omega, dtype=float), len(A)
     depth = np.zeros(n, dtype=int)
     for part in parts:
@@ -293,7 +280,7 @@ def couple_blocks(
             Q = _frame(own, log_omega, basis)
             B = scaled(A[np.ix_(own, own)], log_omega[own])
             M = Q.T @ (B + B.T) @ Q - rate * np.eye(Q.shape[1])
-            reach = _scaled_block(A, own, above, log_omega) @ frame[above, :used]
+            reach = scaled(A[np.ix_(own, above)], log_omega[own], log_omega[above]) @ frame[above, :used]
             lower = solve_triangular(factor[:used, :used], (Q.T @ reach).T, lower=True).T if used else Q.T @ reach
             top = float(np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), lower), 2)) if lower.size else 0.0
             share = -2 * math.log(top) - math.log(2) if top > 0 else 0.0
@@ -315,11 +302,3 @@ def _frame(own: np.ndarray, log_omega: np.ndarray, basis: np.ndarray | None) -> 
         return np.eye(len(own))
     weight = np.exp((log_omega[own] - log_omega[own].max()) / 2)
     return np.linalg.qr(weight[:, None] * block_columns(basis, own))[0]
-
-
-def _scaled_block(A: np.ndarray, own: np.ndarray, above: np.ndarray, log_omega: np.ndarray) -> np.ndarray:
-    """Return the rows ``own`` and columns ``above`` of ``Omega^1/2 A Omega^-1/2``."""
-    block = A[np.ix_(own, above)]
-    rows, columns = np.nonzero(block)
-    block[rows, columns] *= np.exp((log_omega[own[rows]] - log_omega[above[columns]]) / 2)
-    return block

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from lmi.definiteness_proofs import dyadic_array
+from lmi.dyadic import dyadic_array
 from lmi.errors import MatrixError
-from lmi.exact import arithmetic, fast
+from lmi.exact import fast
 from lmi.exact.definite import SparseFactor, scaled
 from lmi.exact.elementary_enclosures import rounded
+from lmi.sparse_h_matrix import diagonal_factor
 
 EPS = float(np.finfo(float).eps)
 #: Bits of a rounded factor, one after the other.
@@ -69,9 +69,6 @@ class DominanceProof:
     v: np.ndarray
     rate: Fraction
 
-    def __bool__(self) -> bool:
-        return True
-
 
 def prove_dominance(A: Any, u: Any, v: Any, *, bits: int = 22) -> DominanceProof | None:
     """Find the largest rate that two positive vectors prove for a matrix that dominates, in integers.
@@ -120,10 +117,41 @@ def prove_dominance(A: Any, u: Any, v: Any, *, bits: int = 22) -> DominanceProof
     diagonal = np.zeros(n, dtype=whole.dtype)
     diagonal[entries.row[on]] = whole[on]
     edges = entries.col[~on], entries.row[~on], whole[~on]
-    rate = arithmetic().largest_rate(n, edges, diagonal, u, v)
+    rate = _largest_rate(edges, diagonal, u, v)
     if rate is None or rate <= 0:
         return None
     return DominanceProof(u, v, rounded(rate, 53) * Fraction(2) ** power)
+
+
+def _largest_rate(edges: Any, diagonal: np.ndarray, u: np.ndarray, v: np.ndarray) -> Fraction | None:
+    """Return the least quotient of ``v_i (M u)_i + u_i (M' v)_i`` and ``u_i v_i``; None unless ``diagonal > 0``.
+
+    All in integers; ``edges`` are the columns, rows and values of the entries off the diagonal.
+    """
+    (sources, targets, weights), n = edges, len(diagonal)
+    if n == 0 or not (diagonal > 0).all():
+        return None
+    degree = max(int(np.bincount(ends, minlength=n).max()) for ends in (sources, targets))
+    weight, top, a, b = (max(int(x.max(initial=0)), -int(x.min(initial=0))) for x in (weights, diagonal, u, v))
+    # Neither the sums nor what is formed of them is larger than this in size.
+    sums, products = degree * weight * max(a, b), 2 * a * b * (top + degree * weight)
+    heard, hearing = (np.zeros(n, dtype=_kind(sums)) for _ in range(2))
+    sizes = np.abs(weights.astype(heard.dtype))
+    np.add.at(heard, targets, sizes * u[sources])
+    np.add.at(hearing, sources, sizes * v[targets])
+    heard, hearing, diagonal, u, v = (x.astype(_kind(products)) for x in (heard, hearing, diagonal, u, v))
+    x, y = 2 * diagonal * u * v - v * heard - u * hearing, u * v
+    try:  # floats tell which rows may be the least
+        ratios = x.astype(float) / y.astype(float)
+        near = np.flatnonzero(~(ratios > ratios.min() + 2.0**-48 * abs(ratios.min())))
+    except OverflowError:
+        near = np.arange(n)
+    return min(map(Fraction, x[near].tolist(), y[near].tolist()))
+
+
+def _kind(size: int) -> Any:
+    """Return the type of array that holds integers of such a size."""
+    return np.int64 if size < fast.INT64_SAFE else object
 
 
 def _rounded_vector(x: Any, n: int, bits: int) -> np.ndarray:
@@ -239,9 +267,8 @@ def prove_sparse_positive_definite(S: Any) -> SparseDefinitenessProof | None:
 def _proposed(unit: sparse.csc_array, shift: float, e: np.ndarray, bits: int) -> SparseDefinitenessProof | None:
     """Return an order and the factor of ``unit - shift I`` in that order, rounded; None if it meets a pivot <= 0."""
     n = unit.shape[0]
-    lowered = sparse.csc_matrix(unit - shift * sparse.eye_array(n))
     try:
-        lu = splu(lowered, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        lu = diagonal_factor(unit - shift * sparse.eye_array(n))
     except RuntimeError:
         return None
     pivots = lu.U.diagonal()

@@ -153,8 +153,26 @@ def _direct(B: Any, right: np.ndarray) -> np.ndarray:
     scale = 1 / np.abs(B.diagonal())
     scaled = sparse.csc_array(sparse.diags_array(scale) @ B)
     try:
-        factor = splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factor = diagonal_factor(scaled)
     except RuntimeError:  # exactly singular
         return np.full(right.shape, np.nan)
     x = factor.solve(scale * right)
     return x + factor.solve(scale * (right - B @ x))
+
+
+def diagonal_factor(A: Any) -> Any:
+    """Factor a sparse matrix with its diagonal entries as pivots, in an order of little fill.
+
+    Of an M-matrix, solutions of positive systems stay positive.
+
+    Raises
+    ------
+    RuntimeError
+        The matrix is exactly singular.
+
+    Examples
+    --------
+    >>> diagonal_factor(sparse.eye_array(2) * 4.0).solve(np.ones(2))
+    array([0.25, 0.25])
+    """
+    return splu(sparse.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

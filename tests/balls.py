@@ -9,7 +9,7 @@ import flint
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, ReachingProtocol
 
 BITS = 512
 
@@ -26,6 +26,18 @@ def rational_matrix(rows: Sequence[Sequence[Fraction]]) -> flint.arb_mat:
 def clock(protocol: NominalProtocol, q: Fraction) -> flint.arb:
     """``s`` where ``1 - t/T = q``: ``rho1 T (1 - q) + rho2 kappa ln(1/q)``."""
     return ball(protocol.rho1 * protocol.T * (1 - q)) - ball(protocol.rho2 * protocol.kappa) * ball(q).log()
+
+
+def inverse_decay_integral(protocol: ReachingProtocol, z: Fraction) -> flint.arb:
+    """``int_0^t dr/psi(r)`` up to the instant ``z``, at the present precision.
+
+    With ``m = mu3 kappa`` and ``u = T_r - r`` it is ``T_r^m e^(mu2 T_r) int u^-m e^(-mu2 u) du``, a difference of upper
+    incomplete gamma functions of order ``1 - m``.
+    """
+    T, m = ball(protocol.T_r), protocol.mu3 * protocol.kappa
+    order, whole = ball(1 - m), ball(protocol.mu2) * T
+    tail = (whole * (-ball(z)).exp()).gamma_upper(order) - whole.gamma_upper(order)
+    return T * (whole ** ball(m - 1)) * whole.exp() * tail
 
 
 def states(graph: SignedDigraph, s: flint.arb, x0: Sequence[Fraction]) -> list[flint.arb]:

@@ -3,8 +3,7 @@
 One proof for all sizes: a rounded Cholesky factor ``R`` with ``S = R R' + E``, the remainder ``E`` known in integers.
 Where the diagonal of ``E`` exceeds the sum of the other entries of each row, ``E > 0`` and ``S > 0``. A
 :class:`Factor` is computed here, for a dense matrix; a :class:`SparseFactor` comes from whoever searched it, and its
-remainder is formed by :func:`remainder`. Elimination decides what the factor cannot: matrices that are not definite, or
-hardly.
+remainder is formed by :func:`remainder`.
 
 References
 ----------
@@ -14,16 +13,15 @@ Rump, Verification of positive definiteness, BIT 46 (2006).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from math import isqrt
 from operator import mul
 from typing import Any, NamedTuple
 
-from lmi.exact import row_dominance as dominance
 from lmi.exact.polynomials import characteristic
-from lmi.exact.work import affordable, fits, spend
+from lmi.exact.work import fits, spend
 
 Rows = Sequence[Sequence[int]]
 #: Bits of the dense factor, one after the other, until the proof succeeds.
@@ -48,57 +46,6 @@ def symmetric(S: Rows) -> bool:
     if not all(len(row) == n and set(map(type, row)) <= {int} and row[i] > 0 for i, row in enumerate(S)):
         return False
     return all(tuple(row) == column for row, column in zip(S, zip(*S, strict=True), strict=True))
-
-
-# ---------------------------------------------------------------------- elimination
-
-
-def eliminate(S: Rows, step: Callable[[], object] = int) -> int | None:
-    """Return the first ``k`` for which the leading minor of ``k + 1`` rows is not positive; None: ``S > 0``.
-
-    Fraction-free symmetric elimination: every pivot is a leading principal minor (Sylvester). Always decides; seconds
-    at 100 rows, minutes at 300.
-
-    Parameters
-    ----------
-    S : n rows of n integers
-        Symmetric; only the lower triangle is read.
-    step : callable
-        Called before each pivot; it may raise.
-
-    References
-    ----------
-    Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, Math. Comp. 22 (1968).
-
-    Examples
-    --------
-    >>> eliminate([[2, 1], [1, 1]]), eliminate([[1, 1], [1, 1]])
-    (None, 1)
-    """
-    rows, previous = [list(row[: i + 1]) for i, row in enumerate(S)], 1
-    for k in range(len(rows)):
-        step()
-        pivot = rows[k][k]
-        if pivot <= 0:
-            return k
-        column = [row[k] for row in rows[k + 1 :]]
-        for i, (row, head) in enumerate(zip(rows[k + 1 :], column, strict=True)):
-            row[k + 1 :] = [
-                (x * pivot - head * y) // previous for x, y in zip(row[k + 1 :], column[: i + 1], strict=True)
-            ]
-        previous = pivot
-    return None
-
-
-def refutes(S: Rows, x: Sequence[int]) -> bool:
-    """Tell whether ``x' S x <= 0`` for an ``x`` that is not 0: then ``S`` is not positive definite.
-
-    Examples
-    --------
-    >>> refutes([[1, 2], [2, 1]], [1, -1]), refutes([[1, 2], [2, 1]], [0, 0])
-    (True, False)
-    """
-    return any(x) and sum(a * sum(map(mul, row, x)) for a, row in zip(x, S, strict=True) if a) <= 0
 
 
 # ---------------------------------------------------------------------- the dense factor
@@ -128,9 +75,8 @@ class Factor:
 
     def __init__(self, S: Rows, bits: int):
         n, self.bits = len(S), bits
-        if any(S[i][i] <= 0 for i in range(n)):
-            raise ArithmeticError("a diagonal entry is not positive")
-        self.shifts = [self._shift(S[i][i]) for i in range(n)]
+        # Powers of two by which rows and columns are scaled, so that the diagonal fits the bits.
+        self.shifts = [bits - (S[i][i].bit_length() - 1) // 2 for i in range(n)]
         self.rows: list[list[int]] = []
         self.diagonal: list[int] = []
         # Scaled entries lie below 4^(bits + 1), so entries of R below 2^(bits + 1). A scaled entry is cut to an
@@ -144,12 +90,6 @@ class Factor:
                 raise ArithmeticError("not proved")
             self.rows.append(row)
             self.diagonal.append(isqrt(left))
-            if not self.diagonal[-1]:
-                raise ArithmeticError("not proved")
-
-    def _shift(self, entry: int) -> int:
-        """Return the power of two by which row and column are scaled, so that the diagonal fits the bits."""
-        return self.bits - (entry.bit_length() - 1) // 2
 
     def _substituted(self, entries: Sequence[int], shift: int) -> list[int]:
         """Return the row of ``R`` that belongs to a row of ``S``: forward substitution, each quotient rounded."""
@@ -224,18 +164,16 @@ def scaled(n: int, entries: Any, factor: SparseFactor, power: int = 0, scale: in
         columns = [x.tolist() if hasattr(x, "tolist") else list(x) for x in columns]
     except TypeError:
         return None
-    if len(columns) != 9 or not all(set(map(type, column)) <= {int} for column in columns):
+    columns.append([factor.bits, power, scale])
+    if len(columns) != 10 or not all(set(map(type, column)) <= {int} for column in columns):
         return None
-    if {type(factor.bits), type(power), type(scale)} != {int} or scale <= 0:
+    rows, cols, values, order, indptr, indices, data, exponents, d, _ = columns
+    if not (len(rows) == len(cols) == len(values) and len(exponents) == len(d) == n and min([scale, *d]) > 0):
         return None
-    rows, cols, values, order, indptr, indices, data, exponents, d = columns
-    if not len(rows) == len(cols) == len(values) or not _well_formed(n, order, indptr, indices, data):
-        return None
-    if len(exponents) != n or len(d) != n or min(d, default=1) <= 0:
+    largest = max(map(abs, (factor.bits, power, *exponents)))
+    if largest > LARGEST_SHIFT or not _well_formed(n, order, indptr, indices, data):
         return None
     if not all(n > row >= column >= 0 for row, column in zip(rows, cols, strict=True)):
-        return None
-    if max(map(abs, (factor.bits, power, *exponents))) > LARGEST_SHIFT:
         return None
     place = [0] * n
     for k, node in enumerate(order):
@@ -255,13 +193,10 @@ def _well_formed(n: int, order: list[int], indptr: list[int], indices: list[int]
     """Tell whether ``order`` is a permutation, and the others the columns of a lower triangular matrix."""
     if sorted(order) != list(range(n)) or len(indices) != len(data) or len(indptr) != n + 1:
         return False
-    if indptr[0] != 0 or indptr[n] != len(indices) or any(b < a for a, b in pairwise(indptr)):
+    if indptr != sorted(indptr) or (indptr[0], indptr[n]) != (0, len(indices)):
         return False
-    for k, (first, last) in enumerate(pairwise(indptr)):
-        part = indices[first:last]
-        if part and (part[0] < k or part[-1] >= n or any(b <= a for a, b in pairwise(part))):
-            return False
-    return True
+    columns = enumerate(indices[first:last] for first, last in pairwise(indptr))
+    return all(not rows or (k <= rows[0] and rows[-1] < n and rows == sorted(set(rows))) for k, rows in columns)
 
 
 def remainder(S: Scaled) -> list[dict[int, int]] | None:
@@ -282,10 +217,11 @@ def remainder(S: Scaled) -> list[dict[int, int]] | None:
                 return None
     if not fits(sum(map(len, E)) * S.times.bit_length(), LARGEST_BITS):
         return None
-    if S.times != 1:
-        E = [{j: value * S.times for j, value in row.items()} for row in E]
+    for row in E:
+        for j in row:
+            row[j] *= S.times
     for (i, j), value in S.T.items():
-        E[i][j] = E[i].get(j, 0) + value
+        E[i][j] += value
     return E
 
 
@@ -315,8 +251,8 @@ class Arithmetic:
     """What decides, by the standard library; :mod:`lmi.exact.fast` has its twin, with arrays."""
 
     name = "standard library"
-    #: Largest matrix that is taken, and largest sum of squared column lengths of a sparse factor.
-    rows, products = 400, 300_000_000
+    #: Largest sum of squared column lengths of a sparse factor that is taken.
+    products = 300_000_000
     #: Whether NumPy is used.
     numpy = False
 
@@ -333,14 +269,12 @@ class Arithmetic:
     def factor(self, S: Rows, first: int = BITS[0]) -> Factor | None:
         """Return the factor that proves a matrix definite, with ``first`` bits or more; None if none does."""
         n = len(S)
-        for bits in BITS:
-            # Every precision costs more than the one before.
-            if bits >= first and affordable(n**3 // 6, bits, bits):
-                spend(n**3 // 6, bits, bits)
-                try:
-                    return Factor(S, bits)
-                except ArithmeticError:
-                    continue
+        for bits in BITS[BITS.index(first) :]:
+            spend(n**3 // 6, bits, bits, "a proof of definiteness")
+            try:
+                return Factor(S, bits)
+            except ArithmeticError:
+                continue
         return None
 
     def residual_definite(self, n: int, entries: Any, factor: SparseFactor, power: int = 0, scale: int = 1) -> bool:
@@ -361,14 +295,6 @@ class Arithmetic:
         """Return by how much each row of the remainder dominates, None if that is too much work."""
         E = remainder(S)
         return None if E is None else spare(E, S.weights)
-
-    def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.row_dominance.dominates`."""
-        return dominance.dominates(n, edges, diagonal, u, v, rate)
-
-    def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.row_dominance.largest_rate`."""
-        return dominance.largest_rate(n, edges, diagonal, u, v)
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
         """Return ``A B``.

@@ -8,26 +8,25 @@ verified on the slices themselves. Every twin is compared with its plain one by 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
-from itertools import chain
+from itertools import chain, pairwise
 from operator import add
 from typing import Any, NamedTuple
 
 import flint
 import numpy as np
 
-from lmi.exact import row_dominance as dominance
 from lmi.exact.definite import BITS, LARGEST_BITS, Arithmetic, Rows, Scaled, symmetric
 from lmi.exact.numbers import longest
 from lmi.exact.work import fits, spend
 
 #: Sums of integers up to these sizes are exact in float64 and in int64.
 FLOAT_SAFE, INT64_SAFE = 2**53, 2**62
-#: Up to this many rows python-flint decides, by the characteristic polynomial, unless entries are longer than so many
-#: bits over the number of rows; above, NumPy proposes a factor.
-FLINT_ROWS, FLINT_BITS = 24, 40_000
+#: Above this many rows NumPy proposes a factor.
+SMALL_ROWS = 24
 #: Matrices with entries of more bits whose mean is shorter by this factor are not multiplied by python-flint.
 PADDED_BITS, PADDED = 4000, 8
 #: Bits of all entries up to which python-flint multiplies large matrices.
@@ -42,25 +41,14 @@ LONGEST_COLUMN, LARGEST_BLOCK, LARGEST_PAIRS, CHUNK = 4000, 2_000_000, 400_000_0
 
 
 class FastArithmetic(Arithmetic):
-    """What decides, by python-flint for small matrices and NumPy for large ones; in between as :class:`Arithmetic`.
-
-    python-flint forms the characteristic polynomial: ``S > 0`` iff its signs alternate strictly (Descartes; its roots
-    are real).
-    """
+    """What decides, with factors that NumPy proposes for large matrices, and products by python-flint."""
 
     name = f"python-flint {flint.__version__}, NumPy {np.__version__}"
     products, numpy = 10_000_000_000, True
 
     def definite(self, S: Rows) -> bool:
         """Tell whether a symmetric integer matrix is positive definite; see :meth:`Arithmetic.definite`."""
-        if not symmetric(S):
-            return False
-        if len(S) > FLINT_ROWS and factor(S) is not None:
-            return True
-        if not 0 < len(S) <= FLINT_ROWS or _longest(S) * len(S) > FLINT_BITS:
-            return self.factor(S) is not None
-        coefficients = _flint(S).charpoly().coeffs()  # constant term first
-        return all(c * (-1) ** (len(S) - k) > 0 for k, c in enumerate(coefficients))
+        return (len(S) > SMALL_ROWS and symmetric(S) and factor(S) is not None) or super().definite(S)
 
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
         """Return ``A B``, by python-flint unless some entries are much longer than others, which it pads all to."""
@@ -81,35 +69,13 @@ class FastArithmetic(Arithmetic):
         E = remainder(S)
         return None if E is None else E.spare(S.weights)
 
-    def dominates(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any, rate: Any) -> bool:
-        """See :func:`lmi.exact.row_dominance.dominates`."""
-        pairs, ratio = _pairs(n, edges, diagonal, u, v), dominance.ratio_of(rate)
-        return pairs is not None and ratio is not None and _at_least(*pairs, *ratio)
-
-    def largest_rate(self, n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> Fraction | None:
-        """See :func:`lmi.exact.row_dominance.largest_rate`."""
-        pairs = _pairs(n, edges, diagonal, u, v)
-        if pairs is None or n == 0:
-            return None
-        x, y = pairs
-        try:  # floats tell which rows may be the least
-            ratios = x.astype(float) / y.astype(float)
-            near = np.flatnonzero(~(ratios > ratios.min() + 2.0**-48 * abs(ratios.min())))
-        except OverflowError:
-            near = np.arange(n)
-        least = dominance.least_ratio(list(zip(x[near].tolist(), y[near].tolist(), strict=True)))
-        if least is None or _at_least(x, y, *least.as_integer_ratio()):
-            return least
-        return dominance.least_ratio(list(zip(x.tolist(), y.tolist(), strict=True)))
-
     def above(self, S: Rows, D: Rows, bits: int = BITS[0]) -> list[Fraction] | None:
         """Bound ``d'S^-1 d`` from above for every row ``d`` of ``D``; see :meth:`Arithmetic.above`.
 
         For large matrices first by a matrix that takes ``S`` near to the identity: the inverse of a float factor.
         """
-        if len(S) > FLINT_ROWS and bits == BITS[0] and symmetric(S):
-            return _above_by_congruence(S, D) or super().above(S, D, bits)
-        return super().above(S, D, bits)
+        large = len(S) > SMALL_ROWS and bits == BITS[0] and symmetric(S)
+        return (_above_by_congruence(S, D) if large else None) or super().above(S, D, bits)
 
 
 def _flint(rows: Rows) -> Any:
@@ -374,15 +340,10 @@ def remainder(S: Scaled) -> Remainder | None:
     block, sums = square(corner), _pair_products(n, first, indptr, indices, data)
     if block is None or sums is None or not fits((len(sums[0]) + corner.size) * S.times.bit_length(), LARGEST_BITS):
         return None
-    E = dict(zip(sums[0].tolist(), (-S.times * sums[1]).tolist(), strict=True))
+    E = defaultdict(int, zip(sums[0].tolist(), (-S.times * sums[1]).tolist(), strict=True))
     block = -S.times * block
     for (row, column), value in S.T.items():
-        if column >= first:
-            block[row - first, column - first] += value
-            if row != column:
-                block[column - first, row - first] += value
-        else:
-            E[row * n + column] = E.get(row * n + column, 0) + value
+        E[row * n + column] += value
     values = np.array(list(E.values()), dtype=object)
     i, j = np.divmod(np.array(list(E), dtype=np.int64), max(n, 1))
     inside = j >= first
@@ -402,86 +363,20 @@ def _pair_products(
         return None
     keys: Any = np.zeros(0, dtype=np.int64)
     limbs = [np.zeros(0, dtype=np.int64) for _ in range(count)]
-    waiting: list[tuple[np.ndarray, list[np.ndarray]]] = []
-
-    def gathered() -> tuple[np.ndarray, list[np.ndarray]]:
-        distinct, inverse = np.unique(np.concatenate([keys, *(key for key, _ in waiting)]), return_inverse=True)
-        sums = [np.zeros(len(distinct), dtype=np.int64) for _ in range(count)]
-        for m, total in enumerate(sums):
-            np.add.at(total, inverse, np.concatenate([limbs[m], *(part[m] for _, part in waiting)]))
-        return distinct, sums
-
-    size = 0
-    for c in np.unique(counts[counts > 0]).tolist():
-        upper, lower = np.tril_indices(c)
-        columns = np.flatnonzero(counts == c)
-        per_chunk = max(CHUNK // len(upper), 1)
-        for begin in range(0, len(columns), per_chunk):
-            at = indptr[columns[begin : begin + per_chunk]][:, None] + np.arange(c)[None, :]
-            rows = indices[at]
-            part = [np.zeros(len(at) * len(upper), dtype=np.int64) for _ in range(count)]
-            for a, x in enumerate(digits):
-                for b, y in enumerate(digits):
-                    part[a + b] += (x[at][:, upper] * y[at][:, lower]).ravel()
-            waiting.append(((rows[:, upper] * n + rows[:, lower]).ravel(), part))
-            size += len(part[0])
-            if size > CHUNK:
-                keys, limbs = gathered()
-                waiting, size = [], 0
-    keys, limbs = gathered()
+    pairs = np.cumsum(counts * (counts + 1) // 2)
+    cuts = np.searchsorted(pairs, np.arange(CHUNK, pairs[-1] if first else 0, CHUNK))
+    for begin, end in pairwise(np.unique([0, *cuts, first]).tolist()):
+        # Every entry of these columns, with those of its column down to itself.
+        entry = np.arange(indptr[begin], indptr[end])
+        head = np.repeat(indptr[begin:end], counts[begin:end])
+        many = entry - head + 1
+        upper = np.repeat(entry, many)
+        lower = np.arange(len(upper)) - np.repeat(np.cumsum(many) - many - head, many)
+        found = np.concatenate([keys, indices[upper] * n + indices[lower]])
+        keys, inverse = np.unique(found, return_inverse=True)
+        for m in range(count):
+            parts = [x[upper] * digits[m - a][lower] for a, x in enumerate(digits) if 0 <= m - a < len(digits)]
+            total = np.zeros(len(keys), dtype=np.int64)
+            np.add.at(total, inverse, np.concatenate([limbs[m], np.sum(parts, axis=0)]))
+            limbs[m] = total
     return keys, _joined(limbs, width)
-
-
-# ---------------------------------------------------------------------- dominance
-
-
-def _pairs(n: int, edges: Any, diagonal: Any, u: Any, v: Any) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return numerators and denominators of the rates of the rows; see :mod:`lmi.exact.row_dominance`."""
-    try:
-        sources, targets, weights, diagonal, u, v = map(_integers, (*edges, diagonal, u, v))
-    except (TypeError, ValueError):
-        return None
-    if not len(sources) == len(targets) == len(weights) or not len(diagonal) == len(u) == len(v) == n:
-        return None
-    if not all((x > 0).all() for x in (diagonal, u, v)):
-        return None
-    if len(sources) and (min(sources.min(), targets.min()) < 0 or max(sources.max(), targets.max()) >= n):
-        return None
-    sources, targets = sources.astype(np.int64), targets.astype(np.int64)
-    sums = []
-    for to, of, x in ((targets, sources, u), (sources, targets, v)):
-        degree = int(np.bincount(to, minlength=1).max())
-        safe = max(degree, 2) * _largest(weights) * _largest(x) < INT64_SAFE
-        a, b = (weights, x) if safe else (weights.astype(object), x.astype(object))
-        total = np.zeros(n, dtype=a.dtype)
-        np.add.at(total, to, np.abs(a) * b[of])
-        sums.append(total)
-    sizes = [_largest(x) for x in (u, v, diagonal, *sums)]
-    # Everything below is at most this in size.
-    if 2 * sizes[0] * sizes[1] * sizes[2] + sizes[1] * sizes[3] + sizes[0] * sizes[4] >= INT64_SAFE:
-        u, v, diagonal, *sums = (x.astype(object) for x in (u, v, diagonal, *sums))
-    return 2 * diagonal * u * v - v * sums[0] - u * sums[1], u * v
-
-
-def _at_least(x: np.ndarray, y: np.ndarray, p: int, q: int) -> bool:
-    """Tell whether ``q x >= p y`` everywhere, ``y`` and ``q`` positive."""
-    if max(q, abs(p)) * max(_largest(x), _largest(y), 1) >= INT64_SAFE:
-        x, y = x.astype(object), y.astype(object)
-    return bool((q * x >= p * y).all())
-
-
-def _integers(column: Any) -> np.ndarray:
-    """Return an int64 array, or one of Python integers where those do not fit.
-
-    Raises
-    ------
-    TypeError
-        There is anything else.
-    """
-    x = column if isinstance(column, np.ndarray) else np.array(list(column), dtype=object)
-    if x.ndim == 1 and x.dtype.kind in "iu" and x.dtype != np.uint64:
-        return x.astype(np.int64, copy=False)
-    listed = x.tolist()
-    if x.ndim != 1 or x.dtype.kind not in "Ou" or not set(map(type, listed)) <= {int}:
-        raise TypeError("not a vector of integers")
-    return np.array(listed, dtype=np.int64 if longest(listed) < 63 else object)

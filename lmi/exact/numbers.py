@@ -18,7 +18,6 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
 
 from lmi.exact.work import WorkError, fits, spend
 
@@ -52,11 +51,12 @@ def parse(text: str) -> Fraction:
     (Fraction(1, 10), Fraction(-3, 4), Fraction(1, 400), Fraction(3, 4))
     """
     if len(text) <= CACHED:
-        return _short_number(text)
+        return _parsed(text)
     spend(1, 2 * len(text), 2 * len(text), "reading long numbers")
-    return _parsed(text)
+    return _parsed.__wrapped__(text)  # which is not kept
 
 
+@lru_cache(maxsize=10_000)
 def _parsed(text: str) -> Fraction:
     if len(text) > MAX_CHARACTERS:
         raise NumberError(f"a number of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
@@ -80,11 +80,6 @@ def _parsed(text: str) -> Fraction:
     return Fraction(value * radix**power) if power >= 0 else Fraction(value, radix**-power)
 
 
-@lru_cache(maxsize=10_000)
-def _short_number(text: str) -> Fraction:
-    return _parsed(text)
-
-
 def shorten(text: str, limit: int = 40) -> str:
     """Return a text fit for a message: printable, and cut after ``limit`` characters."""
     clean = "".join(c if c.isprintable() else "?" for c in text[: limit + 1])
@@ -99,7 +94,7 @@ def longest(values: Iterable[int]) -> int:
     >>> longest([1, -8])
     4
     """
-    return max((x.bit_length() for x in values), default=0)
+    return max(map(int.bit_length, values), default=0)
 
 
 def integers(rows: Sequence[Sequence[Fraction]]) -> tuple[list[list[int]], int]:
@@ -145,52 +140,3 @@ def sized(count: int, bits: int, what: str = "the numbers") -> None:
     """
     if not fits(count * bits, MAX_TOTAL_BITS):
         raise WorkError(f"{what} are too long over one denominator")
-
-
-def round_to_bits(value: float, bits: int) -> Fraction:
-    """Round a finite float to the nearest dyadic rational with ``bits`` significant bits.
-
-    Parameters
-    ----------
-    value : float
-        Finite.
-    bits : int
-        Positive.
-
-    Returns
-    -------
-    Fraction
-
-    Examples
-    --------
-    >>> round_to_bits(0.1, 4)
-    Fraction(13, 128)
-    """
-    p, q = value.as_integer_ratio()
-    drop = p.bit_length() - bits
-    return Fraction(p, q) if drop <= 0 else Fraction(round(Fraction(p, 1 << drop)) << drop, q)
-
-
-def dyadic_integers(values: Any) -> tuple[list[int], int]:
-    """Return floats or ints as integers over one power of two: ``values = integers * 2^power``, exactly.
-
-    So a matrix of floats is handed to whoever checks its proof in integers.
-
-    Parameters
-    ----------
-    values : (n,) sequence of float or int
-        Finite.
-
-    Returns
-    -------
-    integers : list of n ints
-    power : int
-
-    Examples
-    --------
-    >>> dyadic_integers([0.75, -2.0, 3])
-    ([3, -8, 12], -2)
-    """
-    ratios = [value.as_integer_ratio() for value in (values.tolist() if hasattr(values, "tolist") else values)]
-    places = max((q.bit_length() for _, q in ratios), default=1)
-    return [p << (places - q.bit_length()) for p, q in ratios], 1 - places

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import gcd
@@ -24,28 +25,15 @@ def characteristic(rows: Matrix) -> Polynomial:
     [1, -5, -2]
     """
     p = [1]
-    leading: list[list[tuple[int, int]]] = []  # rows of A_(k-1), as pairs of column and entry
-    columns: list[list[tuple[int, int]]] = [[] for _ in rows]
-    for i, row in enumerate(rows):
-        for j, v in row.items():
-            columns[j].append((i, v))
     for k, row in enumerate(rows):
-        r = [(j, v) for j, v in row.items() if j < k]
-        vector = [0] * k
-        for i, v in columns[k]:
-            if i < k:
-                vector[i] = v
+        leading = [[(j, v) for j, v in earlier.items() if j < k] for earlier in rows[:k]]  # A_(k-1)
+        own = [(j, v) for j, v in row.items() if j < k]
+        vector = [earlier.get(k, 0) for earlier in rows[:k]]
         series = [1, -row.get(k, 0)]
-        if r and any(vector):
-            for step in range(k):
-                if step:
-                    vector = [sum([v * vector[j] for j, v in entries]) for entries in leading]
-                series.append(-sum([v * vector[j] for j, v in r]))
+        for _ in range(k if own and any(vector) else 0):
+            series.append(-sum([v * vector[j] for j, v in own]))
+            vector = [sum([v * vector[j] for j, v in entries]) for entries in leading]
         p = product(series, p)[: k + 2]
-        for i, v in columns[k]:
-            if i < k:
-                leading[i].append((k, v))
-        leading.append([(j, v) for j, v in row.items() if j <= k])
     return p
 
 
@@ -78,37 +66,6 @@ def product(p: Polynomial, q: Polynomial) -> Polynomial:
     return result
 
 
-def derivative(p: Polynomial) -> Polynomial:
-    """Return the primitive part of the derivative."""
-    return primitive([c * k for k, c in zip(range(len(p) - 1, 0, -1), p, strict=False)])
-
-
-def primitive(p: Polynomial) -> Polynomial:
-    """Divide by the greatest common divisor of the coefficients, a positive number."""
-    content = gcd(*p)
-    return [c // content for c in p] if content > 1 else p
-
-
-def remainder(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Return a positive multiple of the remainder of ``p`` by ``q``, primitive.
-
-    Examples
-    --------
-    >>> remainder([2, 0, 1], [-3, 1])
-    [1]
-    """
-    left = list(p)
-    while len(left) >= len(q):
-        scale = gcd(left[0], q[0])
-        up, down = q[0] // scale, left[0] // scale
-        if up < 0:
-            up, down = -up, -down
-        left = [up * c - (down * q[k] if k < len(q) else 0) for k, c in enumerate(left)]
-        while left and not left[0]:
-            del left[0]
-    return primitive(left)
-
-
 def quotient(p: Polynomial, q: Polynomial) -> Polynomial | None:
     """Return ``p / q``, or None unless it is a polynomial with integer coefficients.
 
@@ -128,62 +85,35 @@ def quotient(p: Polynomial, q: Polynomial) -> Polynomial | None:
     return None if any(left) else result
 
 
-def common_divisor(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Return the primitive greatest common divisor, with a positive leading coefficient.
+def evaluated(p: Polynomial, matrix: Matrix) -> list[dict[int, int]]:
+    """Return ``p(M)``.
 
     Examples
     --------
-    >>> common_divisor([1, 0, -1], [2, 4, 2])
-    [1, 1]
+    >>> [dict(row) for row in evaluated([1, 0, 1], [{1: 2}, {0: 3}])]
+    [{0: 7, 1: 0}, {1: 7, 0: 0}]
     """
-    while q:
-        p, q = q, remainder(p, q)
-    p = primitive(p)
-    return p if p[0] > 0 else [-c for c in p]
-
-
-def squarefree(p: Polynomial) -> Polynomial:
-    """Return the primitive polynomial with the roots of a primitive one, each once.
-
-    Examples
-    --------
-    >>> squarefree([1, 4, 5, 2])
-    [1, 3, 2]
-    """
-    return divided(p, common_divisor(p, derivative(p)))
-
-
-def divided(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Divide by a primitive divisor."""
-    result = quotient(p, q)
-    if result is None:
-        raise ArithmeticError("a division leaves a remainder")
-    return result
-
-
-def evaluated(pairs: Polynomial, zero: bool, matrix: Matrix) -> list[dict[int, int]]:
-    """Return ``G(M^2)``, or ``M G(M^2)``."""
-    result = _identity(len(matrix), pairs[0])
-    for c in pairs[1:]:
-        result = _times(_times(result, matrix), matrix)
+    result: list[dict[int, int]] = [{} for _ in matrix]
+    for c in p:
+        result = [row_sum(row, matrix) for row in result]
         for i, row in enumerate(result):
-            row[i] = row.get(i, 0) + c
-    return _times(result, matrix) if zero else result
-
-
-def _identity(size: int, factor: int) -> list[dict[int, int]]:
-    return [{i: factor} for i in range(size)]
-
-
-def _times(left: Matrix, right: Matrix) -> list[dict[int, int]]:
-    result = []
-    for row in left:
-        total: dict[int, int] = {}
-        for k, v in row.items():
-            for j, w in right[k].items():
-                total[j] = total.get(j, 0) + v * w
-        result.append(total)
+            row[i] += c
     return result
+
+
+def row_sum(factors: Mapping[int, int], matrix: Matrix) -> dict[int, int]:
+    """Return the sum of multiples of some rows of a matrix.
+
+    Examples
+    --------
+    >>> dict(row_sum({0: 1, 1: 10}, [{0: 2}, {0: 3, 1: 4}]))
+    {0: 32, 1: 40}
+    """
+    total: dict[int, int] = defaultdict(int)
+    for k, v in factors.items():
+        for j, w in matrix[k].items():
+            total[j] += v * w
+    return total
 
 
 def rank(rows: Matrix) -> int:
@@ -196,28 +126,15 @@ def rank(rows: Matrix) -> int:
     >>> rank([{0: 1, 1: 2}, {0: 2, 1: 4}, {2: 5}])
     2
     """
-    left = [_primitive_row(row) for row in rows]
-    left = [row for row in left if row]
-    found = 0
-    while left:
+    left, found = [_primitive_row(row) for row in rows], 0
+    while left := [row for row in left if row]:
         pivot = min(left, key=len)
+        column = min(pivot, key=lambda j: abs(pivot[j]))
         left.remove(pivot)
         found += 1
-        column = min(pivot, key=lambda j: abs(pivot[j]))
-        head = pivot.pop(column)
-        kept = []
-        for row in left:
-            factor = row.pop(column, 0)
-            if factor:
-                scale = gcd(head, factor)
-                up, down = head // scale, factor // scale
-                total = {j: up * v for j, v in row.items()}
-                for j, v in pivot.items():
-                    total[j] = total.get(j, 0) - down * v
-                row = _primitive_row(total)
-            if row:
-                kept.append(row)
-        left = kept
+        for k, row in enumerate(left):
+            if column in row:
+                left[k] = _primitive_row(row_sum({0: pivot[column], 1: -row[column]}, [row, pivot]))
     return found
 
 

@@ -45,11 +45,6 @@ class Account:
         self.allowed, self.spent, self.largest, self.kept = int(Fraction(memory) * GB), 0, 0, 0
 
     @property
-    def left(self) -> int:
-        """Work that is left."""
-        return EACH_BYTE * self.allowed - self.spent
-
-    @property
     def needed(self) -> Fraction:
         """GB for which all that was counted so far would have been allowed."""
         return Fraction(max(self.largest, -(-self.spent // EACH_BYTE)), GB)
@@ -111,21 +106,8 @@ def spend(products: int, a: int = 0, b: int = 0, what: str = "exact arithmetic")
     """
     if (account := _account.get()) is not None:
         account.spent += cost(products, a, b)
-        if account.left < 0:
+        if account.spent > EACH_BYTE * account.allowed:
             raise WorkError(f"{what} would take too long")
-
-
-def affordable(products: int, a: int = 0, b: int = 0) -> bool:
-    """Tell whether so many products are within what is left.
-
-    Examples
-    --------
-    >>> with limited(1e-7):
-    ...     affordable(10, 300, 300)
-    False
-    """
-    account = _account.get()
-    return account is None or cost(products, a, b) <= account.left
 
 
 def fits(size: int, limit: int) -> bool:
@@ -176,12 +158,9 @@ def limited(memory: float = 1) -> Iterator[Account]:
     ValueError
         Not positive.
     """
-    try:
-        account = Account(memory)
-    except (ValueError, OverflowError):  # nan, infinity
-        account = None
-    if account is None or memory <= 0:
+    if not 0 < memory < GB:  # nor nan, nor infinite
         raise ValueError("the memory is not a positive number of GB")
+    account = Account(memory)
     token = _account.set(account)
     try:
         yield account

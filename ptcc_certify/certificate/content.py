@@ -31,7 +31,7 @@ from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.vectors import final_state_witness
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.input_formulas import Form
+from ptcc_certify.checker.lyapunov_form import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES

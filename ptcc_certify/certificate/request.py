@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.final_state import exact_initial_state
 from ptcc_certify.bounds.input import InitialSet, Limits, initial_set_within
-from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -224,21 +222,9 @@ def read_sliding_variable(
     sliding = protocol.reaching
     if sliding is None:
         return None, None
-    sigma = (
-        (Fraction(0),) * len(structure.graph.labels)
-        if sigma0 is None
-        else read_initial_state(structure, sigma0, "sigma0")
-    )
-    times = certified_reaching_times(sliding, sigma)
-    # Whatever the check could not confirm is not claimed.
-    instants = [r.z for r, s in zip(times, sigma, strict=True) if s and r.z is not None]
-    pole = sliding.mu3 * sliding.kappa
-    integrals = decay_integrals_below(sliding.T_r, sliding.mu2, pole, instants, REACHING_BITS)
-    push = sliding.mu1 - sliding.delta
-    return sigma, tuple(
-        r if r.z is None or abs(s) <= push * integrals.get(r.z, Fraction(0)) else ReachingTime(r.deadline, None)
-        for r, s in zip(times, sigma, strict=True)
-    )
+    n = structure.graph.n_nodes
+    sigma = (Fraction(0),) * n if sigma0 is None else read_initial_state(structure, sigma0, "sigma0")
+    return sigma, certified_reaching_times(sliding, sigma)
 
 
 def _instant(at: Any, protocol: Protocol) -> Fraction:

@@ -5,8 +5,8 @@ outside ``unverified``, obligation by obligation as the proof lists them; ``_ver
 specifies the file. Imports the standard library and the kernel :mod:`lmi.exact`, nothing that makes certificates;
 ``TRUSTED`` lists all files that must be right. python-flint and NumPy are used where they are installed.
 
-What makes certificates asks the same kernel, and takes the bounds of the input from ``input_bounds``; graph, structure,
-final state, Lyapunov functions and upper bounds on rates are verified by code that nothing else uses.
+What makes certificates asks the same kernel, and takes the bounds of the input from ``input_formulas``; graph,
+structure, final state, Lyapunov functions and upper bounds on rates are verified by code of the checker's own.
 
     python -m ptcc_certify.checker certificate.json [--stdlib] [--memory GB]
 """
@@ -17,7 +17,6 @@ import io
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +50,9 @@ KEYS = (
     *("verdict", "digest", "unverified"),
 )
 
+#: What values of another type, or too deep, raise where they are used.
+MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
+
 __all__ = [
     "INPUT_NODES",
     "MANY_COMPONENTS",
@@ -69,14 +71,30 @@ __all__ = [
 ]
 
 
-def check(
+def check(source: str | Path | Mapping[str, Any], **options: Any) -> CheckReport:
+    """Check a certificate; source and options are those of :func:`read_and_check`.
+
+    Raises
+    ------
+    UnreadableError
+        The file cannot be read as a certificate; one line.
+
+    Examples
+    --------
+    >>> check({"schema": SCHEMA}).reason
+    'the key "producer" is missing'
+    """
+    return read_and_check(source, **options)[1]
+
+
+def read_and_check(
     source: str | Path | Mapping[str, Any],
     *,
     stdlib: bool = False,
     files: Mapping[str, bytes] | None = None,
     memory: float = 1,
-) -> CheckReport:
-    """Check a certificate.
+) -> tuple[dict[str, Any], CheckReport]:
+    """Check a certificate; return its JSON object beside the report.
 
     Parameters
     ----------
@@ -90,32 +108,6 @@ def check(
         GB that the check may take; what would take more is rejected before it is formed. The work that is allowed, some
         seconds for each GB, grows with it.
 
-    Returns
-    -------
-    CheckReport
-
-    Raises
-    ------
-    UnreadableError
-        The file cannot be read as a certificate; one line.
-
-    Examples
-    --------
-    >>> check({"schema": SCHEMA}).reason
-    'the key "producer" is missing'
-    """
-    return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
-
-
-def read_and_check(
-    source: str | Path | Mapping[str, Any],
-    *,
-    stdlib: bool = False,
-    files: Mapping[str, bytes] | None = None,
-    memory: float = 1,
-) -> tuple[dict[str, Any], CheckReport]:
-    """Return the parsed JSON object beside the report of :func:`check`, whose parameters these are.
-
     Raises
     ------
     UnreadableError
@@ -127,24 +119,16 @@ def read_and_check(
     {'schema': 'ptcc-certificate/2'}
     """
     with limited(memory) as account:
-        if isinstance(source, Mapping):
-            data, folder = dict(source), Path()
-        else:
-            data, folder = read(source), Path(source).parent
-        report = _check(data, SideFiles(folder, files), stdlib)
-        return data, replace(report, memory=float(account.needed))
-
-
-def _check(data: dict[str, Any], files: SideFiles, stdlib: bool) -> CheckReport:
-    doc, verdict, reason = Document(data, files, arithmetic(stdlib)), "", None
-    try:
-        verdict = _verdict(doc)
-    except (RejectedError, WorkError) as error:
-        reason = str(error)
-    except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
-        reason = f"malformed ({type(error).__name__})"
-    at, steps = None if reason is None else doc.at, tuple(doc.steps)
-    return CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256)
+        data, folder = (dict(source), Path()) if isinstance(source, Mapping) else (read(source), Path(source).parent)
+        doc, verdict, reason = Document(data, SideFiles(folder, files), arithmetic(stdlib)), "", None
+        try:
+            verdict = _verdict(doc)
+        except (RejectedError, WorkError) as error:
+            reason = str(error)
+        except MALFORMED as error:
+            reason = f"malformed ({type(error).__name__})"
+        at, steps, needed = None if reason is None else doc.at, tuple(doc.steps), float(account.needed)
+        return data, CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256, needed)
 
 
 def _verdict(doc: Document) -> str:

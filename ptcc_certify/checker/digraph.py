@@ -1,7 +1,6 @@
 """A signed digraph in exact integers: sums over edges, searches, weak components, signs, hash.
 
-:class:`Digraph` needs the standard library alone; its twin in ``fast.py`` gives the same answers by NumPy. What is
-summed is integers of any size, and every sum is exact.
+What is summed is integers of any size, and every sum is exact. Edges are kept in arrays, by listener and by source.
 """
 
 from __future__ import annotations
@@ -10,30 +9,36 @@ import hashlib
 import json
 from array import array
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
-from itertools import accumulate, islice, pairwise
+from itertools import accumulate, pairwise, starmap
+from operator import eq, lt, mul
 from typing import Any
 
 from lmi.exact.numbers import common_denominator, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.reading import need
 
-#: Lines hashed, and edges taken from arrays, at a time.
-CHUNK = 65_536
+#: Where the edges of every node begin, and the end; their other ends; the numbers of their weights.
+Adjacency = tuple[list[int], "array[int]", "array[int]"]
 
 
-def numbered(weights: Any) -> tuple[list[Any], list[int]]:
-    """Return the distinct weights, and the number of each one; by their texts, whose hashes nobody can foresee."""
-    distinct = {_text(w): w for w in weights}
-    number = {text: k for k, text in enumerate(distinct)}
-    return list(distinct.values()), [number[_text(w)] for w in weights]
+def numbered(weights: Any) -> tuple[list[Any], array[int]]:
+    """Return the distinct weights, and the number of each one; long ones by their texts, whose hashes nobody foresees.
 
-
-def _text(w: Any) -> str:
-    p, q = w.as_integer_ratio()
-    return f"{p:x}/{q:x}"
+    Examples
+    --------
+    >>> numbered([2, -3, 2])
+    ([2, -3], array('q', [0, 1, 0]))
+    """
+    keys = (
+        weights if isinstance(weights, array) else [f"{p:x}/{q:x}" for p, q in (w.as_integer_ratio() for w in weights)]
+    )
+    distinct = dict(zip(keys, weights, strict=True))
+    number = {key: k for k, key in enumerate(distinct)}
+    return list(distinct.values()), array("q", map(number.__getitem__, keys))
 
 
 class Digraph:
@@ -51,9 +56,10 @@ class Digraph:
 
     Attributes
     ----------
-    into, out : (starts, ends, negative)
-        The edges that enter ``v``, and those that leave it, are those from ``starts[v]`` to ``starts[v + 1]``: the
-        other ends, and 1 where the weight is negative.
+    into, out : Adjacency
+        The edges that enter ``v``, and those that leave it, are those from ``starts[v]`` to ``starts[v + 1]``.
+    distinct : list
+        The weights that occur.
 
     Raises
     ------
@@ -69,28 +75,28 @@ class Digraph:
 
     def __init__(self, labels: Sequence[str], source: Any, target: Any, weights: Any, scale: int):
         self.labels, self.index, self.n = labels, {label: v for v, label in enumerate(labels)}, len(labels)
-        self.source, self.target, self.scale, self.n_edges = source, target, scale, len(source)
+        self.source, self.target, self.scale, self.n_edges = array("q", source), array("q", target), scale, len(source)
         self._rows: dict[int, dict[int, int]] = {}
         self._formed = 0  # entries of these rows
-        self._read(weights)
-        self.ratios = [w.as_integer_ratio() for w in self.distinct]
-
-    def _read(self, weights: Any) -> None:
-        """Verify range and order; find the distinct weights, and which of them every edge has."""
-        ends = list(zip(self.target, self.source, strict=True))
-        need(all(a < b for a, b in pairwise(ends)), "edges are not in order, or one occurs twice")
-        need(all(0 <= s < self.n and 0 <= t < self.n and s != t for t, s in ends), "an edge of a node to itself")
+        ordered = all(starmap(lt, pairwise(zip(self.target, self.source, strict=True))))
+        need(ordered, "edges are not in order, or one occurs twice")
+        inside = all(min(ends, default=0) >= 0 and max(ends, default=0) < self.n for ends in (self.source, self.target))
+        need(inside and not any(map(eq, self.source, self.target)), "an edge of a node to itself")
         need(all(weights), "an edge of weight 0")
-        self.distinct, which = numbered(weights)
-        self.which: Any = array("q", which)
-        self.negative: Any = bytearray(w < 0 for w in weights)
-        leaving = sorted(range(self.n_edges), key=self.source.__getitem__)
-        self.into = _starts(self.n, self.target), memoryview(array("q", self.source)), memoryview(self.negative)
-        self.out = (
-            _starts(self.n, (self.source[e] for e in leaving)),
-            memoryview(array("q", (self.target[e] for e in leaving))),
-            memoryview(bytearray(self.negative[e] for e in leaving)),
-        )
+        self.distinct, self.which = numbered(weights)
+        self.minus = [w < 0 for w in self.distinct]
+        self.ratios = [w.as_integer_ratio() for w in self.distinct]
+        self.into: Adjacency = _starts(self.n, self.target), self.source, self.which
+
+    @cached_property
+    def out(self) -> Adjacency:
+        """The edges that leave every node; see the class."""
+        starts, ends, which = _starts(self.n, self.source), array("q", self.target), array("q", self.which)
+        place = list(starts)
+        for s, t, k in zip(self.source, self.target, self.which, strict=True):
+            ends[place[s]], which[place[s]] = t, k
+            place[s] += 1
+        return starts, ends, which
 
     # ------------------------------------------------------------------ weights
 
@@ -115,12 +121,11 @@ class Digraph:
     def row(self, v: int) -> dict[int, int]:
         """Return row ``v`` of the signed Laplacian, times ``unit``, without zeros."""
         if v not in self._rows:
-            starts, ends, _ = self.into
-            first, last = starts[v], starts[v + 1]
-            self._formed += last - first + 1
+            sources, which = edges_of(self.into, v)
+            self._formed += len(sources) + 1
             sized(self._formed, self.bits, "the weights")
-            own = {s: -self.values[k] for s, k in zip(ends[first:last], self.which[first:last], strict=True)}
-            self._rows[v] = {v: sum(map(abs, own.values())), **{int(s): x for s, x in own.items()}} if own else {}
+            own = {s: -self.values[k] for s, k in zip(sources, which, strict=True)}
+            self._rows[v] = {v: sum(map(abs, own.values())), **own} if own else {}
         return self._rows[v]
 
     @cached_property
@@ -130,9 +135,9 @@ class Digraph:
 
     def sign(self, s: int, t: int) -> int:
         """Return the sign of the edge from ``s`` to ``t``, 0 if there is none."""
-        starts, ends, negative = self.into
+        starts, ends, which = self.into
         at = bisect_left(ends, s, starts[t], starts[t + 1])
-        return 0 if at == starts[t + 1] or ends[at] != s else -1 if negative[at] else 1
+        return 0 if at == starts[t + 1] or ends[at] != s else -1 if self.minus[which[at]] else 1
 
     @cached_property
     def listening(self) -> list[int]:
@@ -149,13 +154,9 @@ class Digraph:
         """Return the sums of ``|w| x[t]`` over the edges out of every node; weights times ``unit``."""
         return self._sums(self.target, self.source, x, False)
 
-    def moved(self, x: Sequence[int]) -> list[int]:
-        """Return ``L x``, times ``unit``."""
-        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x, signed=True), strict=True)]
-
-    def compared(self, x: Sequence[int]) -> list[int]:
-        """Return ``M(L) x`` with the comparison matrix of ``L``, times ``unit``."""
-        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x), strict=True)]
+    def moved(self, x: Sequence[int], signed: bool = True) -> list[int]:
+        """Return ``L x``, or ``M(L) x`` with the comparison matrix of ``L``; times ``unit``."""
+        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x, signed), strict=True)]
 
     def left(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
         """Return ``x' M(L_k)``, times ``unit``, for a group of nodes that no edge enters."""
@@ -166,13 +167,16 @@ class Digraph:
                 sums[j] += weight * (a if j == v else -abs(a))
         return list(sums.values())
 
-    def _sums(self, of: Any, to: Any, x: Sequence[int], signed: bool) -> list[int]:
+    def _sums(self, of: array[int], to: array[int], x: Sequence[int], signed: bool) -> list[int]:
         values, bits = self.values if signed else [abs(w) for w in self.values], longest(x)
         sized(self.n, self.bits + bits)
         spend(self.n_edges, self.bits, bits, "sums over edges")
+        return self._added(of, to, values, x)
+
+    def _added(self, of: array[int], to: array[int], values: Sequence[int], x: Sequence[int]) -> list[int]:
         total = [0] * self.n
-        for i, j, k in zip(of, to, self.which, strict=True):
-            total[j] += values[k] * x[i]
+        for j, y in zip(to, map(mul, map(values.__getitem__, self.which), map(x.__getitem__, of)), strict=True):
+            total[j] += y
         return total
 
     # ------------------------------------------------------------------ connection
@@ -191,7 +195,7 @@ class Digraph:
             seen[v] = 1
         while todo:
             v = todo.pop()
-            for u in ends[starts[v] : starts[v + 1]].tolist():
+            for u in ends[starts[v] : starts[v + 1]]:
                 if not seen[u] and (group is None or group[u] == group[v]):
                     seen[u] = 1
                     todo.append(u)
@@ -200,74 +204,79 @@ class Digraph:
     @cached_property
     def pieces(self) -> tuple[list[int], set[int]]:
         """The smallest node of every node's weak component, and those components that no camps fit."""
-        camp, piece, torn = bytearray(self.n), [-1] * self.n, set()
+        camp, piece, minus = [False] * self.n, [-1] * self.n, self.minus
         for root in range(self.n):
             todo = [] if piece[root] >= 0 else [root]
-            if todo:
-                piece[root] = root
             while todo:
                 v = todo.pop()
-                for starts, ends, negative in (self.into, self.out):
-                    first, last = starts[v], starts[v + 1]
-                    for u, opposed in zip(ends[first:last].tolist(), negative[first:last].tolist(), strict=True):
+                piece[v] = root
+                for adjacency in (self.into, self.out):
+                    for u, k in zip(*edges_of(adjacency, v), strict=True):
                         if piece[u] < 0:
-                            piece[u], camp[u] = root, camp[v] ^ opposed
+                            piece[u], camp[u] = root, camp[v] ^ minus[k]
                             todo.append(u)
-                        elif camp[u] != camp[v] ^ opposed:
-                            torn.add(root)
-        return piece, torn
+        edges = zip(self.source, self.target, self.which, strict=True)
+        return piece, {piece[s] for s, t, k in edges if camp[s] ^ camp[t] != minus[k]}
 
     def closed(self, group: Sequence[int]) -> bool:
         """Tell whether no edge enters a group from outside; -1 marks nodes of none."""
-        return all(group[t] in (-1, group[s]) for s, t in zip(self.source, self.target, strict=True))
+        inside = (v for v, home in enumerate(group) if home != -1)
+        return all(group[s] == group[t] for t in inside for s in edges_of(self.into, t)[0])
 
     def fits(self, gauge: Sequence[int]) -> bool:
         """Tell whether ``w gauge[s] gauge[t] > 0`` for all edges to a ``t`` whose gauge is not 0."""
-        edges = zip(self.source, self.target, self.negative, strict=True)
-        return all(not gauge[t] or gauge[s] * gauge[t] == (-1 if minus else 1) for s, t, minus in edges)
+        into = ((g, edges_of(self.into, t)) for t, g in enumerate(gauge) if g)
+        return all(gauge[s] == (-g if self.minus[k] else g) for g, edges in into for s, k in zip(*edges, strict=True))
 
     # ------------------------------------------------------------------ pairs of edges
 
     @cached_property
     def mutual(self) -> tuple[bool, set[int]]:
         """Whether no two opposite edges differ in sign, and the pieces with an edge whose opposite is not its equal."""
-        which = {(s, t): k for s, t, k in zip(self.source, self.target, self.which, strict=True)}
-        piece, signs = self.pieces[0], [w < 0 for w in self.distinct]
-        symmetric = all(signs[which.get((t, s), k)] == signs[k] for (s, t), k in which.items())
-        return symmetric, {piece[s] for (s, t), k in which.items() if which.get((t, s)) != k}
+        piece, symmetric, odd = self.pieces[0], True, set()
+        for v in range(self.n):
+            heard, hearing = edges_of(self.into, v), edges_of(self.out, v)
+            if heard != hearing:
+                odd.add(piece[v])
+                both = set(heard[0]).intersection(hearing[0])
+                symmetric &= all(self.sign(u, v) == self.sign(v, u) for u in both)
+        return symmetric, odd
 
     def antagonistic(self) -> set[int]:
         """Return the pieces with a negative weight."""
         piece = self.pieces[0]
-        return {piece[s] for s, minus in zip(self.source, self.negative, strict=True) if minus}
+        return {piece[s] for s, k in zip(self.source, self.which, strict=True) if self.minus[k]}
 
     # ------------------------------------------------------------------ hash
 
     def sha256(self) -> str:
         """Return the SHA-256 of nodes and edges, in an order that depends on the labels alone."""
-        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
         order = sorted(range(self.n), key=self.labels.__getitem__)
-        rank = [0] * self.n
-        for k, v in enumerate(order):
-            rank[v] = k
+        rank = sorted(range(self.n), key=order.__getitem__)
+        quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, self.labels)]
+        weights = [f', "{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]
         hashed = hashlib.sha256("".join(f"[{quoted[v]}]\n" for v in order).encode("utf-8", "surrogatepass"))
-        columns = [f"[{label}, " for label in quoted], [f'{label}, "' for label in quoted]
-        for lines in self._lines(rank, *columns, [f'{Fraction(p, q * self.scale)}"]\n' for p, q in self.ratios]):
+        for lines in self._lines(order, rank, [f"[{label}, " for label in quoted], quoted, weights):
             hashed.update(lines.encode("utf-8", "surrogatepass"))
         return hashed.hexdigest()
 
-    def _lines(self, rank: Sequence[int], *columns: Sequence[str]) -> Iterator[str]:
+    def _lines(self, order: Sequence[int], rank: Sequence[int], *texts: Sequence[str]) -> Iterator[str]:
         """Yield the lines of all edges, put together from texts of source, target and weight, ascending by rank."""
-        edges = zip(self.source, self.target, self.which, strict=True)
-        ordered = iter(sorted(edges, key=lambda edge: (rank[edge[0]], rank[edge[1]])))
-        first, second, third = columns
-        while lines := "".join(first[s] + second[t] + third[k] for s, t, k in islice(ordered, CHUNK)):
-            yield lines
+        first, second, third = texts
+        for v in order:
+            ends, which = edges_of(self.out, v)
+            edges = sorted(zip(map(rank.__getitem__, ends), which, strict=True))
+            yield "".join([first[v] + second[order[r]] + third[k] for r, k in edges])
 
 
-def _starts(n: int, nodes: Any) -> list[int]:
+def edges_of(adjacency: Adjacency, v: int) -> tuple[array[int], array[int]]:
+    """Return the other ends of the edges of a node, and the numbers of their weights."""
+    starts, ends, which = adjacency
+    part = slice(starts[v], starts[v + 1])
+    return ends[part], which[part]
+
+
+def _starts(n: int, nodes: Iterable[int]) -> list[int]:
     """Return where every node's part of a sorted list begins, and the end."""
-    counts = [0] * n
-    for v in nodes:
-        counts[v] += 1
-    return [0, *accumulate(counts)]
+    counts = Counter(nodes)
+    return [0, *accumulate(counts[v] for v in range(n))]

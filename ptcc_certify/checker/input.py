@@ -140,18 +140,12 @@ def _threshold(doc: Document, known: Verified, said: Mapping[str, Any]) -> None:
 
 def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
     """Return where the nonzero eigenvalues of ``L`` lie, exactly."""
-    graph, components = structure.graph, list[list[int]]()
+    graph = structure.graph
     need(graph.n <= INPUT_NODES, "too large a graph, or too long numbers")
     rows = block(graph, range(graph.n))
     need(tractable(rows, graph.unit, line), "too large a graph, or too long numbers")
-    zero, seen = set(), set[int]()
-    for v in range(graph.n):
-        if v not in seen:
-            own, still = structure.strong_component(v)
-            zero |= {len(components)} if still else set()
-            components.append(own)
-            seen.update(own)
-    return nonzero_spectrum_beyond(rows, graph.unit, components, zero, line, doc.exact.characteristic)
+    parts = {tuple(structure.strong_component(v)[0]) for v in range(graph.n)}
+    return nonzero_spectrum_beyond(rows, graph.unit, line, parts, doc.exact.characteristic)
 
 
 # ---------------------------------------------------------------------- constants, sliding part, starts

@@ -14,14 +14,14 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import chain, pairwise
-from operator import mul
 from typing import Any, NamedTuple
 
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import LARGEST_EXPONENT, exp, log, rounded, sqrt
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.matrices import Matrix, congruence, diagonal
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrices import congruence
 from ptcc_certify.checker.reading import Interval, length
 
 #: Bits to which bounds are rounded.
@@ -318,46 +318,6 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
         eta = limits.acting(gain, h * j) * min(h, end - h * j)
         factor = rounded(factor * max(1 - eta * rate + eta**2 * growth, Fraction(0)), BITS, up=True)
     return factor
-
-
-@dataclass(frozen=True)
-class Form:
-    """A Lyapunov function ``z'P z`` that decays: ``V <= e^(-rate s) V(0)``.
-
-    Attributes
-    ----------
-    rate : Fraction
-    coordinates : {"E", "eps"}
-        ``E = -L X`` on the nodes, or the weighted deviation ``eps = X - (p'G X / p'1) G 1``.
-    nodes : list of int
-    diagonal : list of Fraction or None
-    matrix : list of list of Fraction or None
-        ``P``, its diagonal if it is diagonal.
-    lowest : Fraction
-        Not above the smallest eigenvalue of ``P``.
-    gauge : list of int
-        Camps of the nodes, for the coordinates ``eps``.
-    """
-
-    rate: Fraction
-    coordinates: str
-    nodes: Sequence[int]
-    diagonal: Sequence[Fraction] | None
-    matrix: Sequence[Sequence[Fraction]] | None
-    lowest: Fraction
-    gauge: Sequence[int] = ()
-
-    @cached_property
-    def entries(self) -> tuple[Matrix, int]:
-        """``P`` in integers over a scale, and the scale."""
-        P, scale = integers([self.diagonal] if self.diagonal is not None else self.matrix or [])
-        return (P if self.diagonal is None else diagonal(P[0])), scale
-
-    def value(self, z: Sequence[Fraction], sizes: bool = False) -> Fraction:
-        """Return ``z'P z``, or ``z'|P| z`` with the sizes of the entries, which bounds it where ``|z_i|`` is less."""
-        (P, common), ((Z,), scale) = self.entries, integers([z])
-        total = sum(x * sum(map(mul, map(abs, row) if sizes else row, Z)) for x, row in zip(Z, P, strict=True) if x)
-        return Fraction(total, common * scale**2)
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from itertools import pairwise
+from itertools import chain, pairwise
 from operator import mul
 from typing import Any
 
 from lmi.exact.definite import SparseFactor
 from lmi.exact.directed_rounding import down
 from lmi.exact.numbers import longest
+from lmi.exact.polynomials import row_sum
 from lmi.exact.work import fits, spend
 from ptcc_certify.checker.matrices import Sparse, block
 from ptcc_certify.checker.proof_cursor import Document
@@ -50,16 +51,14 @@ def check_dominance(
     for v, w, d in zip(nodes, own, each, strict=True):
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
-    known = {  # g_k of leader groups
-        k: _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
-        for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True)
-    }
+    spare = {}  # of leader groups, by which g_k exceeds the rate
+    for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True):
+        g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
+        spare[k] = ((g - rate) * graph.unit).as_integer_ratio()
     # w_i d_i times rate, less what the others push, times q and unit
     p, q = (rate * graph.unit).as_integer_ratio()
-    spare = {k: ((g - rate) * graph.unit).as_integer_ratio() for k, g in known.items()}
-    bits = longest((p, q, *(x for pair in spare.values() for x in pair))) + graph.bits
-    if bits > 1000:
-        spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
+    bits = longest((p, q, *chain.from_iterable(spare.values()))) + graph.bits
+    spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
     heard, diagonal = graph.heard(D), graph.diagonal
     pushes = [0 if k >= 0 else w * d for k, w, d in zip(number, W, D, strict=True)]
     pushed = graph.hearing(pushes)
@@ -100,7 +99,6 @@ def _factor(
     said, read, arithmetic = fields(said, keys, "factor"), doc.files.integers, doc.exact
     group, gauge = structure.closed[k], structure.gauges[k]
     n = len(group) - (gauge is not None)
-    need(type(said["bits"]) is int and type(said["power"]) is int, "bits or power is no integer")
     order, exponents, indptr = (
         read(said[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
     )
@@ -125,24 +123,16 @@ def _factor(
 
 
 def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:
-    """Return a basis of all ``y`` with ``eta'y = 0``, ``eta = G w``, which contain the range of ``A``, by rows.
+    """Return ``B``, by rows: a basis of all ``y`` with ``eta'y = 0``, ``eta = G w``, which contain the range of ``A``.
 
-    One column ``w_q G_i e_i - w_i G_q e_q`` for each node ``i`` but the root of a tree, ``q`` its parent.
+    One column ``w_q G_i e_i - w_i G_q e_q`` for each node ``i`` but the root of a tree, ``q`` its parent. Where parents
+    are no tree, the columns are dependent, and ``B'S B`` is not definite.
     """
-    n, kept = len(A), [0] * len(A)
-    for i, row in enumerate(A):
-        for j, x in row.items():
-            kept[j] += gauge[i] * w[i] * x
-    need(not any(kept), "the weights are not a left null vector")
-    need(min(parents) == -1 and parents.count(-1) == 1 and max(parents) < n, "parents have not one root")
-    children: list[list[int]] = [[] for _ in range(n + 1)]  # those of the root's parent, -1, at the end
-    for i, q in enumerate(parents):
-        children[q].append(i)
-    reached = list(children[-1])
-    for i in reached:
-        reached += children[i]
-    need(len(reached) == n, "parents are no tree")
-    basis: Sparse = [{} for _ in range(n)]
+    eta = {i: sign * weight for i, (sign, weight) in enumerate(zip(gauge, w, strict=True))}
+    need(not any(row_sum(eta, A).values()), "the weights are not a left null vector")
+    rooted = min(parents) == -1 and parents.count(-1) == 1 and max(parents) < len(A)
+    need(rooted and all(i != q for i, q in enumerate(parents)), "parents are not those of a tree")
+    basis: Sparse = [{} for _ in A]
     for column, i in enumerate(i for i, q in enumerate(parents) if q >= 0):
         q = parents[i]
         basis[i][column], basis[q][column] = w[q] * gauge[i], -w[i] * gauge[q]
@@ -151,7 +141,7 @@ def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Seq
 
 def _form(
     A: Sparse, weights: Sequence[int], g: Fraction, unit: int, basis: Sparse | None
-) -> tuple[tuple[list[int], list[int], list[int]], int]:
+) -> tuple[list[tuple[int, ...]], int]:
     """Return the lower triangle of ``S = W A + A'W - g W``, or of ``B'S B`` with a basis ``B``, times a scale."""
     p, q = (g * unit).as_integer_ratio()
     S: Sparse = [defaultdict(int, {i: -p * w}) for i, w in enumerate(weights)]
@@ -159,33 +149,20 @@ def _form(
         for j, x in row.items():
             S[i][j] += q * weights[i] * x
             S[j][i] += q * weights[i] * x
-    rows: Iterator[dict[int, int]] = iter(S)
+    rows: Iterable[dict[int, int]] = S
     if basis is not None:
-        columns: Sparse = [{} for _ in range(len(A) - 1)]
+        columns: Sparse = [{} for _ in A[1:]]
         for i, row in enumerate(basis):
             for j, x in row.items():
                 columns[j][i] = x
         work = sum(len(basis[j]) for row in S for j in row)
         few = work <= LARGEST_PRODUCT and fits(min(work, len(A) ** 2), LARGEST_KEPT)
         need(few, "a leader group of too many edges")
-        SB = list(_multiplied(S, basis))
+        SB = [row_sum(row, basis) for row in S]
         need(sum(map(mul, map(len, basis), map(len, SB))) <= LARGEST_PRODUCT, "a leader group of too many edges")
-        rows = _multiplied(columns, SB)
-    lower: tuple[list[int], list[int], list[int]] = [], [], []
+        rows = (row_sum(column, SB) for column in columns)
+    lower: list[tuple[int, int, int]] = []
     for i, row in enumerate(rows):
-        need(fits(len(lower[0]), LARGEST_FORM), "a leader group of too many edges")
-        for j, x in row.items():
-            if j <= i:
-                for part, value in zip(lower, (i, j, x), strict=True):
-                    part.append(value)
-    return lower, q * unit
-
-
-def _multiplied(A: Sparse, B: Sparse) -> Iterator[dict[int, int]]:
-    """Yield the rows of ``A B``."""
-    for left in A:
-        row: dict[int, int] = defaultdict(int)
-        for k, x in left.items():
-            for j, y in B[k].items():
-                row[j] += x * y
-        yield row
+        need(fits(len(lower), LARGEST_FORM), "a leader group of too many edges")
+        lower += [(i, j, x) for j, x in row.items() if j <= i]
+    return list(zip(*lower, strict=True)), q * unit

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,14 +12,14 @@ from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered, positions
-from ptcc_certify.checker.input_formulas import Form
 from ptcc_certify.checker.large_function import Proved, check_dominance
-from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, diagonal, less, need_rows, only
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrices import Matrix, block, combined, decays, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
 from ptcc_certify.checker.side_vectors import beside
 from ptcc_certify.checker.structure import Structure
-from ptcc_certify.checker.theorem_function import Paper, deviation_form
+from ptcc_certify.checker.theorem_function import Paper
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
@@ -54,46 +54,32 @@ def check_functions(doc: Document, structure: Structure, final: FinalState, pape
     need(not of_paper or bool(listed), "the paper's certificate is not among the Lyapunov functions")
     need(bool(structure.graph.listening) or not listed, "a Lyapunov function where nothing moves")
     functions: list[Function] = []
-    state_form: tuple[Matrix, Fraction] | None
+    scaled: tuple[Matrix, Fraction] | None
     proved: Proved = set()
     for k, given in enumerate(listed):
         doc.at = of = f"lyapunov.functions[{k}]"
         fields(given, ("class", *KEYS, "deviation"), "a Lyapunov function")
         if k == 0 and paper is not None and of_paper:
-            function, state_form = _of_paper(doc, paper, given)
+            function, scaled = _of_paper(doc, paper, given)
         elif given["class"] in ("perron", "lmi") and doc.following.get("kind") == "dominance":
-            function, state_form = _by_rows(doc, structure, given, of, proved), None
+            function, scaled = _by_rows(doc, structure, given, of, proved), None
         else:
-            function, state_form = _searched(doc, structure, given, of)
+            function, scaled = _searched(doc, structure, given, of)
         functions.append(function)
         if given["deviation"] is not None:
-            if state_form is None:
+            if scaled is None:
                 raise RejectedError("a deviation without a form")
-            _deviation(doc, final, given["deviation"], state_form, of)
+            _deviation(doc, final, given["deviation"], scaled, of)
     return functions
-
-
-def _state_form(
-    doc: Document, structure: Structure, nodes: Sequence[int], P: Matrix, scale: int
-) -> tuple[Matrix, Fraction]:
-    """Return ``E'P E``, with ``E`` on some nodes, as a form of the state, times a scale, and the scale."""
-    graph = structure.graph
-    form = congruence(doc.exact, P, [graph.row(v) for v in nodes], graph.n)
-    return form, Fraction(scale * graph.unit**2)
 
 
 def _of_paper(doc: Document, paper: Paper, function: Any) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Return the paper's function, which was verified before, with its form of the state."""
-    said, weights, rate = doc.data["paper"], paper.weights(paper.rho), paper.rate or Fraction(0)
+    said, form = doc.data["paper"], paper.form
     equal = function["class"] == "paper" and all(same(function[key], said[key]) for key in KEYS)
     need(equal, "the first Lyapunov function is not the paper's certificate")
-    own, gauge = list(weights.values()), paper.structure.gauges[0] or []
-    form = Form(rate, paper.coordinates, list(weights), own, None, min(own), gauge)
-    function = Function("paper", rate, exact(said["overshoot"]), form)
-    if paper.coordinates == "eps":
-        return function, deviation_form(paper)
-    (scaled,), scale = integers([own])
-    return function, _state_form(doc, paper.structure, list(weights), diagonal(scaled), scale)
+    function = Function("paper", form.rate, exact(said["overshoot"]), form)
+    return function, form.of_state(doc.exact, paper.structure.graph)
 
 
 def _block(doc: Document, structure: Structure, function: Any, shape: str) -> tuple[list[int], Any]:
@@ -127,38 +113,39 @@ def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tu
     need_rows(graph.n)
     rate = exact(function["rate"])
     if full:
-        rows, weights = triangle(said, len(nodes)), []
-        P, scale = integers(rows)
+        form = Form(rate, "E", nodes, None, triangle(said, len(nodes)), Fraction(0))
     else:
         need(not beside(said), "a side vector where it has no place")
-        rows, weights = [], list(doc.files.numbers(said, "diagonal", len(nodes)))
-        need(all(w > 0 for w in weights), "a weight is not positive")
-        (own,), scale = integers([weights])
-        P = diagonal(own)
-    state_form = _state_form(doc, structure, nodes, P, scale)
-    need(doc.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
-    S, _ = decrease(doc.exact, state_form[0], block(graph, range(graph.n)), rate, graph.unit)
-    need(doc.exact.definite(only(S, structure.kept)), "not proved definite")
-    doc.done(f"b = {down(rate)}, class {function['class']}")
-    if full:
-        ends = doc.open("overshoot", of, ["lowest", "highest"])
-        low, high = ends["lowest"], ends["highest"]
-        need(low > 0 and doc.exact.definite(less(P, low * scale)), "the lower end is not proved")
-        negative = [[-x for x in row] for row in P]
-        need(doc.exact.definite(less(negative, -high * scale)), "the upper end is not proved")
-        need(low <= high, "the ends are in the wrong order")
-        doc.done(f"at most {up(high / low)}")
-    else:
+        weights = list(doc.files.numbers(said, "diagonal", len(nodes)))
         low, high = min(weights), max(weights)
+        need(low > 0, "a weight is not positive")
+        form = Form(rate, "E", nodes, weights, None, low)
+    need(doc.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
+    F, times = form.of_state(doc.exact, graph)
+    proved = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.kept)
+    need(proved, "not proved definite")
+    doc.done(f"b = {down(rate)}, class {function['class']}")
+    if form.matrix:
+        low, high = _ends(doc, form.matrix, of)
+        form = replace(form, lowest=low)
     need(exact(function["overshoot"]) == high / low, "the overshoot constant is another")
-    form = Form(rate, "E", nodes, None if full else weights, rows if full else None, low)
-    return Function(function["class"], rate, high / low, form), state_form
+    return Function(function["class"], rate, high / low, form), (F, times)
 
 
-def _deviation(doc: Document, final: FinalState, said: Any, state_form: tuple[Matrix, Fraction], of: str) -> None:
+def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[Fraction, Fraction]:
+    """Verify ``lowest I < P < highest I``; return both."""
+    ends, (P, scale) = doc.open("overshoot", of, ["lowest", "highest"]), integers(rows)
+    low, high = ends["lowest"], ends["highest"]
+    need(low > 0 and doc.exact.definite(less(P, low * scale)), "the lower end is not proved")
+    need(doc.exact.definite(less([[-x for x in row] for row in P], -high * scale)), "the upper end is not proved")
+    doc.done(f"at most {up(high / low)}")
+    return low, high
+
+
+def _deviation(doc: Document, final: FinalState, said: Any, scaled: tuple[Matrix, Fraction], of: str) -> None:
     """Verify ``(x_k - (Q x)_k)^2 <= c_k V`` and ``||x - Q x||^2 <= c V``, in the coordinates ``kept``."""
     doc.open("deviation", of)
-    structure, (form, scale) = final.structure, state_form
+    structure, (form, scale) = final.structure, scaled
     labels = structure.graph.labels
     agents = ordered(labels, fields(said, ("agents", "norm"), "deviation")["agents"], "agents")
     (D, common, gram), S = final.deviations, only(form, structure.kept)
@@ -171,9 +158,6 @@ def _deviation(doc: Document, final: FinalState, said: Any, state_form: tuple[Ma
     failed = doc.exact.bounded(S, forms)  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
     p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
-    bits, ratio = max(longest(x for row in part for x in row) for part in (S, gram)), longest((p, q))
-    sized(len(S) ** 2, bits + ratio, "the deviation of the norm")
-    spend(2 * len(S) ** 2, bits, ratio, "the deviation of the norm")
-    N = [[p * s - q * g for s, g in zip(r, t, strict=True)] for r, t in zip(S, gram, strict=True)]
+    N = combined("the deviation of the norm", (p, S), (-q, gram))
     need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
     doc.done(f"norm at most {up(exact(said['norm']))}")

@@ -13,6 +13,7 @@ from operator import mul
 
 from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import longest, sized
+from lmi.exact.polynomials import row_sum
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.reading import need
@@ -36,11 +37,6 @@ def block(graph: Digraph, nodes: Sequence[int]) -> Sparse:
     return [{place[j]: x for j, x in graph.row(v).items() if j in place} for v in nodes]
 
 
-def product(A: Matrix, B: Matrix) -> Matrix:
-    """Return ``A B``; for small matrices."""
-    return [[sum(map(mul, row, column)) for column in zip(*B, strict=True)] for row in A]
-
-
 def transposed(A: Matrix) -> Matrix:
     """Return ``A'``."""
     return [list(column) for column in zip(*A, strict=True)]
@@ -51,20 +47,12 @@ def times(exact: Arithmetic, A: Matrix, B: Sparse, width: int) -> Matrix:
     need_rows(max(len(A), len(B), width))
     bits, own = longest(chain.from_iterable(A)), longest(x for row in B for x in row.values())
     sized(len(A) * width, bits + own + len(B).bit_length(), "a product of matrices")
-    spend(
-        sum(len(other) for row in A for x, other in zip(row, B, strict=True) if x), bits, own, "a product of matrices"
-    )
+    count = sum(len(other) for row in A for x, other in zip(row, B, strict=True) if x)
+    spend(count, bits, own, "a product of matrices")
     if A and 4 * sum(map(len, B)) > len(B) * width > DENSE_SIZE:
         return exact.product(A, [[row.get(j, 0) for j in range(width)] for row in B])
-    result = []
-    for row in A:
-        total = [0] * width
-        for x, other in zip(row, B, strict=True):
-            if x:
-                for j, y in other.items():
-                    total[j] += x * y
-        result.append(total)
-    return result
+    sums = (row_sum({k: x for k, x in enumerate(row) if x}, B) for row in A)
+    return [[total.get(j, 0) for j in range(width)] for total in sums]
 
 
 def congruence(exact: Arithmetic, P: Matrix, A: Sparse, width: int) -> Matrix:
@@ -73,15 +61,32 @@ def congruence(exact: Arithmetic, P: Matrix, A: Sparse, width: int) -> Matrix:
     return times(exact, left, A, width)
 
 
+def combined(what: str, *terms: tuple[int, Matrix]) -> Matrix:
+    """Return the sum of multiples of matrices.
+
+    Examples
+    --------
+    >>> combined("A - 2 B", (1, [[5, 6]]), (-2, [[1, 2]]))
+    [[3, 2]]
+    """
+    factors, matrices = zip(*terms, strict=True)
+    count = sum(map(len, matrices[0]))
+    bits, ratio = max(longest(chain.from_iterable(S)) for S in matrices), longest(factors)
+    sized(count, bits + ratio + 1, what)
+    spend(len(terms) * count, bits, ratio, what)
+    return [[sum(map(mul, factors, x)) for x in zip(*rows, strict=True)] for rows in zip(*matrices, strict=True)]
+
+
 def decrease(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int) -> tuple[Matrix, int]:
     """Return ``F A + A'F - b F`` times a positive integer, and that; ``F`` is symmetric, ``A`` over ``unit``."""
     FA = times(exact, F, A, len(A))
     p, q = (b * unit).as_integer_ratio()
-    bits, ratio = longest(chain.from_iterable(FA)) + 1, longest((p, q))
-    sized(len(F) ** 2, bits + ratio, "F A + A'F - b F")
-    spend(2 * len(F) ** 2, bits, ratio, "F A + A'F - b F")
-    pairs = zip(F, FA, zip(*FA, strict=True), strict=True)
-    return [[q * (x + y) - p * f for f, x, y in zip(*rows, strict=True)] for rows in pairs], q * unit
+    return combined("F A + A'F - b F", (q, FA), (q, transposed(FA)), (-p, F)), q * unit
+
+
+def decays(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int, kept: Sequence[int]) -> bool:
+    """Tell whether ``F A + A'F - b F > 0`` is proved on some coordinates; see :func:`decrease`."""
+    return exact.definite(only(decrease(exact, F, A, b, unit)[0], kept))
 
 
 def diagonal(values: Sequence[int]) -> Matrix:
@@ -93,10 +98,7 @@ def diagonal(values: Sequence[int]) -> Matrix:
 def less(S: Matrix, m: Fraction) -> Matrix:
     """Return ``S - m I``, times a positive integer."""
     p, q = m.as_integer_ratio()
-    bits, ratio = longest(chain.from_iterable(S)), longest((p, q))
-    sized(len(S) ** 2, bits + ratio, "S - m I")
-    spend(len(S) ** 2, bits, ratio, "S - m I")
-    return [[q * x - p * (i == j) for j, x in enumerate(row)] for i, row in enumerate(S)]
+    return combined("S - m I", (q, S), (-p, diagonal([1] * len(S))))
 
 
 def only(S: Matrix, kept: Sequence[int]) -> Matrix:

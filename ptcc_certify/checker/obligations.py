@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 #: What each kind of obligation states, and what makes it part of the claim; the fixed texts of FORMAT.md.
-OBLIGATIONS: dict[str, tuple[str, str]] = {
-    kind: (statement, lemma)
-    for kind, (statement, lemma) in json.loads(Path(__file__).with_suffix(".json").read_text("utf-8")).items()
-}
+_TEXTS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
+OBLIGATIONS: dict[str, tuple[str, str]] = {kind: (text, lemma) for kind, (text, lemma) in _TEXTS.items()}
 
 
 @dataclass(frozen=True)

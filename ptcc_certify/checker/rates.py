@@ -7,11 +7,10 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.directed_rounding import up
-from lmi.exact.numbers import integers, longest
-from lmi.exact.work import spend
+from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import block, decrease, need_rows, product, transposed
+from ptcc_certify.checker.matrices import block, congruence, decays, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure
@@ -72,12 +71,9 @@ def _inertia(doc: Document, structure: Structure, limit: Fraction, witness: Any)
     need(nodes == own, "the nodes are not a strong component")
     need_rows(len(nodes))
     H, _ = integers(triangle(said["lower_triangle"], len(nodes)))
-    S, _ = decrease(doc.exact, H, block(graph, nodes), limit, graph.unit)
-    need(doc.exact.definite(S), "not proved definite")
+    need(decays(doc.exact, H, block(graph, nodes), limit, graph.unit, range(len(nodes))), "not proved definite")
     # Of a balanced closed component the eigenvalue 0 lies below too, so that one more is needed.
     rows = entries(said["vectors"], "vectors", 2 if still else 1)
     X, _ = integers([[exact(x) for x in entries(row, "a vector", len(nodes))] for row in rows])
-    bits = longest(x for row in H for x in row)
-    spend(2 * len(nodes) ** 2, bits, 2 * longest(x for row in X for x in row), "H on the vectors")
-    below = product(X, product(H, transposed(X)))
+    below = congruence(doc.exact, H, [dict(enumerate(column)) for column in zip(*X, strict=True)], len(X))
     need(doc.exact.definite([[-x for x in row] for row in below]), "H is not negative on the vectors")

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -64,13 +64,7 @@ def read(path: str | Path) -> dict[str, Any]:
             raise ValueError(f"it may take {tenths // 10}.{tenths % 10} GB in memory; allow more by --memory")
         del content
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
-        data = json.loads(
-            text,
-            object_pairs_hook=unique,
-            parse_constant=number,
-            parse_float=number,
-            parse_int=integer,
-        )
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=number, parse_float=number, parse_int=integer)
     except (OSError, ValueError, RecursionError) as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise UnreadableError(f"{name}: not a readable certificate ({shorten(said, 160)})") from None
@@ -95,24 +89,10 @@ def loaded_bytes(content: bytes, text: str) -> int:
 
 def digest(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of everything but ``digest`` and ``unverified``, as JSON with sorted keys and no blanks."""
-    hashed = hashlib.sha256()
-    for part in _canonical({key: value for key, value in data.items() if key not in ("digest", "unverified")}):
+    hashed, encoder = hashlib.sha256(), json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+    for part in encoder.iterencode({key: x for key, x in data.items() if key not in ("digest", "unverified")}):
         hashed.update(part.encode("ascii"))
     return hashed.hexdigest()
-
-
-def _canonical(value: Any) -> Iterator[str]:
-    """Yield JSON with sorted keys and no blanks in pieces, lest the whole stand in memory once more."""
-    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    if any(isinstance(x, dict | list) for x in parts):
-        opened, closed = "{}" if isinstance(value, dict) else "[]"
-        for key in sorted(value) if isinstance(value, dict) else range(len(value)):
-            yield opened + (f"{json.dumps(key)}:" if isinstance(value, dict) else "")
-            yield from _canonical(value[key])
-            opened = ","
-        yield closed
-    else:
-        yield json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
 def exact(text: Any) -> Fraction:
@@ -172,9 +152,8 @@ def entries(value: Any, what: str, length: int | None = None) -> list[Any]:
 
 def triangle(said: Any, n: int) -> list[list[Fraction]]:
     """Return a symmetric matrix from its lower triangle."""
-    lower = [
-        [exact(x) for x in entries(row, "a row", i + 1)] for i, row in enumerate(entries(said, "lower_triangle", n))
-    ]
+    rows = enumerate(entries(said, "lower_triangle", n), start=1)
+    lower = [[exact(x) for x in entries(row, "a row", count)] for count, row in rows]
     return [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
 
 

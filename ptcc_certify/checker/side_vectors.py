@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from lmi.exact.numbers import integers, longest, sized
-from ptcc_certify.checker.reading import RejectedError, exact, fields, need
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
 
-NPY = re.compile(r"\{'descr': '(<i8|<f8)', 'fortran_order': False, 'shape': \(([0-9]{1,12}),\), \} *\n")
+NPY = re.compile(
+    rb"(?s)\x93NUMPY\x01\x00..\{'descr': '<([if])8', 'fortran_order': False, 'shape': \(([0-9]{1,12}),\), \} *\n"
+)
 
 
 class Numbers:
@@ -35,7 +37,7 @@ class Numbers:
         return len(self.values)
 
     def __getitem__(self, k: int) -> Fraction:
-        return Fraction(self.values[k]) if self.scale is None else Fraction(self.values[k], self.scale)
+        return self.values[k] if self.scale is None else Fraction(self.values[k], self.scale)
 
     def __iter__(self) -> Iterator[Fraction]:
         return map(self.__getitem__, range(len(self)))
@@ -79,19 +81,14 @@ class SideFiles:
         """Read ``{"file", "sha256"}``: a .npy vector of 64-bit integers or finite floats, little-endian."""
         said = fields(said, ("file", "sha256"), "a side file")
         name = said["file"]
-        need(
-            isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_.-]{1,200}", name) is not None,
-            "a side file's name is odd",
-        )
+        plain = isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_.-]{1,200}", name)
+        need(bool(plain), "a side file's name is odd")
         content = self._content(name, 8 * count + 1024)
         need(hashlib.sha256(content).hexdigest() == said["sha256"], f"side file {name} is not what its hash says")
-        size = int.from_bytes(content[8:10], "little")
-        match = NPY.fullmatch(content[10 : 10 + size].decode("latin-1"))
-        fits = content[:8] == b"\x93NUMPY\x01\x00" and match is not None and int(match[2]) == count
-        need(fits and len(content) == 10 + size + 8 * count, f"side file {name} is not a vector of {count} numbers")
-        values = array(
-            "q" if match is not None and match[1] == "<i8" else "d", memoryview(content)[10 + size :].tobytes()
-        )
+        match, start = NPY.match(content), 10 + int.from_bytes(content[8:10], "little")
+        if match is None or int(match[2]) != count or not match.end() == start == len(content) - 8 * count:
+            raise RejectedError(f"side file {name} is not a vector of {count} numbers")
+        values = array("q" if match[1] == b"i" else "d", content[start:])
         if sys.byteorder == "big":
             values.byteswap()
         need(values.typecode == "q" or all(map(math.isfinite, values)), f"side file {name}: a number is not finite")
@@ -116,26 +113,25 @@ class SideFiles:
 
     def integers(self, said: Any, what: str, count: int) -> list[int]:
         """Return a list of JSON integers, or a side vector of integers."""
-        if beside(said):
-            need("scale" not in said, f"{what}: integers have no scale")
-            values = self._vector(said, what, count)
-            need(values.typecode == "q", f"{what}: not integers")
-            return values.tolist()
-        need(isinstance(said, list) and len(said) == count, f"{what} has not {count} entries")
-        need(all(type(x) is int for x in said), f"{what}: not integers")
-        return said
+        if not beside(said):
+            need(all(type(x) is int for x in entries(said, what, count)), f"{what}: not integers")
+            return said
+        need("scale" not in said, f"{what}: integers have no scale")
+        values = self._vector(said, what, count)
+        need(values.typecode == "q", f"{what}: not integers")
+        return values.tolist()
 
     def numbers(self, said: Any, what: str, count: int) -> Numbers:
         """Return the exact numbers of a list of texts, or of a side vector: floats, or integers over a scale."""
         if not beside(said):
-            need(isinstance(said, list) and len(said) == count, f"{what} has not {count} entries")
-            return Numbers([exact(x) for x in said])
+            return Numbers([exact(x) for x in entries(said, what, count)])
         values = self._vector(said, what, count)
         if values.typecode == "d":
             need("scale" not in said, f"{what}: only integers have a scale")
-            common = max((x.as_integer_ratio()[1] for x in values), default=1)  # they are powers of two
+            ratios = [x.as_integer_ratio() for x in values]
+            common = max((q for _, q in ratios), default=1)  # they are powers of two
             sized(count, common.bit_length() + longest(int(end(values)) for end in (min, max) if count), what)
-            return Numbers([p * (common // q) for p, q in map(float.as_integer_ratio, values)], common)
+            return Numbers([p * (common // q) for p, q in ratios], common)
         scale = exact(said.get("scale", "1"))
         need(scale > 0, f"{what}: the scale is not positive")
         factor = scale.denominator

@@ -94,19 +94,17 @@ def check_structure(doc: Document, graph: Digraph) -> Structure:
         need(type(entry["balanced"]) is bool, "balance of a closed component")
         nodes = positions(doc, graph, entry["nodes"], "a closed component")
         need(bool(nodes) and all(a < b for a, b in pairwise(nodes)), "nodes of a closed component are not in order")
-        gauge = entries(entry["gauge"], "gauge", len(nodes)) if balanced else None
-        signs = gauge is None or (all(type(g) is int and g in (1, -1) for g in gauge) and gauge[0] == 1)
-        need(signs, "camps of a component")
+        gauge = None
+        if balanced:
+            gauge = entries(entry["gauge"], "gauge", len(nodes))
+            need(all(type(g) is int and abs(g) == 1 for g in gauge) and gauge[0] == 1, "camps of a component")
+        else:
+            _negative_cycle(doc, graph, entry["negative_cycle"], set(nodes))
         closed.append(nodes)
         gauges.append(gauge)
     structure = Structure(graph, closed, gauges, _closed_components(graph, closed))
-    signs_of = [0] * graph.n
-    for entry, nodes, gauge in zip(said["closed_components"], closed, gauges, strict=True):
-        if gauge is None:
-            _negative_cycle(doc, graph, entry["negative_cycle"], set(nodes))
-        for v, sign in zip(nodes, gauge or [0] * len(nodes), strict=True):
-            signs_of[v] = sign
-    need(graph.fits(signs_of), "camps of a component")
+    signs = {v: g for _, nodes, gauge in structure.balanced for v, g in zip(nodes, gauge, strict=True)}
+    need(graph.fits([signs.get(v, 0) for v in range(graph.n)]), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):
         need(positions(doc, graph, said[key], key, len(expected)) == expected, f"other {key}")
     need(said["balanced"] is (not graph.pieces[1]), "balance of the graph")
@@ -202,24 +200,24 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
 
 def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
     """Check what is said of each weak component; return its nodes and the final state that is claimed."""
-    said, keys = doc.data.get("components"), ("theorem", "behaviour", "corollaries")
-    groups, kinds, claims = zip(*expected, strict=True)
-    if len(expected) <= MANY_COMPONENTS:
-        for entry, nodes, kind, claim in zip(
-            entries(said, "components", len(expected)), groups, kinds, claims, strict=True
-        ):
-            fields(entry, ("nodes", "connectivity", "claim", "final_state"), "a component")
-            need(positions(doc, graph, entry["nodes"], "a component") == nodes, "another component")
-            need(entry["connectivity"] == kind and same(entry["claim"], claim), "the claim of a component")
-        return [(nodes, entry["final_state"]) for nodes, entry in zip(groups, said or [], strict=True)]
-    said = fields(said, ("nodes", "connectivity", *keys), "components")
-    if beside(said["nodes"]):
-        number = {v: k for k, nodes in enumerate(groups) for v in nodes}
-        listed = doc.files.integers(said["nodes"], "nodes", graph.n)
-        need(listed == [number[v] for v in range(graph.n)], "other components")
+    said, groups = doc.data.get("components"), [nodes for nodes, _, _ in expected]
+    labels = [[graph.labels[v] for v in nodes] for nodes in groups]
+    states: list[Any] = [None] * len(groups)
+    wanted: Any
+    if len(groups) <= MANY_COMPONENTS:
+        listed = entries(said, "components", len(groups))
+        states = [entry.get("final_state") if isinstance(entry, dict) else None for entry in listed]
+        wanted = [
+            {"nodes": nodes, "connectivity": kind, "claim": claim, "final_state": state}
+            for nodes, (_, kind, claim), state in zip(labels, expected, states, strict=True)
+        ]
     else:
-        told = [positions(doc, graph, x, "a component") for x in entries(said["nodes"], "nodes")]
-        need(told == list(groups), "other components")
-    need(same(said["connectivity"], list(kinds)), "connectivity of the components")
-    need(all(same(said[key], [claim[key] for claim in claims]) for key in keys), "claims of the components")
-    return [(nodes, None) for nodes in groups]
+        wanted = {"nodes": labels, "connectivity": [kind for _, kind, _ in expected]}
+        wanted |= {key: [claim[key] for _, _, claim in expected] for key in ("theorem", "behaviour", "corollaries")}
+        if isinstance(said, dict) and beside(said.get("nodes")):
+            number = {v: k for k, nodes in enumerate(groups) for v in nodes}
+            listed = doc.files.integers(said["nodes"], "nodes", graph.n)
+            need(listed == [number[v] for v in range(graph.n)], "other components")
+            wanted["nodes"] = said["nodes"]
+    need(same(said, wanted), "other components, or another claim of one")
+    return list(zip(groups, states, strict=True))

@@ -5,23 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import chain
 from typing import Any, NamedTuple
 
 from lmi.exact.directed_rounding import down
-from lmi.exact.numbers import integers, longest, sized
-from lmi.exact.work import spend
+from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
-from ptcc_certify.checker.matrices import (
-    Matrix,
-    block,
-    congruence,
-    decrease,
-    diagonal,
-    less,
-    need_rows,
-    only,
-)
+from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.matrices import block, congruence, decays, decrease, diagonal, less, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Claim, Structure
@@ -48,6 +38,13 @@ class Paper:
     blocks: list[Block]
     rho: Fraction
     rate: Fraction | None
+
+    @property
+    def form(self) -> Form:
+        """The function with its own rho."""
+        weights, gauge = self.weights(self.rho), self.structure.gauges[0] or ()
+        own = list(weights.values())
+        return Form(self.rate or Fraction(0), self.coordinates, list(weights), own, None, min(own), gauge)
 
     def weights(self, rho: Fraction) -> dict[int, Fraction]:
         """Return the diagonal by node, with some ``rho``."""
@@ -118,27 +115,13 @@ def _row(structure: Structure, theorem: str) -> tuple[str, str, list[tuple[str, 
     return objective, "E", [(f"{one}{k}", group, False) for k, group in groups] + ([(last, F, True)] if F else [])
 
 
-def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fraction]) -> None:
-    """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term, as the paper's formula asks."""
+def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fraction]) -> list[int]:
+    """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term; return a multiple of ``p`` in integers."""
     (scaled,), _ = integers([list(p)])
     left, graph = structure.graph.left(nodes, scaled), structure.graph
     near = all(abs(x) * NEAR <= w * graph.row(v)[v] for x, w, v in zip(left, scaled, nodes, strict=True))
     need(near, "the weights are not the left null vector of the comparison matrix")
-
-
-def deviation_form(paper: Paper) -> tuple[Matrix, Fraction]:
-    """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale, and the scale."""
-    p, gauge = paper.blocks[0].weights, paper.structure.gauges[0] or []
-    (own,), scale = integers([p])
-    bits = longest(own) + len(own).bit_length()
-    spend(4 * len(own) ** 2, bits, bits, "deviations")
-    sized(len(own) ** 2, 2 * bits, "deviations")
-    total = sum(own)
-    Z = [
-        [g * h * (total * x * (g_at == h_at) - x * y) for h_at, (h, y) in enumerate(zip(gauge, own, strict=True))]
-        for g_at, (g, x) in enumerate(zip(gauge, own, strict=True))
-    ]
-    return Z, Fraction(total * scale)
+    return scaled
 
 
 def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
@@ -147,39 +130,36 @@ def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
     b = doc.open("deviation-decrease", "paper", ["b"])["b"]
     need(b == rate, "b is not the rate")
     _near_null_vector(paper.structure, one.nodes, one.weights)
-    S, _ = decrease(doc.exact, deviation_form(paper)[0], block(graph, range(graph.n)), b, graph.unit)
-    need(doc.exact.definite(only(S, paper.structure.kept)), "not proved definite")
+    Z, _ = paper.form.of_state(doc.exact, graph)
+    need(decays(doc.exact, Z, block(graph, range(graph.n)), b, graph.unit, paper.structure.kept), "not proved definite")
     doc.done(f"b = {down(b)}")
 
 
 def group_decrease(doc: Document, structure: Structure, k: int, weights: Sequence[int], b: Fraction) -> bool:
     """Tell whether ``F L_k + L_k'F - b F > 0``, ``F = L_k'W L_k``, is proved, modulo ``G_k 1`` if that is balanced."""
     A = block(structure.graph, structure.closed[k])
-    F = congruence(doc.exact, diagonal(weights), A, len(A))
-    S, _ = decrease(doc.exact, F, A, b, structure.graph.unit)
-    return doc.exact.definite(only(S, range(structure.gauges[k] is not None, len(A))))
+    F, kept = congruence(doc.exact, diagonal(weights), A, len(A)), range(structure.gauges[k] is not None, len(A))
+    return decays(doc.exact, F, A, b, structure.graph.unit, kept)
 
 
-def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction] | None:
-    """Verify the decrease of each leader block; return the diagonal of Gamma, None where the row has no Gamma."""
+def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
+    """Verify the decrease of each leader block; return the diagonal of Gamma, empty where the row has no Gamma."""
     structure, gamma = paper.structure, dict[int, Fraction]()
     if theorem not in ("2.1", "3.1", "5.1", "6.1"):
-        return None
+        return gamma
     for name, nodes, weights, times_rho in paper.blocks:
         if times_rho or nodes == structure.followers:
             continue
-        k, ((scaled,), scale) = structure.closed.index(nodes), integers([weights])
+        k = structure.closed.index(nodes)
         if structure.gauges[k] is None:
             m = doc.open("leader-margin", f"paper.{name}", ["m"])["m"]
-            S, unit = decrease(
-                doc.exact, diagonal(scaled), block(structure.graph, nodes), Fraction(0), structure.graph.unit
-            )
-            need(m > 0 and doc.exact.definite(less(S, m * unit * scale)), "not proved definite")
+            own = dict(zip(nodes, weights, strict=True))
+            need(m > 0 and _exceeds(doc, structure, own, {}, m), "not proved definite")
             gamma |= dict.fromkeys(nodes, m)
             doc.done(f"m = {down(m)}")
         else:
             b = doc.open("leader-decrease", f"paper.{name}", ["b"])["b"]
-            _near_null_vector(structure, nodes, weights)
+            scaled = _near_null_vector(structure, nodes, weights)
             need(b > 0 and group_decrease(doc, structure, k, scaled, b), "not proved definite")
             least = min(weights)
             gamma |= {v: b * (w if theorem in ("2.1", "5.1") else least) for v, w in zip(nodes, weights, strict=True)}
@@ -187,34 +167,32 @@ def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction] |
     return gamma
 
 
-def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rate: Fraction) -> None:
+def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction], rate: Fraction) -> None:
     """Verify ``S - m I > 0``, and that the rate is ``m`` over the largest weight."""
     has_rho = doc.data["paper"]["rho"] is not None
     numbers = doc.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
     need(numbers.get("rho", paper.rho) == paper.rho, "another rho")
-    need(_coupled(doc, paper, gamma, paper.rho, numbers["m"]), "not proved definite")
-    need(rate == numbers["m"] / max(paper.weights(paper.rho).values()), "the rate is not m / largest weight")
+    weights = paper.weights(paper.rho)
+    need(_exceeds(doc, paper.structure, weights, gamma, numbers["m"]), "not proved definite")
+    need(rate == numbers["m"] / max(weights.values()), "the rate is not m / largest weight")
     doc.done(f"m = {down(numbers['m'])}, rate {down(rate)}")
 
 
-def _coupled(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None, rho: Fraction, m: Fraction) -> bool:
-    """Tell whether ``S > m I`` is proved: ``S = W A + A'W`` at some rho, with Gamma in place of the leaders' block."""
-    graph, weights, gamma = paper.structure.graph, paper.weights(rho), gamma or {}
-    nodes, ((own,), scale) = list(weights), integers([list(weights.values())])
-    S, unit = decrease(doc.exact, diagonal(own), block(graph, nodes), Fraction(0), graph.unit)
-    (tops,), other = integers([[*(gamma[v] * scale * unit for v in nodes if v in gamma)]])
-    bits, more = longest(chain.from_iterable(S)), other.bit_length()
-    sized(len(S) ** 2, bits + more, "the coupled blocks")
-    spend(len(S) ** 2, bits, more, "the coupled blocks")
-    S = [[x * other for x in row] for row in S]
+def _exceeds(
+    doc: Document, structure: Structure, weights: Mapping[int, Fraction], gamma: Mapping[int, Fraction], m: Fraction
+) -> bool:
+    """Tell whether ``S > m I`` is proved: ``S = W A + A'W`` on some nodes, with Gamma for the leaders' block."""
+    graph, nodes = structure.graph, list(weights)
     leading = [i for i, v in enumerate(nodes) if v in gamma]
-    for i, top in zip(leading, tops, strict=True):
+    (whole,), scale = integers([[*weights.values(), *(gamma[nodes[i]] for i in leading)]])
+    S, unit = decrease(doc.exact, diagonal(whole[: len(nodes)]), block(graph, nodes), Fraction(0), graph.unit)
+    for i, top in zip(leading, whole[len(nodes) :], strict=True):
         for j in leading:
-            S[i][j] = top * (i == j)
-    return doc.exact.definite(less(S, m * scale * unit * other))
+            S[i][j] = top * unit * (i == j)
+    return doc.exact.definite(less(S, m * scale * unit))
 
 
-def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None) -> None:
+def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> None:
     """Verify that both ends of the interval of ``rho`` are admissible."""
     said, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
     doc.at = "rho-interval of paper"
@@ -232,6 +210,7 @@ def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction] | None)
     need(numbers == {**ends, "witness": None}, "other ends")
     need(ends["printed"] <= ends["exact"], "the ends are in the wrong order")
     for end in ends.values():
-        need(end > 0 and _coupled(doc, paper, gamma, end, Fraction(0)), "an end is not proved admissible")
+        admissible = end > 0 and _exceeds(doc, paper.structure, paper.weights(end), gamma, Fraction(0))
+        need(admissible, "an end is not proved admissible")
     need(paper.rho <= ends["exact"], "rho lies beyond the interval")
     doc.done(", ".join(f"{key} end {down(end)}" for key, end in ends.items()))

@@ -27,8 +27,8 @@ import numpy as np
 
 import lmi
 from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.numbers import round_to_bits
 from lmi.sparse_definiteness_proofs import prove_sparse_positive_definite
 from lmi.sparse_h_matrix import FILL_ROWS, SparseHMatrix, fill_core
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -40,9 +40,12 @@ from ptcc_certify.theorems.matrices import diagonal_matrix, symmetric_product
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)
-#: Significant bits of weights and of the vector, and what floats may have lost in a row of the inequality.
-_BITS, _SLACK = 40, 1e-9
-_ROUNDING = 1e-14
+#: Significant bits of weights and of the vector.
+_BITS = 40
+#: What floats may have lost in a row of the inequality: a share of the rate, and of the terms that cancel (45 units of
+#: rounding, enough for rows of hundreds of entries). No part of the proof: the check forms every row exactly and
+#: refuses a rate that is too large; this is the room for it to succeed.
+_SLACK, _ROUNDING = 1e-9, 1e-14
 #: In-weights from here on leave no room for rates, which may be four times as large.
 _LARGEST_WEIGHT = 2.0**1021
 #: Largest condition of a diagonal matrix that is searched for a leader group.
@@ -77,10 +80,8 @@ def dominant_functions(
     problem = _Composite(structure, search)
     found: list[LyapunovFunction] = []
     for loss in losses:
-        try:
+        with contextlib.suppress(LMIError):
             found.append(problem.function(loss, "lmi" if search else "perron"))
-        except LMIError:
-            continue
     if not found:
         raise NoCertificate("no diagonal matrix was found that dominates")
     return found
@@ -311,16 +312,13 @@ def _smallest_eigenvalue(form: Any, weights: np.ndarray, balanced: bool, factor:
     half = sparse.diags_array(1 / np.sqrt(weights))
     scaled = sparse.csc_array(half @ form @ half)
     top = float(abs(scaled).max())
+    options = {"k": 1 + balanced, "sigma": -1e-3 * top} if factor else {"k": 1, "which": "SA", "tol": 1e-6}
+    if balanced and not factor:  # the spectrum of the comparison matrix, whose kernel is known, moved to the other end
+        M = sparse.csc_array(2 * sparse.diags_array(scaled.diagonal()) - abs(scaled))
+        kernel = np.sqrt(weights / weights.sum())
+        scaled = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
     try:
-        if factor:
-            found = float(eigsh(scaled, k=1 + balanced, sigma=-1e-3 * top, return_eigenvectors=False).max())
-        elif balanced:  # the spectrum of the comparison matrix, whose kernel is known and moved to the other end
-            M = sparse.csc_array(2 * sparse.diags_array(scaled.diagonal()) - abs(scaled))
-            kernel = np.sqrt(weights / weights.sum())
-            moved = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
-            found = float(eigsh(moved, k=1, which="SA", tol=1e-6, return_eigenvectors=False)[0])
-        else:
-            found = float(eigsh(scaled, k=1, which="SA", tol=1e-6, return_eigenvectors=False)[0])
+        found = float(eigsh(scaled, return_eigenvectors=False, **options).max())
     except (ArpackError, RuntimeError):
         found = 0.0
     if not found > 0:

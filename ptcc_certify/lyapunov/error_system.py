@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin
-from lmi.exact.numbers import round_to_bits
+from lmi.dyadic import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.lemmas import left_vector
 from ptcc_certify.theorems.matrices import (
@@ -109,26 +109,17 @@ class ErrorSystem:
         """
         if self.basis is None:
             return None
-        factor: Matrix = [[Fraction(0)] * self.basis.shape[1] for _ in self.nodes]
-        moved = np.zeros(len(self.nodes), dtype=bool)
+        result: Matrix = [[Fraction(int(x)) for x in row] for row in self.basis]  # rows of balanced groups follow
         for rows, component in zip(self.parts, self.leaders, strict=False):
             if not component.balanced:
                 continue
-            moved[rows] = True
             columns = np.flatnonzero(np.abs(self.basis[rows]).max(axis=0) > 0)
             R = np.linalg.pinv(self.matrix[np.ix_(rows, rows)]) @ self.basis[np.ix_(rows, columns)]
-            unit = 2.0 ** np.floor(np.log2(np.abs(R).max()))
-            for i, row in zip(rows, R / unit, strict=True):
+            R /= 2.0 ** np.floor(np.log2(np.abs(R).max()))
+            factor = [[Fraction(round(x * 2**_BASIS_BITS), 2**_BASIS_BITS) for x in row] for row in R]
+            for i, row in zip(rows, multiply(exact_block(self.exact_matrix, rows, rows), factor), strict=True):
                 for j, x in zip(columns, row, strict=True):
-                    factor[i][j] = Fraction(round(x * 2**_BASIS_BITS), 2**_BASIS_BITS)
-        L = self.exact_matrix
-        result: Matrix = []
-        product = multiply([[x if moved[j] else Fraction(0) for j, x in enumerate(row)] for row in L], factor)
-        for i in range(len(self.nodes)):
-            if moved[i]:
-                result.append(product[i])
-            else:
-                result.append([Fraction(int(x)) for x in self.basis[i]])
+                    result[i][j] = x
         return result
 
     @cached_property

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from lmi.definiteness_proofs import prove_positive_definite
+from lmi.dyadic import round_to_bits
 from lmi.exact.directed_rounding import float_down
-from lmi.exact.numbers import round_to_bits
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix

@@ -252,11 +252,7 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
         first = min(decaying, key=_useful_from)
         if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
             chosen.append(first)
-    distinct: list[Candidate] = []
-    for candidate in chosen:
-        if not any(candidate is other for other in distinct):
-            distinct.append(candidate)
-    return distinct
+    return list(dict.fromkeys(chosen))
 
 
 def _useful_from(candidate: Candidate) -> float:
@@ -278,39 +274,35 @@ def _without_hair_splitting(functions: list[LyapunovFunction]) -> list[LyapunovF
     """
     result = []
     for function in functions:
-        slower = (m.proved_rate for m in functions if m.overshoot < function.overshoot)
-        near = [rate for rate in slower if 0 < rate < function.proved_rate]
-        close = [rate for rate in near if function.proved_rate - rate <= Fraction(_SAME_RATE) * rate]
-        if close:
-            function = replace(function, rate=max(close))
-        result.append(function)
+        own, slower = function.proved_rate, (V.proved_rate for V in functions if V.overshoot < function.overshoot)
+        close = [rate for rate in slower if 0 < rate < own <= rate + Fraction(_SAME_RATE) * rate]
+        result.append(replace(function, rate=max(close)) if close else function)
     return result
 
 
 def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunction | None:
     """Round a candidate to rationals and prove its rate and overshoot constant exactly; None if a step fails."""
-    n = len(system.nodes)
+    ends = None
     if candidate.log_weights is not None:
         weights = rounded_diagonal(candidate.log_weights, BITS)
         if min(weights) <= 0:
             return None
-        rate = system.prove_rate(diagonal_matrix(weights), candidate.rate)
-        if rate is None:
-            return None
-        block = LyapunovBlock("P", system.nodes, weights)
-        return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, numerical_rate=candidate.rate)
-    assert candidate.matrix is not None
-    P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
+        P, block = diagonal_matrix(weights), LyapunovBlock("P", system.nodes, weights)
+    else:
+        assert candidate.matrix is not None
+        P = rounded_matrix(candidate.matrix, _MATRIX_BITS)
+        block = LyapunovBlock("P", system.nodes, matrix=P)
     rate = system.prove_rate(P, candidate.rate)
     if rate is None:
         return None
-    size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
-    whole, identity = [[x.numerator for x in row] for row in P], np.eye(n, dtype=int).tolist()
-    lowest = prove_generalized_margin(whole, identity, float(size[0]))
-    negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
-    if lowest is None or lowest <= 0 or negated is None:
-        return None
-    block, ends = LyapunovBlock("P", system.nodes, matrix=P), (lowest, -negated)
+    if block.matrix is not None:
+        size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
+        whole, identity = [[x.numerator for x in row] for row in P], np.eye(len(P), dtype=int).tolist()
+        lowest = prove_generalized_margin(whole, identity, float(size[0]))
+        negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
+        if lowest is None or lowest <= 0 or negated is None:
+            return None
+        ends = (lowest, -negated)
     return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, ends=ends, numerical_rate=candidate.rate)
 
 
@@ -420,24 +412,18 @@ def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:
 
 def _coupled(
     kind: str, A: np.ndarray, parts: Sequence[np.ndarray], log_weights: np.ndarray, basis: np.ndarray | None
-) -> list[Candidate]:
-    """Couple blocks at several rates below the slowest of them."""
-    rates = []
-    for part in parts:
-        own = None if basis is None else block_columns(basis, part)
-        rates.append(lmi.diagonal_rate(A[np.ix_(part, part)], log_weights[part], own))
-    slowest = min(rates)
+) -> Iterator[Candidate]:
+    """Yield the blocks coupled at several rates below the slowest of them."""
+    bases = [None if basis is None else block_columns(basis, part) for part in parts]
+    pairs = zip(parts, bases, strict=True)
+    slowest = min(lmi.diagonal_rate(A[np.ix_(part, part)], log_weights[part], own) for part, own in pairs)
     if not slowest > 0:
         raise lmi.NoCertificate(f"the slowest block decays at {slowest:.3g}, which is not positive")
     if len(parts) == 1:
-        return [_diagonal(kind, lmi.DiagonalCertificate(log_weights - log_weights.max(), slowest))]
-    found = []
+        yield _diagonal(kind, lmi.DiagonalCertificate(log_weights - log_weights.max(), slowest))
+        return
     for loss in _COUPLING_LOSSES:
-        try:
+        with contextlib.suppress(lmi.NoCertificate):
             coupled = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
-            rate = lmi.diagonal_rate(A, coupled, basis)
-        except lmi.NoCertificate:
-            continue
-        if rate > 0:
-            found.append(_diagonal(kind, lmi.DiagonalCertificate(coupled, rate)))
-    return found
+            if (rate := lmi.diagonal_rate(A, coupled, basis)) > 0:
+                yield _diagonal(kind, lmi.DiagonalCertificate(coupled, rate))

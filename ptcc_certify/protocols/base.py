@@ -36,7 +36,6 @@ class Protocol(Parameters, ABC):
     """
 
     kind: ClassVar[str]
-    deadline_latex: ClassVar[str] = "T"
     _kinds: ClassVar[dict[str, type[Protocol]]] = {}
     T: Fraction
     rho1: Fraction
@@ -125,7 +124,6 @@ class ReachingProtocol(Protocol):
         Of the equation, ``|d_k| <= delta < mu1``.
     """
 
-    deadline_latex: ClassVar[str] = "T_{r} + T_{s}"
     T_r: Fraction
     T_s: Fraction
     mu1: Fraction

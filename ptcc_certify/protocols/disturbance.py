@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,7 +20,7 @@ from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
 from ptcc_certify.protocols.casadi_latex import to_latex
-from ptcc_certify.protocols.expression import ATOMS, Interval, Program, enclosure, floats, parse, symbolic
+from ptcc_certify.protocols.expression import ATOMS, Program, enclosure, floats, parse, symbolic
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -159,13 +159,13 @@ class ExpressionDisturbance(Disturbance):
 
     def __init__(self, text_or_texts: str | Sequence[str]):
         common = isinstance(text_or_texts, str)
-        texts = [text_or_texts] if common else list(text_or_texts)
+        texts: list[Any] = [text_or_texts] if common else list(text_or_texts)
         if not texts or not all(isinstance(text, str) for text in texts):
             raise ParameterError("a disturbance is one text, or one text for each agent")
-        programs = {text: parse(text) for text in dict.fromkeys(map(str, texts))}
-        object.__setattr__(self, "texts", tuple(" ".join(str(text).split()) for text in texts))
+        programs = {" ".join(text.split()): parse(text) for text in dict.fromkeys(texts)}
+        object.__setattr__(self, "texts", tuple(" ".join(text.split()) for text in texts))
         object.__setattr__(self, "common", common)
-        object.__setattr__(self, "_programs", {" ".join(text.split()): program for text, program in programs.items()})
+        object.__setattr__(self, "_programs", programs)
 
     @property
     def text(self) -> str:
@@ -214,15 +214,12 @@ class ExpressionDisturbance(Disturbance):
         ParameterError
             Names agent, time and value where the bound is broken, or where no bound can be given.
         """
+        limit, budget, sampled = _Limit(delta, slack, labels), _BOXES, False
         if not self.common:
-            _refuse_other_count(len(self.texts), "expressions", labels)
-        budget, sampled = _BOXES, False
+            limit.refuse_other_count(len(self.texts), "expressions")
         for text, agents in self._groups(np.arange(len(labels))):
-            if "k" not in self._programs[text]:
-                agents = agents[:1]
-            for start in range(0, agents.size, _CHUNK):
-                chunk = agents[start : start + _CHUNK]
-                budget, by_samples = self._check_boxes(text, chunk, _Limit(delta, slack), labels, until, budget)
+            for chunk in _chunks(agents if "k" in self._programs[text] else agents[:1]):
+                budget, by_samples = self._check_boxes(text, chunk, limit, until, budget)
                 sampled |= by_samples
         return f"sampling at {_INSTANTS:,} instants" if sampled else "interval arithmetic"
 
@@ -236,28 +233,26 @@ class ExpressionDisturbance(Disturbance):
     def _program(self, agent: int) -> Program:
         return self._programs[self.texts[0 if self.common else agent]]
 
-    def _check_boxes(
-        self, text: str, agents: np.ndarray, limit: _Limit, labels: Sequence[str], until: float, budget: int
-    ) -> tuple[int, bool]:
+    def _check_boxes(self, text: str, agents: np.ndarray, limit: _Limit, until: float, budget: int) -> tuple[int, bool]:
         """Return the number of boxes left to spend, and whether samples had to do."""
         program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', limit.bound
 
         def sample(k: np.ndarray, t: np.ndarray) -> None:
-            _refuse_beyond(floats(program, k + 1.0, t), t, k, limit, labels, place)
+            limit.refuse_beyond(floats(program, k + 1.0, t), t, k, place)
 
         sample(agents[:, None], np.linspace(0, until, _GRID)[None, :])
         boxes, sampled = [(int(agent), 0.0, until) for agent in agents], False
         for level in range(_BISECTIONS + 1):
-            ends = [enclosure(program, agent + 1, lo, hi) for agent, lo, hi in boxes]
-            undefined = [box for box, end in zip(boxes, ends, strict=True) if end is None]
-            boxes = [box for box, end in zip(boxes, ends, strict=True) if end is None or not _within(end, bound)]
+            ends = {box: enclosure(program, box[0] + 1, *box[1:]) for box in boxes}
+            undefined = [box for box, end in ends.items() if end is None]
+            boxes = [box for box, end in ends.items() if end is None or not (end[0] >= -bound and end[1] <= bound)]
             if level == _BISECTIONS or 2 * len(boxes) > budget:
                 sampled |= len(boxes) > len(undefined)
                 boxes = undefined
             if not boxes:
                 break
             if level == _BISECTIONS or 2 * len(boxes) > _BOXES:  # undefined ones may overspend: they are few
-                where = f"agent {shorten(labels[boxes[0][0]])}, t = {boxes[0][1]:.9g}"
+                where = f"agent {shorten(limit.labels[boxes[0][0]])}, t = {boxes[0][1]:.9g}"
                 mend = "is it undefined there? keep clear of divisions by zero, or write sqrt(max(0, ...))"
                 raise ParameterError(f"{place}: no bound can be given near {where}; {mend}")
             halves = [(agent, lo, (lo + hi) / 2, hi) for agent, lo, hi in boxes]
@@ -361,15 +356,12 @@ class SampledDisturbance(Disturbance):
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Compare all samples on [0, until], and the values at both ends, with ``delta``."""
-        if len(self.samples) > 1:
-            _refuse_other_count(len(self.samples), "signals", labels)
-        agents = np.arange(len(self.samples))
-        instants = np.unique(np.concatenate([[0.0], self.breaks(until), [until]]))
-        for start in range(0, agents.size, _CHUNK):
-            chunk = agents[start : start + _CHUNK]
-            values = self.values(instants, chunk)
-            place = f"disturbance ({shorten(self.text)})"
-            _refuse_beyond(values, instants, chunk[:, None], _Limit(delta, slack), labels, place)
+        limit, count, place = _Limit(delta, slack, labels), len(self.samples), f"disturbance ({shorten(self.text)})"
+        if count > 1:
+            limit.refuse_other_count(count, "signals")
+        instants = np.unique([0.0, *self.breaks(until), until])
+        for chunk in _chunks(np.arange(count)):
+            limit.refuse_beyond(self.values(instants, chunk), instants, chunk[:, None], place)
         return "exact at the samples"
 
     def _rows(self, agents: ArrayLike) -> np.ndarray:
@@ -554,8 +546,8 @@ class StateDependent(Disturbance):
             wanted = f"return a number or shape ({len(labels)},)"
             raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {wanted}")
         values = np.broadcast_to(values, (len(labels),))
-        limit, agents = _Limit(delta, slack), np.arange(len(labels))
-        _refuse_beyond(values, np.array(t), agents, limit, labels, f"disturbance ({self.text})")
+        agents = np.arange(len(labels))
+        _Limit(delta, slack, labels).refuse_beyond(values, np.array(t), agents, f"disturbance ({self.text})")
         return values
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike) -> np.ndarray:
@@ -642,6 +634,10 @@ def _exact(value: Any, name: str) -> Fraction:
         raise ParameterError(f"{error}; give a finite number, or a text such as 0.1*sin(t)") from None
 
 
+def _chunks(agents: np.ndarray) -> Iterator[np.ndarray]:
+    return (agents[start : start + _CHUNK] for start in range(0, agents.size, _CHUNK))
+
+
 def _number(value: Any, name: str) -> float:
     number = nearest_float(_exact(value, name))
     if math.isinf(number):
@@ -650,36 +646,30 @@ def _number(value: Any, name: str) -> float:
 
 
 class _Limit(NamedTuple):
-    """The bound of a disturbance, and how far floats may exceed it, relatively."""
+    """The bound of the disturbance of the agents of these labels, and how far floats may exceed it, relatively."""
 
     delta: Fraction
     slack: float
+    labels: Sequence[str]
 
     @property
     def bound(self) -> float:
         return nearest_float(self.delta) * (1 + self.slack)
 
+    def refuse_other_count(self, count: int, what: str) -> None:
+        n = len(self.labels)
+        if count != n:
+            raise ParameterError(f"the disturbance has {count} {what} for {n} agents; give one for each")
 
-def _within(ends: Interval, bound: float) -> bool:
-    return bool(ends[0] >= -bound and ends[1] <= bound)
-
-
-def _refuse_other_count(count: int, what: str, labels: Sequence[str]) -> None:
-    if count != len(labels):
-        raise ParameterError(f"the disturbance has {count} {what} for {len(labels)} agents; give one for each")
-
-
-def _refuse_beyond(
-    values: np.ndarray, t: np.ndarray, agents: np.ndarray, limit: _Limit, labels: Sequence[str], place: str
-) -> None:
-    """Refuse values that are not finite or beyond ``delta``; the three arrays broadcast."""
-    size = np.where(np.isfinite(values), np.abs(values), np.inf)
-    worst = int(size.argmax())
-    if size.flat[worst] <= limit.bound:
-        return
-    agent, instant = (np.broadcast_to(array, size.shape).flat[worst] for array in (agents, t))
-    value, delta = float(values.flat[worst]), nearest_float(limit.delta)
-    where = f"{place} of agent {shorten(labels[agent])} at t = {float(instant):.9g}"
-    if not math.isfinite(value):
-        raise ParameterError(f"{where} is {value}, not finite; keep clear of poles and of the ends of domains")
-    raise ParameterError(f"{where} is {value!r}, beyond delta = {delta!r}; lower it or raise delta")
+    def refuse_beyond(self, values: np.ndarray, t: np.ndarray, agents: np.ndarray, place: str) -> None:
+        """Refuse values that are not finite or beyond ``delta``; the three arrays broadcast."""
+        size = np.where(np.isfinite(values), np.abs(values), np.inf)
+        worst = int(size.argmax())
+        if size.flat[worst] <= self.bound:
+            return
+        agent, instant = (np.broadcast_to(array, size.shape).flat[worst] for array in (agents, t))
+        value, delta = float(values.flat[worst]), nearest_float(self.delta)
+        where = f"{place} of agent {shorten(self.labels[agent])} at t = {float(instant):.9g}"
+        if not math.isfinite(value):
+            raise ParameterError(f"{where} is {value}, not finite; keep clear of poles and of the ends of domains")
+        raise ParameterError(f"{where} is {value!r}, beyond delta = {delta!r}; lower it or raise delta")

@@ -162,11 +162,16 @@ def evaluate(program: Program, algebra: dict[str, Callable[..., Any]], atoms: di
     return stack[0]
 
 
-_FLOATS: dict[str, Callable[..., Any]] = {
-    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative},
-    **{"sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh, "exp": np.exp, "log": np.log},
-    **{"sqrt": np.sqrt, "abs": np.abs, "sign": np.sign, "min": np.minimum, "max": np.maximum},
+def _algebra(module: Any, names: dict[str, str]) -> dict[str, Callable[..., Any]]:
+    """Return the operations of NumPy or CasADi, with the names of the functions that are called otherwise there."""
+    return _ARITHMETIC | {name: getattr(module, names.get(name, name)) for name in FUNCTIONS}
+
+
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow},
+    "neg": operator.neg,
 }
+_FLOATS = _algebra(np, {"atan": "arctan", "min": "minimum", "max": "maximum"})
 
 
 def floats(program: Program, k: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -181,10 +186,7 @@ def symbolic(program: Program, atoms: dict[str, Any]) -> Any:
     """Return the CasADi expression of symbols or numbers ``k``, ``t``, ``pi`` and ``e``, of the type of ``t``."""
     import casadi as ca
 
-    names = {"abs": "fabs", "min": "fmin", "max": "fmax"}
-    algebra = {name: getattr(ca, names.get(name, name)) for name in FUNCTIONS}
-    algebra |= {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
-    algebra |= {"**": operator.pow, "neg": operator.neg}
+    algebra = _algebra(ca, {"abs": "fabs", "min": "fmin", "max": "fmax"})
     return evaluate(program, algebra, atoms, type(atoms["t"]))
 
 
@@ -242,25 +244,25 @@ def _corners(operation: Callable[[arb, arb], arb]) -> Callable[[Interval, Interv
     return enclose
 
 
-def _increasing(function: Callable[[arb], arb], defined: Callable[[arb], bool] = lambda low: True) -> Callable:
-    """Return the enclosure of an increasing function; ``defined`` is asked of the lower end."""
+def _increasing(function: Callable[[arb], arb]) -> Callable[[Interval], Interval]:
+    return lambda x: (function(x[0]), function(x[1]))
 
-    def enclose(x: Interval) -> Interval:
-        if not defined(x[0]):
-            raise _Undefined
-        return function(x[0]), function(x[1])
+
+def _checked(operation: Callable[..., Interval], defined: Callable[..., bool] = lambda *_: True) -> Callable:
+    """Refuse operands outside the domain, and what may be beyond the range of floats, or is not a number."""
+
+    def enclose(*operands: Interval) -> Interval:
+        if defined(*operands):
+            ends = operation(*operands)
+            if ends[0] > -_LARGEST and ends[1] < _LARGEST:
+                return ends
+        raise _Undefined
 
     return enclose
 
 
 def _has_no_zero(x: Interval) -> bool:
     return bool(x[0] > 0 or x[1] < 0)
-
-
-def _divide(x: Interval, y: Interval) -> Interval:
-    if not _has_no_zero(y):
-        raise _Undefined
-    return _corners(operator.truediv)(x, y)
 
 
 def _absolute(x: Interval) -> Interval:
@@ -294,37 +296,19 @@ def _wave(function: Callable[[arb], arb], peak: float) -> Callable[[Interval], I
     return enclose
 
 
-def _tan(x: Interval) -> Interval:
-    if _reaches(x, 0.5, arb.pi()):
-        raise _Undefined
-    return x[0].tan(), x[1].tan()
-
-
-def _within_floats(operation: Callable[..., Interval]) -> Callable[..., Interval]:
-    """Refuse what may be beyond the range of floats, and not a number."""
-
-    def enclose(*operands: Interval) -> Interval:
-        ends = operation(*operands)
-        if ends[0] > -_LARGEST and ends[1] < _LARGEST:
-            return ends
-        raise _Undefined
-
-    return enclose
-
-
 _INTERVALS: dict[str, Callable[..., Interval]] = {
     "neg": lambda x: (-x[1], -x[0]),
-    "+": _within_floats(lambda x, y: (x[0] + y[0], x[1] + y[1])),
-    "-": _within_floats(lambda x, y: (x[0] - y[1], x[1] - y[0])),
-    "*": _within_floats(_corners(operator.mul)),
-    "/": _within_floats(_divide),
-    "**": _within_floats(_power),
+    "+": _checked(lambda x, y: (x[0] + y[0], x[1] + y[1])),
+    "-": _checked(lambda x, y: (x[0] - y[1], x[1] - y[0])),
+    "*": _checked(_corners(operator.mul)),
+    "/": _checked(_corners(operator.truediv), lambda x, y: _has_no_zero(y)),
+    "**": _checked(_power),
     "sin": _wave(arb.sin, 0.25),
     "cos": _wave(arb.cos, 0.0),
-    "tan": _within_floats(_tan),
-    "exp": _within_floats(_increasing(arb.exp)),
-    "log": _within_floats(_increasing(arb.log, lambda low: low > 0)),
-    "sqrt": _within_floats(_increasing(arb.sqrt, lambda low: low >= 0)),
+    "tan": _checked(_increasing(arb.tan), lambda x: not _reaches(x, 0.5, arb.pi())),
+    "exp": _checked(_increasing(arb.exp)),
+    "log": _checked(_increasing(arb.log), lambda x: x[0] > 0),
+    "sqrt": _checked(_increasing(arb.sqrt), lambda x: x[0] >= 0),
     "atan": _increasing(arb.atan),
     "tanh": _increasing(arb.tanh),
     "sign": _increasing(arb.sgn),

@@ -144,15 +144,15 @@ class Gain(Parameters):
 
     def expression(self, t: ca.SX) -> ca.SX:
         """Return the gain as a CasADi expression of the symbol ``t``."""
-        return self._gain(t, self._numbers())
+        return self._expressions(t, self._numbers())["gain"]
 
     def phi_expression(self, t: ca.SX) -> ca.SX:
         """Return ``phi`` as a CasADi expression of the symbol ``t``."""
-        return self._phi(t, self._numbers())
+        return self._expressions(t, self._numbers())["phi"]
 
     def clock_expression(self, t: ca.SX) -> ca.SX:
         """Return the clock ``s`` as a CasADi expression of the symbol ``t``."""
-        return self._clock(t, self._numbers())
+        return self._expressions(t, self._numbers())["clock"]
 
     def latex(
         self,
@@ -187,38 +187,28 @@ class Gain(Parameters):
         """  # noqa: E501
         import casadi as ca
 
-        forms = {"gain": self._gain, "phi": self._phi, "clock": self._clock}
+        parameters = dict(zip(_PARAMETERS, map(ca.SX.sym, letters), strict=True))
+        forms = self._expressions(ca.SX.sym("t"), self._numbers() if numbers else parameters)
         if of not in forms:
             raise ParameterError(f'LaTeX of "{shorten(str(of))}" is unknown; use "gain", "phi" or "clock"')
-        parameters = (
-            self._numbers()
-            if numbers
-            else {name: ca.SX.sym(letter) for name, letter in zip(_PARAMETERS, letters, strict=True)}
-        )
-        return to_latex(forms[of](ca.SX.sym("t"), parameters))
+        return to_latex(forms[of])
 
     def _numbers(self) -> dict[str, Any]:
         return {name: float(value) for name, value in self.parameters.items()}
 
-    def _gain(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
+    def _expressions(self, t: ca.SX, p: dict[str, Any]) -> dict[str, ca.SX]:
+        """Return gain, ``phi`` and clock for parameters by name, numbers or symbols."""
         import casadi as ca
 
+        T, rho1, pole, before = p["T"], p["rho1"], p["rho2"] * p["kappa"], t < p["T"]
+        phi = ca.if_else(before, (T / (T - t)) ** p["kappa"], 1)
         if not self.rho2:
-            return ca.SX(p["rho1"])
-        return ca.if_else(t < p["T"], p["rho1"] + p["rho2"] * p["kappa"] / (p["T"] - t), p["rho1"])
-
-    def _phi(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
-        import casadi as ca
-
-        return ca.if_else(t < p["T"], (p["T"] / (p["T"] - t)) ** p["kappa"], 1)
-
-    def _clock(self, t: ca.SX, p: dict[str, Any]) -> ca.SX:
-        import casadi as ca
-
-        if not self.rho2:
-            return p["rho1"] * t
-        stretched = p["rho1"] * t + p["rho2"] * p["kappa"] * ca.log(p["T"] / (p["T"] - t))
-        return ca.if_else(t < p["T"], stretched, float("inf"))
+            return {"gain": ca.SX(rho1), "phi": phi, "clock": rho1 * t}
+        return {
+            "gain": ca.if_else(before, rho1 + pole / (T - t), rho1),
+            "phi": phi,
+            "clock": ca.if_else(before, rho1 * t + pole * ca.log(T / (T - t)), float("inf")),
+        }
 
 
 def prescribed_time_bound(V0: ArrayLike, a: float, b: float, t: ArrayLike, T: Exact, kappa: Exact) -> np.ndarray:

@@ -149,13 +149,13 @@ class LimitedGain:
                 f"stop_before = {readable(stop)} is outside its domain; stop_before must be below T = {readable(T)}"
             )
         for name, share in (("gain_cap", self._capped_share), ("stop_before", self._stopped_share)):
-            if share is not None and share < _SMALLEST_SHARE:
+            if 0 < share < _SMALLEST_SHARE:
                 raise ParameterError(f"{name} acts only where 1 - t/T is below 1e-300; leave it out")
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
         """The course of the gain if it is not held over periods."""
-        gain, capped, stopped = self.gain, float(self._capped_share or 0), float(self._stopped_share or 0)
+        gain, capped, stopped = self.gain, float(self._capped_share), float(self._stopped_share)
         stretches, begin = [], 1.0
         if gain.rho2 and capped < 1:
             begin = max(capped, stopped)
@@ -187,11 +187,9 @@ class LimitedGain:
         t, q = self._instants(t, remaining)
         if self.limits.sample_period is not None:
             return self.periods(float(t.max())).value(t)
-        value = np.zeros(t.shape)
-        for stretch in self.stretches:
-            free = self.gain.value_at_remaining(q) if stretch.level is None else stretch.level
-            value = np.where((q <= stretch.begin) & (q > stretch.end), free, value)
-        return value
+        free = self.gain.value_at_remaining(q)
+        acting = [(q <= stretch.begin) & (q > stretch.end) for stretch in self.stretches]
+        return np.select(acting, [free if stretch.level is None else stretch.level for stretch in self.stretches])
 
     def clock(self, t: ArrayLike, remaining: ArrayLike | None = None) -> np.ndarray:
         """Return ``s_eff(t)``, the integral of the gain that acts; infinite from a pole on.
@@ -272,28 +270,26 @@ class LimitedGain:
         return min(float(self.gain.rho1), self._cap)
 
     @property
-    def _capped_share(self) -> Fraction | None:
-        """``1 - t/T`` where the cap begins to act."""
+    def _capped_share(self) -> Fraction:
+        """``1 - t/T`` where the cap begins to act; 0 if it never does."""
         cap, gain = self.limits.gain_cap, self.gain
         if cap is None or not gain.rho2:
-            return None
+            return Fraction(0)
         return Fraction(1) if cap <= gain.first else gain.pole / (gain.T * (cap - gain.rho1))
 
     @property
-    def _stopped_share(self) -> Fraction | None:
-        stop = self.limits.stop_before
-        return None if stop is None else stop / self.gain.T
+    def _stopped_share(self) -> Fraction:
+        """``1 - t/T`` where the input is switched off; 0 if it never is."""
+        return (self.limits.stop_before or Fraction(0)) / self.gain.T
 
     def _instants(self, t: ArrayLike, remaining: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
         """Return ``t`` and ``1 - t/T`` as arrays."""
         t = np.asarray(t, dtype=float)
         if remaining is not None:
             return t, np.asarray(remaining, dtype=float)
-        q = np.maximum(1 - t / float(self.gain.T), 0)
-        if self._stopped_share is None:
-            return t, q
-        stopped = t >= float(self.gain.T * (1 - self._stopped_share))
-        return t, np.where(stopped, np.minimum(q, float(self._stopped_share)), q)
+        q, stopped = np.maximum(1 - t / float(self.gain.T), 0), self._stopped_share
+        late = t >= float(self.gain.T * (1 - stopped)) if stopped else False
+        return t, np.where(late, np.minimum(q, float(stopped)), q)
 
 
 #: The limits, by what imposes them.

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.directed_rounding import down, float_down, near, up
+from lmi.exact.elementary_enclosures import decay_integrals_below
+from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.protocols.disturbance import Disturbance, WorstCaseDisturbance
 
@@ -35,7 +37,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(15)
 _MAX_PANELS = 200_000
 _LEAST_PANELS = 3000
 _BATCH = 200_000
-_BITS = (96, 256, 1024, 4096)
 #: By how much a sum of panels, or a decay, may be off, relative to the initial state.
 SUM_ERROR = 1e-12
 _LARGEST_Z = Fraction(2) ** 1000
@@ -98,9 +99,9 @@ class ReachingTime:
 def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fraction]) -> tuple[ReachingTime, ...]:
     """Prove for every agent an instant from which its sliding variable is 0, whatever the disturbance.
 
-    ``|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r)`` is shown in ball arithmetic, the integral being an incomplete
-    gamma function. With ``mu3 kappa >= 1`` such a ``t < T_r`` always exists. With ``mu3 kappa < 1`` the integral is
-    finite: a large ``sigma_k(0)`` is certain to be 0 at ``T_r`` only, and the worst-case disturbance attains it.
+    ``|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r)`` is shown with the lower bounds of the integral that the checker
+    uses. With ``mu3 kappa >= 1`` such a ``t < T_r`` always exists. With ``mu3 kappa < 1`` the integral is finite: a
+    large ``sigma_k(0)`` is certain to be 0 at ``T_r`` only, and the worst-case disturbance attains it.
 
     Parameters
     ----------
@@ -125,78 +126,27 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
     worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
-    known: dict[Fraction, Fraction | None] = {Fraction(0): Fraction(0)}
-    for value, z in zip(sigma0, worst.z.tolist(), strict=True):
-        if abs(value) not in known:
-            known[abs(value)] = _least_certain(protocol, abs(value), z)
-    return tuple(ReachingTime(protocol.T_r, known[abs(value)]) for value in sigma0)
+    # What is below the range of floats is guessed as 0.
+    guesses = {abs(size): max(z, 1e-305) for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
+    pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
+    known = {Fraction(0): Fraction(0)}
 
+    def prove(candidates: dict[Fraction, Fraction]) -> list[Fraction]:
+        below = decay_integrals_below(protocol.T_r, protocol.mu2, pole, candidates.values(), REACHING_BITS)
+        proved = {size: z for size, z in candidates.items() if size <= push * below[z]}
+        known.update(proved)
+        return list(proved)
 
-def _least_certain(protocol: ReachingProtocol, size: Fraction, guess: float) -> Fraction | None:
-    """Return a ``z`` at which 0 is proved to be reached, as near to the guess as proves."""
-    if math.isfinite(guess):
-        for slack in (1e-12, 1e-9, 1e-6, 1e-3):
-            z = Fraction(guess * (1 + slack))
-            if _certainly_reached(protocol, size, z):
-                return z
-    return _bracket(protocol, size)
-
-
-def _bracket(protocol: ReachingProtocol, size: Fraction) -> Fraction | None:
-    """Return a ``z`` at which 0 is proved to be reached, too large by a tenth at most; None if none was found."""
-    if not size:
-        return Fraction(0)
-    # With mu3 kappa < 1 the integral is within e^(-(1 - mu3 kappa) z) of its limit.
-    power = protocol.mu3 * protocol.kappa
-    last = _LARGEST_Z if power >= 1 else min(_LARGEST_Z, 60 / (1 - power))
-    high = Fraction(1)
-    while not _certainly_reached(protocol, size, high):
-        if high >= last:
-            return None
-        high *= 2
-    while _certainly_reached(protocol, size, high / 2):
-        high /= 2
-    low = high / 2
-    while high > low * Fraction(11, 10):
-        middle = (low + high) / 2
-        low, high = (low, middle) if _certainly_reached(protocol, size, middle) else (middle, high)
-    return high
-
-
-def _certainly_reached(protocol: ReachingProtocol, size: Fraction, z: Fraction) -> bool:
-    """Prove ``size <= (mu1 - delta) int dr/psi`` up to the instant ``z``; False if it is wrong or not provable."""
-    import flint
-
-    bits = flint.ctx.prec
-    try:
-        for precision in _BITS:
-            flint.ctx.prec = precision
-            surplus = _ball(protocol.mu1 - protocol.delta) * inverse_decay_integral(protocol, z) - _ball(size)
-            if surplus >= 0:
-                return True
-            if surplus < 0:
-                return False
-    finally:
-        flint.ctx.prec = bits
-    return False
-
-
-def inverse_decay_integral(protocol: ReachingProtocol, z: Fraction) -> Any:
-    """Return ``int_0^t dr/psi(r)`` up to the instant ``z`` as a ball of python-flint, at its present precision.
-
-    With ``m = mu3 kappa`` and ``u = T_r - r`` it is ``T_r^m e^(mu2 T_r) int u^-m e^(-mu2 u) du``, a difference of upper
-    incomplete gamma functions of order ``1 - m``.
-    """
-    T, mu2, m = _ball(protocol.T_r), _ball(protocol.mu2), protocol.mu3 * protocol.kappa
-    order, whole = _ball(1 - m), mu2 * T
-    tail = (whole * (-_ball(z)).exp()).gamma_upper(order) - whole.gamma_upper(order)
-    return T * (whole ** _ball(m - 1)) * whole.exp() * tail
-
-
-def _ball(x: Fraction) -> Any:
-    import flint
-
-    return flint.arb(x.numerator) / flint.arb(x.denominator)
+    for slack in (1e-12, 1e-9, 1e-6, 1e-3):
+        finite = {size: z for size, z in guesses.items() if size not in known and math.isfinite(z)}
+        prove({size: Fraction(z * (1 + slack)) for size, z in finite.items()})
+    # What floats cannot place is within a tenth; with mu3 kappa < 1 the integral does not grow any more from ``z`` on.
+    z = min(_LARGEST_Z, (60 if pole < 1 else 1600) / abs(pole - 1)) if pole != 1 else _LARGEST_Z
+    rest = [size for size in guesses if size not in known]
+    while rest:
+        rest = prove(dict.fromkeys(rest, z))
+        z = Fraction(float(z) / 1.1)
+    return tuple(ReachingTime(protocol.T_r, known.get(abs(size))) for size in sigma0)
 
 
 # ---------------------------------------------------------------------- one run
@@ -233,27 +183,17 @@ class ReachingProblem:
         self._worst = isinstance(disturbance, WorstCaseDisturbance) and disturbance.delta == protocol.delta
         self.z = np.zeros(len(sigma0))
         if self._agents.size:
-            largest = _bracket(protocol, Fraction(float(self._unit.max())))
-            self._end = LAST_Z if largest is None else float(min(largest, Fraction(LAST_Z)))
+            self._end = self._latest()
             self._edges, self._steps = self._panels()
             self._sums = np.concatenate([np.zeros((self._agents.size, 1)), np.cumsum(self._steps, axis=1)], axis=1)
             self.z[self._agents] = [self._root(row) for row in range(self._agents.size)]
 
     def sigma(self, z: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
-        values, sigma0 = np.zeros((self.z.size, z.size)), self._sign * self._unit
-        if not self._agents.size:
-            return values
+        values = np.zeros((self.z.size, z.size))
         for row, agent in enumerate(self._agents.tolist()):
-            before = np.flatnonzero(z < self.z[agent])
-            near = before[z[before] <= self._end]
-            panel = self._panel(z[near])
-            start = self._edges[panel]
-            spent = self._sums[row, panel] + self._integrals(start, z[near], [row])[0]
-            left = np.maximum(1 - spent, 0) * self._decay(z[near])
-            values[agent, near] = sigma0[agent] * left
-            far = before[z[before] > self._end]
-            values[agent, far] = sigma0[agent] * self._tail(row, z[far])
+            before = z < self.z[agent]
+            values[agent, before] = self._sign[agent] * self._unit[agent] * self._size(row, z[before])
         return values
 
     def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
@@ -265,16 +205,20 @@ class ReachingProblem:
         bounds = np.zeros((self.z.size, z.size))
         for row, agent in enumerate(self._agents.tolist()):
             before = z < certain[agent]
-            near, far = before & (z <= self._end), before & (z > self._end)
-            panel = self._panel(z[near])
-            spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
-            left = np.minimum(np.maximum(1 - spent, 0) + SUM_ERROR, 1)
+            size = self._size(row, z[before], SUM_ERROR)
             if certain[agent] <= self._end:
-                left = np.minimum(left, self._rest(row, z[near], float(certain[agent])))
-            bounds[agent, near] = left * self._decay(z[near])
-            bounds[agent, far] = self._tail(row, z[far], SUM_ERROR)
-            bounds[agent] *= self._unit[agent] * (1 + SUM_ERROR / 2)
+                size = np.minimum(size, self._rest(row, z[before], float(certain[agent])) * self._decay(z[before]))
+            bounds[agent, before] = size * self._unit[agent] * (1 + SUM_ERROR / 2)
         return bounds
+
+    def _size(self, row: int, z: np.ndarray, more: float = 0.0) -> np.ndarray:
+        """Return the size of one sliding variable in its unit, with so much added to the bracket."""
+        near, size = z <= self._end, np.empty(z.size)
+        panel = self._panel(z[near])
+        spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+        size[near] = np.minimum(np.maximum(1 - spent, 0) + more, 1) * self._decay(z[near])
+        size[~near] = self._tail(row, z[~near], more)
+        return size
 
     def _rest(self, row: int, z: np.ndarray, end: float) -> np.ndarray:
         """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision."""
@@ -309,6 +253,14 @@ class ReachingProblem:
         push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
         with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small start
             return (push * self._weight(z)) @ _WEIGHTS * half
+
+    def _latest(self) -> float:
+        """Return a ``z`` by which the worst case has brought every agent to 0, a tenth too large or so."""
+        edges = np.concatenate([[0.0], np.geomspace(1e-12, 1, 400) * LAST_Z])
+        low, half = edges[:-1, None], np.diff(edges)[:, None] / 2
+        with np.errstate(over="ignore"):
+            spent = np.cumsum((self._weight(low + half + half * _NODES) * half) @ _WEIGHTS) * self._gap
+        return float(edges[min(int(np.searchsorted(spent, self._unit.max())) + 2, edges.size - 1)])
 
     def _panels(self) -> tuple[np.ndarray, np.ndarray]:
         """Return panel edges and the (A, P) integrals over them, refined until halving changes nothing."""
@@ -352,23 +304,18 @@ class ReachingProblem:
 
     def _root(self, row: int) -> float:
         """Return where the bracket of one agent vanishes."""
+        from scipy.optimize import brentq
+
         panel = int(np.searchsorted(self._sums[row, 1:], 1.0))
         if panel == self._steps.shape[1]:
             return self._far_root(row)
-        start, low, high = self._edges[panel], self._edges[panel], self._edges[panel + 1]
+        start, end = self._edges[panel : panel + 2]
         rest = 1 - self._sums[row, panel]
-        z = low + (high - low) * rest / max(self._steps[row, panel], rest)
-        for _ in range(100):
-            excess = float(self._integrals(np.array([start]), np.array([z]), [row])[0, 0]) - rest
-            low, high = (low, z) if excess > 0 else (z, high)
-            slope = float(self._push(np.array([z]), [row])[0, 0] * self._weight(z))
-            better = z - excess / slope if slope > 0 else math.nan
-            if not low <= better <= high:
-                better = (low + high) / 2
-            if abs(better - z) <= 4e-16 * z:
-                return float(better)
-            z = better
-        return float(z)
+
+        def excess(z: float) -> float:
+            return float(self._integrals(self._edges[[panel]], np.array([z]), [row])[0, 0] - rest)
+
+        return float(brentq(excess, start, end, xtol=1e-300, rtol=1e-15)) if excess(end) > 0 else float(end)
 
     def _weight(self, z: np.ndarray | float) -> np.ndarray:
         """Return ``dt/psi``, per unit of ``z``."""

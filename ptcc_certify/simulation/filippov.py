@@ -18,13 +18,16 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
-from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
-from ptcc_certify.simulation.forced import Phase, SlidingMotion
+from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 from ptcc_certify.simulation.instants import Instants, tau_before
+from ptcc_certify.simulation.motions import MANY_STEPS, NominalMotion, signal
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:
+    import casadi as ca
+
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import ReachingProtocol
 
@@ -54,15 +57,14 @@ def simulate_sliding(
     tolerances : Tolerances
     boundary_layer : float or None
     """
-    slack = rounding_slack(protocol)
-    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), slack)
-    unit = float(max(np.abs(start).max(), np.abs(sigma0).max(), np.abs(start - sigma0).max())) or 1.0
-    solver = _Solver(graph, protocol, disturbance, unit, tolerances)
+    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), rounding_slack(protocol))
+    motion = _SlidingMotion(graph, protocol, disturbance, start, sigma0, tolerances, boundary_layer)
+    z = np.full(start.size, np.nan)
     if boundary_layer is None:
-        z, y, sigma, residual = solver.filippov(start, sigma0, instants)
+        z, states, residual = motion.filippov(instants)
     else:
-        z = np.full(start.size, np.nan)
-        y, sigma, residual = solver.imitation(start, sigma0, instants, boundary_layer)
+        states, residual = motion.imitation(instants)
+    y, sigma = states.T * motion.unit
     with np.errstate(divide="ignore"):
         clock = np.where(instants.left > 0, protocol.gain.clock_at_remaining(instants.left) + 0.0, np.inf)
     return SlidingTrajectory(
@@ -76,9 +78,9 @@ def simulate_sliding(
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
         deadline_residual=residual,
-        stats=solver.stats,
+        stats=motion.stats,
         sigma=sigma,
-        disturbance=solver.disturbances(instants.t, y + sigma, sigma, boundary_layer),
+        disturbance=motion.disturbances(instants.t, y + sigma, sigma),
         sigma0=sigma0,
         reaching_remaining=instants.reaching_left,
         reaching_z=z,
@@ -89,79 +91,103 @@ def simulate_sliding(
     )
 
 
-class _Solver:
-    """One run; ``stats`` adds up what the integrators did."""
+class _SlidingMotion(Motion):
+    """Agents moved along ``y' = -gain L (y + sigma)`` with their sliding variables, ``y = x - sigma``.
+
+        sigma' = -mu1 s - (reaching gain) sigma + d    until sigma is 0, and 0 from there on
+
+    Attributes
+    ----------
+    state : (N, 2) array
+        ``y`` and ``sigma`` in units of ``unit``, the size of the initial state.
+    reached : (N,) array
+        ``z`` where each sliding variable is 0; before, ``s`` is the sign of its initial value.
+    layer : float or None
+        ``s`` is ``tanh(sigma/layer)`` instead.
+    """
 
     def __init__(
         self,
         graph: SignedDigraph,
         protocol: ReachingProtocol,
         disturbance: Disturbance,
-        unit: float,
+        start: np.ndarray,
+        sigma0: np.ndarray,
         tolerances: Tolerances,
+        boundary_layer: float | None,
     ):
-        self.graph, self.protocol, self.disturbance = graph, protocol, disturbance
-        self.unit, self.tolerances = unit, tolerances
-        self.stats: dict[str, float] = {"steps": 0, "rhs": 0}
+        state = np.stack([start - sigma0, sigma0], axis=1)
+        self.unit = float(max(np.abs(start).max(), np.abs(state).max())) or 1.0
+        super().__init__(graph, state / self.unit, 1, tolerances)
+        self._options["max_num_steps"] = MANY_STEPS
+        self.graph, self.protocol, self.tolerances, self.slack = graph, protocol, tolerances, rounding_slack(protocol)
+        self.sigma0, self.disturbance = sigma0, disturbance
+        self.sources, self._signal = (disturbance,), signal(disturbance, graph.n_nodes)
+        self.reached, self.layer = np.full(len(state), np.inf), boundary_layer
         self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
         self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
         self.mu1, self.mu2 = float(protocol.mu1), float(protocol.mu2)
         reaching_pole = float(protocol.reaching_gain.pole)
         self.reaching = Phase(0.0, self.T_r, self.rho1, self.pole, self.T_s, self.mu2, reaching_pole)
 
+    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
+        """Return ``dy/dz`` and ``dsigma/dz``, with 0 for a sliding variable that is 0."""
+        import casadi as ca
+
+        R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
+        y, sigma = ca.horzsplit(x)
+        s = ca.tanh(sigma * (self.unit / self.layer)) if self.layer else ca.DM(np.sign(self.sigma0))
+        push = R / self.unit * ca.DM(self.reached > ends[0]) * (self.mu1 * s - self._signal(phase, ends, t, s))
+        driven = -push - (phase.mu2 * R + phase.reaching_pole) * sigma
+        return ca.horzcat(-phase.nominal(R) * self._product(y + sigma), driven)
+
+    def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
+        self.state[self.reached <= start, 1] = 0
+        return super()._advance(phase, z, start)
+
     # ------------------------------------------------------------------ the true solution
 
-    def filippov(
-        self, start: np.ndarray, sigma0: np.ndarray, instants: Instants
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float | None]:
-        """Return reaching times ``z``, the (N, M) ``y`` and sliding variables, and the residual at the deadline."""
-        z, n = instants.z, start.size
-        out = np.zeros((2 * n, z.size))
-        reads_states = isinstance(self.disturbance, StateDependent) and bool(sigma0.any())
-        reach = self._coupled if reads_states else self._decoupled
-        reached, end, y_end = reach(start, sigma0, z, out)
+    def filippov(self, instants: Instants) -> tuple[np.ndarray, np.ndarray, float | None]:
+        """Return reaching times ``z``, the (M, N, 2) ``y`` and sliding variables, and the residual at the deadline."""
+        z, t, left = instants.z, instants.t, instants.left
+        out = np.zeros((z.size, *self.state.shape))
+        reads_states = isinstance(self.disturbance, StateDependent) and bool(self.sigma0.any())
+        reached, end, y_end = (self._coupled if reads_states else self._decoupled)(z, out)
         # Sliding variables that are 0 at T_r only: from ``end`` on they move nobody.
         early = end < self._last_z
-        out[:n, (z >= end) & (z < np.inf)] = y_end[:, None]
+        out[(z >= end) & (z < np.inf), :, 0] = y_end
         later = z >= end if early else np.isinf(z)
         remaining = self.T_s + (self.T_r * math.exp(-end) if early else 0.0)
-        out[:n, later], residual = self._nominal(y_end, remaining, instants.t[later], instants.left[later])
-        return reached, out[:n] * self.unit, out[n:] * self.unit, residual
+        motion = NominalMotion(self.graph, y_end[:, None], self.tolerances)
+        motion.stats = self.stats
+        limited, begin = GainLimits().limit(self.protocol.gain), math.log(self.T / remaining)
+        settled, residual = motion.follow(limited, t[later], left[later], begin)
+        out[later, :, 0] = settled[:, :, 0]
+        return reached, out, residual
 
     @property
     def _last_z(self) -> float:
         """Beyond this ``z`` what is left of the sliding variables moves nobody by a float's last bit."""
-        gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.graph.in_weight().max())
+        gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.in_weight.max())
         return LAST_Z + max(0.0, math.log(max(gain, 1.0)))
 
-    def _decoupled(
-        self, start: np.ndarray, sigma0: np.ndarray, z: np.ndarray, out: np.ndarray
-    ) -> tuple[np.ndarray, float, np.ndarray]:
+    def _decoupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Fill ``out`` until all sliding variables are 0; return the reaching times, the last of them, ``y`` there."""
-        scalar = ReachingProblem(self.protocol, sigma0, self.disturbance)
+        scalar = ReachingProblem(self.protocol, self.sigma0, self.disturbance)
         end = min(float(scalar.z.max(initial=0.0)), self._last_z)
-        motion = self._motion(start, sigma0)
-        sign = np.sign(sigma0)
-        events = [0.0, *scalar.z[scalar.z < end], end]
-        motion.sample(self.reaching, z, events, lambda at: np.where(scalar.z > at, sign, 0.0), out)
-        self._count(motion.stats)
+        self.reached, early = scalar.z, z < end
+        out[early] = self.sample(self.reaching, z[early], end, events=scalar.z)
         # The scalar equations are solved to near machine precision.
-        out[start.size :] = scalar.sigma(z) / self.unit
-        return scalar.z, end, motion.state[: start.size]
+        out[:, :, 1] = scalar.sigma(z).T / self.unit
+        return scalar.z, end, self.state[:, 0]
 
-    def _coupled(
-        self, start: np.ndarray, sigma0: np.ndarray, z: np.ndarray, out: np.ndarray
-    ) -> tuple[np.ndarray, float, np.ndarray]:
+    def _coupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
         from scipy.integrate import LSODA
 
-        n, end, now = start.size, self._last_z, 0.0
-        phase, L = self.reaching, self.graph.laplacian()
-        disturbance = self.disturbance
-        assert isinstance(disturbance, StateDependent)
-        labels, delta, slack = self.graph.labels, self.protocol.delta, rounding_slack(self.protocol)
-        signs, reached = np.sign(sigma0), np.where(sigma0 == 0, 0.0, np.inf)
-        state = np.concatenate([start - sigma0, sigma0]) / self.unit
+        n, end, now, phase = len(self.state), self._last_z, 0.0, self.reaching
+        state, signs = self.state.T.ravel(), np.sign(self.sigma0)
+        reached = np.where(signs == 0, 0.0, np.inf)
         # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
         sizes = np.abs(state[n:])
         atol = self.tolerances.atol * np.concatenate([np.ones(n), np.where(sizes > 0, np.maximum(sizes, 1e-250), 1.0)])
@@ -170,10 +196,10 @@ class _Solver:
             R, t = float(phase.rate(z, math.exp)), float(phase.time(z, math.exp))
             # A trial beyond the root must not show the disturbance a sign that never occurs.
             y, sigma = v[:n], signs * np.maximum(signs * v[n:], np.finfo(float).tiny)
-            d = disturbance.at(t, (y + sigma) * self.unit, sigma * self.unit, delta, labels, slack)
+            d = self._met(t, (y + sigma) * self.unit, sigma * self.unit)
             push = R * (self.mu1 * signs - np.abs(signs) * d) / self.unit
             rate = -push - (phase.mu2 * R + phase.reaching_pole) * np.where(signs != 0, v[n:], 0.0)
-            return np.concatenate([-phase.nominal(R) * (L @ (y + sigma)), rate])
+            return np.concatenate([-phase.nominal(R) * (self.laplacian @ (y + sigma)), rate])
 
         while signs.any() and now < end:
             solver = LSODA(motion, now, state, end, rtol=self.tolerances.rtol, atol=atol)
@@ -190,83 +216,58 @@ class _Solver:
                 now = min(last, solver.t)
                 inside = (z >= before) & (z < now)
                 if inside.any():
-                    out[:, inside] = dense(z[inside])
-                    out[n:, inside] *= np.abs(signs)[:, None]
-                self._count({"steps": 1, "rhs": 0})
-            self._count({"steps": 0, "rhs": solver.nfev})
+                    out[inside] = dense(z[inside]).T.reshape(-1, 2, n).swapaxes(1, 2)
+                    out[inside, :, 1] *= np.abs(signs)
+                self.stats["steps"] += 1
+            self.stats["rhs"] += solver.nfev
             state = dense(now) if hit else solver.y.copy()
-            reached[hit], signs[hit] = now, 0.0
             # Who is past 0 by a rounding has arrived too.
-            late = np.flatnonzero(signs * state[n:] < 0)
-            reached[late], signs[late] = now, 0.0
+            arrived = (signs * state[n:] < 0) | np.isin(np.arange(n), hit)
+            reached[arrived], signs[arrived] = now, 0.0
             state[n:][signs == 0] = 0
         return reached, now, state[:n]
 
-    def _nominal(
-        self, y: np.ndarray, remaining: float, t: np.ndarray, left: np.ndarray
-    ) -> tuple[np.ndarray, float | None]:
-        """Return the (N, .) states on the sliding manifold, reached ``remaining`` before ``T``, and the residual."""
-        motion, before = NominalMotion(self.graph, y[:, None], self.tolerances), left > 0
-        tau = tau_before(t[before], left[before], self.T, remaining)
-        states, residual = motion.past_deadline(self.protocol.gain, remaining, tau, t[~before])
-        self._count(motion.stats)
-        return states[:, :, 0].T, residual
-
     # ------------------------------------------------------------------ the imitation
 
-    def imitation(
-        self, start: np.ndarray, sigma0: np.ndarray, instants: Instants, width: float
-    ) -> tuple[np.ndarray, np.ndarray, float | None]:
-        """Return the (N, M) ``y`` and sliding variables with ``tanh(sigma/width)`` for the sign, and the residual.
+    def imitation(self, instants: Instants) -> tuple[np.ndarray, float | None]:
+        """Return the (M, N, 2) ``y`` and sliding variables with ``tanh(sigma/layer)`` for the sign, and the residual.
 
         Towards each pole the run stops at ``1 - t/T = 1e-13``; its state there stands for what follows.
         """
         if isinstance(self.disturbance, StateDependent):
             raise ParameterError("a boundary layer takes no disturbance that reads the states; give one of time")
-        n, t, last = start.size, instants.t, float(instants.t[-1])
-        out = np.empty((2 * n, t.size))
-        motion = self._motion(start, sigma0, width)
+        t, residual = instants.t, None
+        out = np.empty((t.size, *self.state.shape))
         before, after = instants.reaching_left > 0, instants.left == 0
-        between = ~before & ~after
         settling = Phase(self.T_r, self.T_s, self.rho1, self.pole, mu2=self.mu2)
         past = Phase(self.T, self.T, self.rho1, mu2=self.mu2, past=True)
-        towards_T = tau_before(t, instants.left, self.T, self.T_s)
+        towards_T, since_T = tau_before(t, instants.left, self.T, self.T_s), np.maximum(t / self.T - 1, 0.0)
         clocks = (
             (self.reaching, before, instants.z, _LAYER_Z),
-            (settling, between, towards_T, _LAYER_Z),
-            (past, after, np.maximum(t / self.T - 1, 0.0), max(last / self.T - 1, 0.0)),
+            (settling, ~before & ~after, towards_T, _LAYER_Z),
+            (past, after, since_T, float(since_T[-1])),
         )
-        residual = None
         for phase, here, clock, end in clocks:
             if phase is past and after.any():
-                residual = motion.imbalance((motion.state[:n] + motion.state[n:])[:, None])
+                residual = self.imbalance(self.state.sum(axis=1, keepdims=True))
             if (t >= phase.start).any():
-                z = np.where(here, clock, np.nan)
-                motion.sample(phase, z, [0.0, end], lambda _: np.ones(n), out)
-                out[:, here & (clock >= end)] = motion.state[:, None]
-        self._count(motion.stats)
-        return out[:n] * self.unit, out[n:] * self.unit, residual
+                out[here] = self.sample(phase, clock[here], end)
+        return out, residual
 
-    def _motion(self, start: np.ndarray, sigma0: np.ndarray, layer: float | None = None) -> SlidingMotion:
-        state = np.concatenate([start - sigma0, sigma0]) / self.unit
-        return SlidingMotion(self.graph, self.protocol, self.disturbance, state, self.unit, self.tolerances, layer)
+    def _met(self, t: float, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+        """Return the (N,) disturbances at one instant and state, within the bound."""
+        assert isinstance(self.disturbance, StateDependent)
+        return self.disturbance.at(t, x, sigma, self.protocol.delta, self.graph.labels, self.slack)
 
-    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray, layer: float | None) -> np.ndarray:
+    def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
-        disturbance, labels, delta = self.disturbance, self.graph.labels, self.protocol.delta
+        disturbance = self.disturbance
         if isinstance(disturbance, StateDependent):
-            slack = rounding_slack(self.protocol)
-            columns = (disturbance.at(float(t[i]), x[:, i], sigma[:, i], delta, labels, slack) for i in range(t.size))
-            return np.stack(list(columns), axis=1)
-        if isinstance(disturbance, WorstCaseDisturbance) and layer is not None:
-            return float(disturbance.delta) * np.tanh(sigma / layer)
-        agents = np.arange(x.shape[0])
-        up, rest, down = (disturbance.values(t, agents, np.full(agents.size, s)) for s in (1, 0, -1))
-        return np.where(sigma > 0, up, np.where(sigma < 0, down, rest))
-
-    def _count(self, stats: dict[str, Any]) -> None:
-        for key in ("steps", "rhs"):
-            self.stats[key] += stats[key]
+            return np.stack([self._met(*at) for at in zip(t.tolist(), x.T, sigma.T, strict=True)], axis=1)
+        if isinstance(disturbance, WorstCaseDisturbance):
+            return float(disturbance.delta) * (np.tanh(sigma / self.layer) if self.layer else np.sign(sigma))
+        agents = np.arange(len(x))
+        return disturbance.values(t, agents, np.zeros_like(agents))
 
 
 def rounding_slack(protocol: ReachingProtocol) -> float:

@@ -35,6 +35,7 @@ def interruptible() -> Iterator[None]:
             try:
                 act(number, frame)
             except BaseException as error:
+                signal.signal(signal.SIGINT, previous)  # it may come before the try below, or in its finally
                 raised.append(error)
                 raise
 

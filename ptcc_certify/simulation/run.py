@@ -23,11 +23,11 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.simulation.cvodes import NominalMotion, Tolerances
+from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
-from ptcc_certify.simulation.instants import PAST, Instants, default_instants, tau_before, wanted_instants
+from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
-from ptcc_certify.simulation.limited import as_forcing, simulate_limited
+from ptcc_certify.simulation.nominal import as_forcing, simulate_nominal
 from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -168,42 +168,8 @@ def simulate(
             )
         else:
             forcing = as_forcing(graph, protocol.T, disturbance, delta, noise, noise_bound, until)
-            if forcing is None and (actuator is None or actuator.ideal):
-                run = _simulate_nominal(graph, protocol, begin, instants, tolerances)
-            else:
-                run = simulate_limited(graph, protocol, begin, instants, actuator, forcing, tolerances)
+            run = simulate_nominal(graph, protocol, begin, instants, actuator, forcing, tolerances)
     return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - began})
-
-
-def _simulate_nominal(
-    graph: SignedDigraph, protocol: Protocol, begin: np.ndarray, instants: Instants, tolerances: Tolerances
-) -> Trajectory:
-    """Move the nominal protocol from (N,) or (N, S) states, with nothing in its way."""
-    columns = begin.reshape(graph.n_nodes, -1)
-    scale = np.abs(columns).max(axis=0)
-    scale[scale == 0] = 1
-    gain, T, t = protocol.gain, float(protocol.T), instants.t
-    before = instants.left > 0
-    run = NominalMotion(graph, columns / scale, tolerances)
-    if protocol.prescribed:
-        tau = tau_before(t[before], instants.left[before], T, T)
-        states, residual = run.past_deadline(gain, T, tau, t[~before])
-        clock = np.append(gain.clock_at_tau(tau), np.full(t.size - tau.size, np.inf))
-    else:
-        states, residual, clock = run.sample(0.0, float(gain.rho1) * T, 0.0, t / T), None, gain.clock(t)
-    return Trajectory(
-        graph=graph,
-        protocol=protocol,
-        t=t,
-        remaining=instants.left,
-        clock=clock,
-        states=(np.moveaxis(states, 0, -1) * scale[:, None]).reshape(*begin.shape, t.size),
-        rtol=tolerances.rtol,
-        atol=tolerances.atol,
-        deadline_index=instants.deadline(protocol),
-        deadline_residual=residual,
-        stats=run.stats,
-    )
 
 
 def _start(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:

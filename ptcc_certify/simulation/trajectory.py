@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,8 +87,8 @@ class Trajectory(Shown):
     held_input: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        for array in (self.t, self.remaining, self.clock, self.states, self.held_input):
-            if array is not None:
+        for own in fields(self):
+            if isinstance(array := getattr(self, own.name), np.ndarray):
                 array.flags.writeable = False
 
     @property
@@ -266,11 +266,6 @@ class SlidingTrajectory(Trajectory):
     bounded_by: str
     boundary_layer: float | None
     reads_states: bool
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for array in (self.sigma, self.disturbance, self.sigma0, self.reaching_remaining, self.reaching_z):
-            array.flags.writeable = False
 
     @property
     def sliding(self) -> SlidingTrajectory:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lmi.exact.numbers import round_to_bits
+from lmi.dyadic import round_to_bits
 from ptcc_certify.lyapunov.function import Matrix
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from balls import BITS, ball, clock, states
 from generators import all_classes, random_graph
 
 from lmi.exact.definite import Arithmetic
-from lmi.exact.fast import FLINT_ROWS, FastArithmetic
+from lmi.exact.fast import SMALL_ROWS, FastArithmetic
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
@@ -51,7 +51,7 @@ def sparse(n: int, seed: int) -> SignedDigraph:
 @cache
 def slow() -> Certificate:
     """A graph of more nodes than the exact polynomial decides."""
-    graph = sparse(FLINT_ROWS + 12, 3)
+    graph = sparse(SMALL_ROWS + 12, 3)
     return certify(graph, NOMINAL, numbers(np.random.default_rng(1), graph.n_nodes), method="full", simulation=False)
 
 
@@ -189,7 +189,7 @@ def test_a_constant_lowered_by_a_millionth_is_rejected(stdlib: bool):
                 assert report.rejected == f"deviation of lyapunov.functions[{k}]", (path, report.reason)
 
 
-@pytest.mark.parametrize("n", [3, FLINT_ROWS, FLINT_ROWS + 8])
+@pytest.mark.parametrize("n", [3, SMALL_ROWS, SMALL_ROWS + 8])
 def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
     """``d'S^-1 d`` for rows of a million sizes, and for rows and columns of ``S`` of many."""
     rng = np.random.default_rng(n)
@@ -214,7 +214,7 @@ def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
 
 
 def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
-    n = FLINT_ROWS + 6
+    n = SMALL_ROWS + 6
     S = [[int(i == j) * (1 if i else -1) for j in range(n)] for i in range(n)]
     singular = [[1] * n for _ in range(n)]
     for arithmetic in (Arithmetic(), FastArithmetic()):

@@ -12,6 +12,7 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
+from balls import inverse_decay_integral
 from generators import all_classes, class_cases, random_graph
 
 from ptcc_certify.bounds.final_state import final_state
@@ -25,7 +26,6 @@ from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
-from ptcc_certify.protocols.reaching_time import inverse_decay_integral
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory

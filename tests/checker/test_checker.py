@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from side_files import Side, with_factors, with_side_files
 import ptcc_certify
 from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
+from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input import box, ellipsoid
@@ -40,6 +42,8 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import UnreadableError, check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.checker.digraph import numbered
+from ptcc_certify.checker.large_function import _differences
+from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -859,6 +863,26 @@ def test_factors_that_are_odd_are_rejected(name: str):
             rejected_beside(changed(data, (*path, "rate"), rate), {}, "dominance of")
         rejected_beside(changed(data, path, {"rate": entry["rate"]}), {}, "dominance of")
         accepted_beside(resealed(changed(data, (*path, "factor", "weights"), [1] * n)), {})
+
+
+def test_parents_give_a_basis_only_if_they_are_those_of_a_tree():
+    """Every choice for a balanced ring of three: refused, or orthogonal to ``eta``, and independent iff a tree."""
+    A, ratios, gauge = [{0: 2, 2: -2}, {0: 1, 1: 1}, {1: 1, 2: 1}], [1, 2, 2], [1, -1, 1]
+    trees = 0
+    for parents in product((-1, 0, 1, 2, 3), repeat=3):
+        try:
+            basis = _differences(A, ratios, gauge, parents)
+        except RejectedError:
+            assert parents.count(-1) != 1 or 3 in parents or any(i == q for i, q in enumerate(parents))
+            continue
+        assert not any(row_sum({i: g * w for i, (g, w) in enumerate(zip(gauge, ratios, strict=True))}, basis).values())
+        root = parents.index(-1)
+        tree = all(root in (q, parents[q]) for i, q in enumerate(parents) if i != root)
+        assert rank(basis) == (2 if tree else 1)
+        trees += tree
+    assert trees == 9
+    with pytest.raises(RejectedError, match="null vector"):
+        _differences(A, [1, 1, 1], gauge, [-1, 0, 0])
 
 
 def test_the_work_of_a_factor_is_bounded(monkeypatch: pytest.MonkeyPatch):

@@ -29,7 +29,6 @@ STANDARD = {
     *(
         "fractions",
         "functools",
-        "graphlib",
         "hashlib",
         "io",
         "itertools",
@@ -52,7 +51,6 @@ FLOATS = {
     ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",
     ("ptcc_certify/checker/reading.py", "number"): "JSON numbers of `unverified`, which nothing reads",
     ("ptcc_certify/checker/side_vectors.py", "column"): "side files of floats: finite",
-    ("ptcc_certify/checker/side_vectors.py", "numbers"): "side files of floats: each as the dyadic rational that it is",
 }
 
 

@@ -17,6 +17,7 @@ from lmi.closed_form import h_matrix_certificate, m_matrix_certificate, perron_c
 from lmi.definiteness_proofs import prove_positive_definite
 from lmi.diagonal_certificate import DiagonalCertificate, diagonal_rate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
+from lmi.matrix_classes import comparison_matrix
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -278,7 +279,7 @@ def test_malformed_matrices_are_refused(function):
 @given(SEEDS, st.integers(1, 10), st.sampled_from([1.0, 3.0]))
 def test_an_h_matrix_is_certified_by_its_comparison_matrix(seed, n, magnitude):
     A = random_h_matrix(np.random.default_rng(seed), n, magnitude)
-    found, least = h_matrix_certificate(A), m_matrix_certificate(closed_form.comparison_matrix(A))
+    found, least = h_matrix_certificate(A), m_matrix_certificate(comparison_matrix(A))
     assert least.rate <= found.rate <= spectral_rate(A) * (1 + 1e-9)
     assert found.upper == math.inf
     assert proved(A, found)
@@ -303,7 +304,7 @@ def test_a_large_sparse_h_matrix():
 def test_the_perron_certificate_of_an_unbalanced_digraph(seed, n):
     L = signed_ring(np.random.default_rng(seed), n)
     found = perron_certificate(L)
-    p, M = found.omega, closed_form.comparison_matrix(L)
+    p, M = found.omega, comparison_matrix(L)
     assert np.abs(p @ M).max() <= 1e-14 * n * (p @ np.abs(M)).max()
     half = np.sqrt(p)
     B = half[:, None] * L / half
@@ -316,7 +317,7 @@ def test_the_perron_certificate_of_an_unbalanced_digraph(seed, n):
 def test_a_balanced_digraph_has_none(seed, n):
     rng = np.random.default_rng(seed)
     camps = rng.choice([-1.0, 1.0], n)
-    L = camps[:, None] * closed_form.comparison_matrix(signed_ring(rng, n)) * camps
+    L = camps[:, None] * comparison_matrix(signed_ring(rng, n)) * camps
     with pytest.raises(NoCertificate, match="balanced"):
         perron_certificate(L)
 
@@ -324,7 +325,7 @@ def test_a_balanced_digraph_has_none(seed, n):
 @given(SEEDS, st.integers(2, 8))
 def test_the_left_vector_has_full_accuracy_over_twelve_decades(seed, n):
     L = signed_ring(np.random.default_rng(seed), n, 6.0)
-    M = closed_form.comparison_matrix(L)
+    M = comparison_matrix(L)
     p = np.exp(closed_form._log_left_vector(sparse.csr_array(M)))
     # The same elimination in rationals.
     exact = [[Fraction(abs(x)) for x in row] for row in M]

@@ -7,13 +7,12 @@ from fractions import Fraction
 
 import flint
 import pytest
-from balls import ball
+from balls import ball, inverse_decay_integral
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lmi.exact import elementary_enclosures as enclosure
 from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.protocols.reaching_time import inverse_decay_integral
 
 
 @pytest.fixture(autouse=True)

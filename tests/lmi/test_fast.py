@@ -7,14 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_cases import FAST, FEW, PLAIN, SEEDS, dominance_case, factored, gram
+from exact_cases import FAST, FEW, PLAIN, SEEDS, factored, gram
 from hypothesis import given
 from hypothesis import strategies as st
 
 import lmi
-from lmi.definiteness_proofs import _array_integers, dyadic_array
+from lmi.definiteness_proofs import _array_integers, eliminate
+from lmi.dyadic import dyadic_array
 from lmi.exact import fast
-from lmi.exact.definite import SparseFactor, eliminate, scaled
+from lmi.exact.definite import SparseFactor, scaled
 
 
 def wide(rng: np.random.Generator, shape, bits: int) -> list:
@@ -72,38 +73,6 @@ def test_remainders_are_those_of_the_standard_library(seed, n, bits, many):
     S = scaled(n, entries, factor, int(rng.integers(-30, 30)), int(rng.integers(1, 10**6)))
     assert S is not None
     assert FAST.spare(S) == PLAIN.spare(S)
-
-
-@FEW
-@given(SEEDS, st.integers(0, 12), st.sampled_from([1, 20, 31, 61, 63, 100]), st.booleans())
-def test_rates_are_those_of_the_standard_library(seed, n, bits, dominant):
-    """Edges that repeat, loops, weights and vectors up to the ends of int64 and beyond, in lists and in arrays."""
-    rng = np.random.default_rng(seed)
-    m = 2 * n
-    ends = rng.integers(0, max(n, 1), (2, m))
-    weights, vectors = wide(rng, m, bits), [[abs(x) + 1 for x in wide(rng, n, bits)] for _ in range(3)]
-    if dominant and n:
-        edges, diagonal, u, v = dominance_case(rng, n)
-        ends, weights, vectors = edges[:2], edges[2].tolist(), [diagonal.tolist(), u.tolist(), v.tolist()]
-    for claim in (((*ends, weights), *vectors), (([x.tolist() for x in ends] + [weights]), *vectors)):
-        rate = PLAIN.largest_rate(n, *claim)
-        assert FAST.largest_rate(n, *claim) == rate
-        if rate is not None:
-            for judge in (PLAIN, FAST):
-                assert judge.dominates(n, *claim, rate)
-                assert not judge.dominates(n, *claim, rate + Fraction(1, 10**90))
-    if bits < 63:
-        arrays = ((*ends, np.array(weights, dtype=np.int64)), *(np.array(x, dtype=np.int64) for x in vectors))
-        assert FAST.largest_rate(n, *arrays) == PLAIN.largest_rate(n, *arrays)
-
-
-def test_nearly_equal_rates_are_told_apart():
-    """Two rows whose rates differ by less than floats can tell."""
-    big = 2**80
-    claim = ([], [], []), [big + 1, big, big + 2], [1, 1, 1], [1, 1, 1]
-    assert FAST.largest_rate(3, *claim) == PLAIN.largest_rate(3, *claim) == 2 * big
-    huge = [10**400, 10**400 - 1]
-    assert FAST.largest_rate(2, ([], [], []), huge, [1, 1], [1, 1]) == 2 * huge[1]
 
 
 def test_what_is_not_symmetric_is_neither_proved_nor_bounded():

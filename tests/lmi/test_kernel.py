@@ -71,16 +71,14 @@ from fractions import Fraction
 from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
 from lmi.exact import numbers, polynomials, spectrum, work
-from lmi.exact import row_dominance as dominance
 from lmi.exact import elementary_enclosures as enclosure
 from lmi.exact import directed_rounding as rounding
 judge = arithmetic()
 assert judge.name == "standard library" and not judge.numpy
 assert judge.definite([[2, 1], [1, 1]]) and not judge.definite([[1, 1], [1, 1]])
-assert judge.dominates(2, ([0, 1], [1, 0], [-1, 1]), [2, 2], [1, 1], [1, 1], 2)
 assert judge.residual_definite(1, ([0], [0], [5]), SparseFactor([0], [0, 1], [0], [2], [0], 0))
 assert numbers.parse("1/3") == Fraction(1, 3) and rounding.down(Fraction(1, 3), 2) == "0.33"
-assert spectrum.nonzero_spectrum_beyond([{{0: 1, 1: -1}}, {{1: 1, 0: -1}}], 1, [[0, 1]], {{0}}, Fraction(1)) == "beyond"
+assert spectrum.nonzero_spectrum_beyond([{{0: 1, 1: -1}}, {{1: 1, 0: -1}}], 1, Fraction(1)) == "beyond"
 assert not {{"numpy", "scipy", "flint", "ptcc_certify", "lmi.exact.fast"}} & set(sys.modules)
 """
     done = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True, timeout=60)

@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 import lmi
 import ptcc_certify
-from lmi.definiteness_proofs import _integers
+from lmi.definiteness_proofs import _integers, eliminate
 from lmi.exact import fast
-from lmi.exact.definite import eliminate
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 import lmi
+from lmi.definiteness_proofs import eliminate
 from lmi.exact import fast
-from lmi.exact.definite import Arithmetic, SparseFactor, eliminate
+from lmi.exact.definite import Arithmetic, SparseFactor
 
 
 @FEW

@@ -19,12 +19,12 @@ from lmi.exact.spectrum import nonzero_spectrum_beyond
 
 #: Weights of the edges from j to i, by (j, i).
 Edges = dict[tuple[int, int], Fraction]
-#: Arguments of the decision but the line.
-Blocks = tuple[list[dict[int, int]], int, list[list[int]], set[int]]
 
 
-def blocks(size: int, edges: Mapping[tuple[int, int], Fraction | int], factor: int = 1) -> Blocks:
-    """Laplacian, strongly connected components, and those among them that are closed and balanced."""
+def laplacian(
+    size: int, edges: Mapping[tuple[int, int], Fraction | int], factor: int = 1
+) -> tuple[list[dict[int, int]], int, int]:
+    """Rows of the Laplacian, their unit, and how many strong components are closed and balanced."""
     unit = factor * lcm(*(Fraction(w).denominator for w in edges.values()))
     rows: list[dict[int, int]] = [{} for _ in range(size)]
     graph = nx.DiGraph()
@@ -33,12 +33,10 @@ def blocks(size: int, edges: Mapping[tuple[int, int], Fraction | int], factor: i
         graph.add_edge(j, i)
         rows[i][j] = -int(w * unit)
         rows[i][i] = rows[i].get(i, 0) + abs(int(w * unit))
-    components = [list(c) for c in nx.strongly_connected_components(graph)]
-    still = set()
-    for index, nodes in enumerate(components):
-        if all(j in nodes for i in nodes for j in graph.predecessors(i)) and balanced(nodes, edges):
-            still.add(index)
-    return rows, unit, components, still
+    still = 0
+    for nodes in map(list, nx.strongly_connected_components(graph)):
+        still += all(j in nodes for i in nodes for j in graph.predecessors(i)) and balanced(nodes, edges)
+    return rows, unit, still
 
 
 def balanced(nodes: list[int], edges: Mapping[tuple[int, int], Fraction | int]) -> bool:
@@ -56,7 +54,7 @@ def balanced(nodes: list[int], edges: Mapping[tuple[int, int], Fraction | int]) 
 
 
 def location(size: int, edges: Mapping[tuple[int, int], Fraction | int], line: Fraction | int, factor: int = 1) -> str:
-    return nonzero_spectrum_beyond(*blocks(size, edges, factor), Fraction(line))
+    return nonzero_spectrum_beyond(*laplacian(size, edges, factor)[:2], Fraction(line))
 
 
 def ring(nodes: list[int], weight: int = 1) -> dict[tuple[int, int], int]:
@@ -143,6 +141,13 @@ def leaders(r: random.Random) -> tuple[int, Edges]:
     return size, {(j, i): weight(r) for i in range(2, size) for j in range(i) if r.random() < 0.5}
 
 
+def parts(size: int, edges: Edges) -> list[list[int]]:
+    """Nodes of the strong components, by networkx."""
+    graph = nx.DiGraph(list(edges))
+    graph.add_nodes_from(range(size))
+    return [sorted(nodes) for nodes in nx.strongly_connected_components(graph)]
+
+
 CLASSES = [digraph, undirected, two_sides, unbalanced_ring, leaders]
 
 
@@ -154,19 +159,20 @@ def test_random_graphs_on_both_sides_of_the_slowest_mode(make: Callable[[random.
         size, edges = make(r)
         if not edges:
             continue
-        rows, unit, components, still = blocks(size, edges)
+        rows, unit, still = laplacian(size, edges)
         roots = numerical(rows, unit)
-        slowest = np.sort(roots.real)[len(still) :]
-        assert np.sum(abs(roots) < 1e-9) == len(still)
+        slowest = np.sort(roots.real)[still:]
+        assert np.sum(abs(roots) < 1e-9) == still
         if not len(slowest):
             continue
         compared += 1
         for factor, expected in ((0.9, "beyond"), (1.1, "below")):
             line = Fraction(slowest[0] * factor).limit_denominator(r.choice([10**3, 10**6, 10**15]))
-            assert nonzero_spectrum_beyond(rows, unit, components, still, line) == expected
+            assert nonzero_spectrum_beyond(rows, unit, line) == expected
+            assert nonzero_spectrum_beyond(rows, unit, line, parts(size, edges)) == expected
             c = r.randint(2, 40)
             more = [{j: c * v for j, v in row.items()} for row in rows]
-            assert nonzero_spectrum_beyond(more, c * unit, components, still, line) == expected
+            assert nonzero_spectrum_beyond(more, c * unit, line) == expected
 
 
 def unit_weights(r: random.Random) -> tuple[int, Edges]:
@@ -198,13 +204,13 @@ def test_lines_through_eigenvalues(bits: tuple[int, ...], monkeypatch: pytest.Mo
         size, edges = unit_weights(r)
         if not edges:
             continue
-        rows, unit, components, still = blocks(size, edges)
-        real = np.sort(numerical(rows, unit).real)[len(still) :]
+        rows, unit, still = laplacian(size, edges)
+        real = np.sort(numerical(rows, unit).real)[still:]
         if not len(real):
             continue
         line = max(Fraction(round(2 * real[0]), 2), Fraction(1, 2))
-        found = nonzero_spectrum_beyond(rows, unit, components, still, line)
-        assert found == exact(rows, unit, line)
+        found = nonzero_spectrum_beyond(rows, unit, line)
+        assert found == exact(rows, unit, line) == nonzero_spectrum_beyond(rows, unit, line, parts(size, edges))
         seen[found] = seen.get(found, 0) + 1
     assert min(seen[key] for key in ("beyond", "on", "defective", "below")) >= 10, seen
 
@@ -281,14 +287,13 @@ def rings(count: int, weight: int, heard: int, joined: str) -> tuple[int, Edges]
 def test_eigenvalues_repeated_across_rings(
     count: int, weight: int, heard: int, line: Fraction | int, joined: str, expected: str, precision: None
 ):
-    rows, unit, components, still = blocks(*rings(count, weight, heard, joined))
-    assert len(components) == count + 1
+    rows, unit, _ = laplacian(*rings(count, weight, heard, joined))
     line = Fraction(line)
-    assert nonzero_spectrum_beyond(rows, unit, components, still, line) == expected
+    assert nonzero_spectrum_beyond(rows, unit, line) == expected
     if count < 4:
         assert exact(rows, unit, line) == expected
-    assert nonzero_spectrum_beyond(rows, unit, components, still, line * Fraction(99, 100)) == "beyond"
-    assert nonzero_spectrum_beyond(rows, unit, components, still, line * Fraction(101, 100)) == "below"
+    assert nonzero_spectrum_beyond(rows, unit, line * Fraction(99, 100)) == "beyond"
+    assert nonzero_spectrum_beyond(rows, unit, line * Fraction(101, 100)) == "below"
 
 
 def test_two_closed_rings_and_a_chain_after_them():
@@ -317,9 +322,9 @@ def test_roots_in_symmetry_to_the_line(bits: tuple[int, ...], monkeypatch: pytes
     assert on_axis([1, 0, -1]) is None  # y^2 - 1
     assert on_axis([1, 0, 0, 0, 4]) is None  # y^4 + 4: +-1 +- i
     assert on_axis([1, -1, 0, 0, 4, -4]) is None  # (y^4 + 4)(y - 1)
-    assert on_axis([1, 0, 1]) == (0, [1, 1])  # y^2 + 1
-    assert on_axis([1, 0, 2, 0, 1]) == (0, [1, 2, 1])  # (y^2 + 1)^2
-    assert on_axis([1, -1, 2, -2, 0, 0]) == (2, [1, 2])  # y^2 (y^2 + 2)(y - 1)
+    assert on_axis([1, 0, 1]) == (2, [1, 0, 1])  # y^2 + 1
+    assert on_axis([1, 0, 2, 0, 1]) == (4, [1, 0, 1])  # (y^2 + 1)^2
+    assert on_axis([1, -1, 2, -2, 0, 0]) == (4, [1, 0, 2, 0])  # y^2 (y^2 + 2)(y - 1)
     assert on_axis([1, 0, 0, -1]) is None  # y^3 - 1
     assert on_axis([1, -3, 3, -1]) == (0, [1])  # (y - 1)^3
     assert on_axis([1, 0, 1, 0, 1]) is None  # y^4 + y^2 + 1
@@ -330,15 +335,19 @@ def test_products_of_chosen_roots(bits: tuple[int, ...], monkeypatch: pytest.Mon
     monkeypatch.setattr(spectrum, "BITS", bits)
     r = random.Random(3)
     for _ in range(150):
-        p, zeros, pairs, below = [1], r.randint(0, 2), [1], False
-        for _ in range(r.randint(0, 3)):
-            square = r.randint(1, 5)
-            p, pairs = polynomials.product(p, [1, 0, square]), polynomials.product(pairs, [1, square])
+        p, zeros, below = [1], r.randint(0, 2), False
+        squares = [r.randint(1, 5) for _ in range(r.randint(0, 3))]
+        simple = [1, 0] if zeros else [1]
+        for square in squares:
+            p = polynomials.product(p, [1, 0, square])
+        for square in set(squares):
+            simple = polynomials.product(simple, [1, 0, square])
         for _ in range(r.randint(0, 4)):
             root, square = r.choice([-1, 1, 1, 2, 3, 50]), r.randint(0, 3)
             below |= root < 0
             p = polynomials.product(p, [1, -root] if not square else [1, -2 * root, root**2 + square])
-        assert spectrum._roots_on_axis(p + [0] * zeros) == (None if below else (zeros, pairs))
+        count = zeros + 2 * len(squares)
+        assert spectrum._roots_on_axis(p + [0] * zeros) == (None if below else (count, simple))
 
 
 def test_the_unit_and_the_line_scale_together():
@@ -352,38 +361,13 @@ def test_the_unit_and_the_line_scale_together():
 
 
 def test_without_edges_nothing_is_below():
-    assert nonzero_spectrum_beyond([{}, {}], 1, [[0], [1]], {0, 1}, Fraction(5)) == "beyond"
+    assert nonzero_spectrum_beyond([{}, {}], 1, Fraction(5)) == "beyond"
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"unit": 0}, "positive"),
-        ({"line": Fraction(0)}, "positive"),
-        ({"components": [[0], [1]]}, "part the nodes"),
-        ({"components": [[0], [1], [2], [2]]}, "part the nodes"),
-        ({"still": {3}}, "no such component"),
-        ({"still": {0, 1}}, "regular"),
-        ({"still": set()}, "more often"),
-        ({"components": [[0], [1], [2]]}, "cycle"),
-        ({"components": [[0, 1, 2]]}, None),  # coarser blocks are blocks as well
-        ({"rows": [{}, {0: -1, 1: 2, 2: -1}, {1: -1, 2: 1, 3: 0}]}, "no column"),
-    ],
-)
-def test_what_is_refused(change: dict[str, object], message: str | None):
-    arguments: dict[str, object] = {
-        "rows": [{}, {0: -1, 1: 2, 2: -1}, {1: -1, 2: 1}],
-        "unit": 1,
-        "components": [[0], [1, 2]],
-        "still": {0},
-        "line": Fraction(1, 4),
-    }
-    assert nonzero_spectrum_beyond(**arguments) == "beyond"  # type: ignore[arg-type]
-    if message is None:
-        assert nonzero_spectrum_beyond(**(arguments | change)) == "beyond"  # type: ignore[arg-type]
-        return
-    with pytest.raises(ValueError, match=message):
-        nonzero_spectrum_beyond(**(arguments | change))  # type: ignore[arg-type]
+@pytest.mark.parametrize(("unit", "line"), [(0, 1), (1, 0), (-1, 1)])
+def test_what_is_refused(unit: int, line: int):
+    with pytest.raises(ValueError, match="positive"):
+        nonzero_spectrum_beyond([{}, {0: -1, 1: 1}], unit, Fraction(line))
 
 
 def test_characteristic_polynomials_and_ranks():
@@ -407,11 +391,11 @@ def test_a_large_graph():
         for j in r.sample(range(size), 3):
             if j != i:
                 edges[j, i] = Fraction(r.randint(1, 99), 50) * r.choice([1, -1])
-    rows, unit, components, still = blocks(size, edges)
-    assert len(components) == 1 and not still
+    rows, unit, still = laplacian(size, edges)
+    assert not still
     slowest = numerical(rows, unit).real.min()
     for factor, expected in ((0.999, "beyond"), (1.001, "below")):
         start = time.perf_counter()
         line = Fraction(slowest * factor).limit_denominator(10**9)
-        assert nonzero_spectrum_beyond(rows, unit, components, still, line) == expected
+        assert nonzero_spectrum_beyond(rows, unit, line) == expected
         print(f"{size} nodes, {expected}: {time.perf_counter() - start:.2f} s")

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 import lmi
-from lmi.definiteness_proofs import ELIMINATION_ROWS, ResidualWitness
-from lmi.exact.definite import eliminate
+from lmi.definiteness_proofs import ELIMINATION_ROWS, ResidualWitness, eliminate
 
 
 @FEW

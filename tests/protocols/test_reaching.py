@@ -7,7 +7,7 @@ from itertools import pairwise
 import flint
 import numpy as np
 import pytest
-from balls import ball
+from balls import ball, inverse_decay_integral
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -20,7 +20,6 @@ from ptcc_certify.protocols.reaching_time import (
     ReachingProblem,
     ReachingTime,
     certified_reaching_times,
-    inverse_decay_integral,
     sliding_bound,
 )
 from ptcc_certify.simulation.run import simulate

@@ -19,7 +19,7 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import Actuator, LimitedGain
-from ptcc_certify.simulation.limited import as_forcing
+from ptcc_certify.simulation.nominal import as_forcing
 from ptcc_certify.simulation.run import simulate
 
 PROTOCOL = NominalProtocol("0.6", "0.1", "0.3", 1)

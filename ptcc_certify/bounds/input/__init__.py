@@ -158,10 +158,8 @@ def _bounded(
     if not tractable(rows, unit, 1 / k):
         return None, None
     labels = structure.strong_component
-    components = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
-    balanced = [sorted(c.nodes) for c in structure.closed_components if c.balanced]
-    still_parts = {k for k, nodes in enumerate(components) if nodes in balanced}
-    place = nonzero_spectrum_beyond(rows, unit, components, still_parts, 1 / k, arithmetic().characteristic)
+    parts = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
+    place = nonzero_spectrum_beyond(rows, unit, 1 / k, parts, arithmetic().characteristic)
     return place in ("beyond", "on"), "spectrum"
 
 

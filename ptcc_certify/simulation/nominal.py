@@ -1,4 +1,4 @@
-"""The nominal protocol under limits of the gain, disturbances and measurement noise.
+"""The nominal protocol, alone or under limits of the gain, disturbances and measurement noise.
 
 As long as nothing is held or added,
 
@@ -9,7 +9,6 @@ A disturbance ``d`` and noise ``n`` give ``X' = -gain L (X + n) + d``.
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -19,11 +18,11 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain, Periods
+from ptcc_certify.protocols.gain_limits import GainLimits, Periods
 from ptcc_certify.protocols.parameters import parameter, readable
-from ptcc_certify.simulation.cvodes import Motion, NominalMotion, Tolerances
-from ptcc_certify.simulation.forced import ForcedMotion, Forcing, Phase
+from ptcc_certify.simulation.cvodes import Phase, Tolerances
 from ptcc_certify.simulation.instants import Instants
+from ptcc_certify.simulation.motions import Forcing, NominalMotion
 from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -31,13 +30,11 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols import Protocol
 
 MAX_JUMPS = 10**4
-# From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit.
-_LAST_TAU = 40.0
 # Up to so many agents a dense product with ``L`` is faster than a sparse one.
 _DENSE_UP_TO = 64
 
 
-def simulate_limited(
+def simulate_nominal(
     graph: SignedDigraph,
     protocol: Protocol,
     start: np.ndarray,
@@ -46,7 +43,7 @@ def simulate_limited(
     forcing: Forcing | None,
     tolerances: Tolerances,
 ) -> Trajectory:
-    """Move the nominal protocol under limits of the gain; see :func:`ptcc_certify.simulation.run.simulate`.
+    """Move the nominal protocol, under limits of the gain; see :func:`ptcc_certify.simulation.run.simulate`.
 
     Parameters
     ----------
@@ -67,7 +64,8 @@ def simulate_limited(
     """
     limited = (actuator or GainLimits()).limit(protocol.gain)
     t, left = instants.t, instants.left
-    if forcing is not None and limited.limits.sample_period is not None:
+    sampled = limited.limits.sample_period is not None
+    if forcing is not None and sampled:
         raise ParameterError("sample_period takes no disturbance and no noise; leave one of them out")
     if forcing is not None and forcing.noisy and not limited.bounded:
         raise ParameterError("noise times a gain that becomes infinite at T is no input; give gain_cap or stop_before")
@@ -75,41 +73,41 @@ def simulate_limited(
     unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
     unit[unit == 0] = 1
     held = residual = None
-    run: Motion
-    if limited.limits.sample_period is not None:
+    run = NominalMotion(graph, columns / unit, tolerances, forcing, unit)
+    if sampled:
         periods = limited.periods(float(t[-1]))
         clock = periods.clock(t)
-        states, held = _sampled(graph, periods, columns / unit, t)
-        run = NominalMotion(graph, states[-1], tolerances)
+        states, held = _sampled(graph, periods, run.state, t)
         run.stats["steps"] = int(periods.locate(t[-1:])[0][0])
-    elif forcing is None:
+    elif forcing is None and limited.bounded:
         clock = limited.clock(t, left)
-        run = NominalMotion(graph, columns / unit, tolerances)
         span = float(clock[-1]) or 1.0
-        states = run.sample(0.0, span, 0.0, clock / span)
+        states = run.sample(Phase(0.0, 1.0, span, past=True), clock / span, float(clock[-1]) / span)
     else:
         clock = limited.clock(t, left)
-        run = ForcedMotion(graph, columns / unit, unit, forcing, float(t[-1]), tolerances)
-        states, residual = _forced(graph, limited, run, instants, tolerances)
+        states, residual = run.follow(limited, t, left)
     late = np.flatnonzero(left == 0)
     if residual is None and protocol.prescribed and late.size:
         residual = run.imbalance(states[late[0]])
-    shape = (*start.shape, t.size)
+
+    def shaped(values: np.ndarray) -> np.ndarray:
+        return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*start.shape, t.size)
+
     return Trajectory(
         graph=graph,
         protocol=protocol,
         t=t,
         remaining=left,
         clock=clock,
-        states=(np.moveaxis(states, 0, -1) * unit[:, None]).reshape(shape),
+        states=shaped(states),
         rtol=tolerances.rtol,
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
         deadline_residual=residual,
         stats=run.stats,
-        actuator=actuator,
+        actuator=None if actuator is None or actuator.ideal else actuator,
         forcing=None if forcing is None else forcing.text,
-        held_input=None if held is None else (np.moveaxis(held, 0, -1) * unit[:, None]).reshape(shape),
+        held_input=None if held is None else shaped(held),
     )
 
 
@@ -158,39 +156,6 @@ def as_forcing(
         return None
     size = float(max(bounds[0] * T, bounds[1]))
     return Forcing(sources[0], sources[1], ", ".join(words), size, noisy=bounds[1] > 0)
-
-
-def _forced(
-    graph: SignedDigraph, limited: LimitedGain, motion: ForcedMotion, instants: Instants, tolerances: Tolerances
-) -> tuple[np.ndarray, float | None]:
-    """Return the (M, N, S) states, found stretch by stretch, and the residual at ``T`` if the gain has its pole."""
-    t, left = instants.t, instants.left
-    T, rho1, pole = (float(value) for value in (limited.gain.T, limited.gain.rho1, limited.gain.pole))
-    states, residual = np.empty((t.size, *motion.state.shape)), None
-    for stretch in limited.stretches:
-        here, beyond = (left <= stretch.begin) & (left > stretch.end), bool((left <= stretch.end).any())
-        if not here.any() and not beyond:
-            break
-        if stretch.level is None:
-            phase = Phase(0.0, T, rho1, pole)
-            z, end = limited.tau(stretch, t, left)[here], -math.log(stretch.end) if stretch.end else _LAST_TAU
-        else:
-            span = T * (stretch.begin - stretch.end) if stretch.end >= 0 else T
-            phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
-            z, end = limited.elapsed(stretch, t, left)[here] / span, 1.0 if stretch.end >= 0 else math.inf
-        last = end if beyond else min(float(z[-1]), end)
-        states[here] = motion.sample(phase, np.minimum(z, last), last)
-        if stretch.level is None and not stretch.end and last == _LAST_TAU:
-            onward = NominalMotion(graph, motion.state, tolerances)
-            late = np.maximum(z - _LAST_TAU, 0)
-            moved = onward.sample(rho1 * T * math.exp(-_LAST_TAU), pole, 1.0, late)
-            states[here] = np.where((late > 0)[:, None, None], moved, states[here])
-            if beyond:
-                residual = onward.settle(rho1 * T, pole, max(z.max(initial=0.0), _LAST_TAU))
-            motion.state = onward.state
-            for name, count in onward.stats.items():
-                motion.stats[name] += count
-    return states, residual
 
 
 def _sampled(graph: SignedDigraph, periods: Periods, state: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
