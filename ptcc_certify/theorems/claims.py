@@ -101,12 +101,12 @@ class Claim:
         True
         """
         expected = behaviour_name(behaviour)
-        return any(expected in _implied(name) for name in (self.behaviour, *self.special))
+        return any(expected in _implications(name) for name in (self.behaviour, *self.special))
 
 
-def _implied(behaviour: str) -> set[str]:
+def _implications(behaviour: str) -> set[str]:
     """Return a behaviour and all that it implies."""
-    return {behaviour}.union(*map(_implied, _IMPLIES.get(behaviour, ())))
+    return {behaviour}.union(*map(_implications, _IMPLIES.get(behaviour, ())))
 
 
 def claim_of(component: WeakComponent) -> Claim:
