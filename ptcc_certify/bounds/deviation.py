@@ -120,7 +120,7 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
     By floats where they are sharp enough, else in integers; there the last one may be the sum of the others. None where
     ``F > 0`` is not proved.
     """
-    image, power, apart = _factored(F, D)
+    image, power, apart = _factor(F, D)
     unit, sizes = Fraction(4) ** power, (image**2).sum(axis=1).tolist()
     if apart <= NEAR and all(x > LEAST or not any(d) for x, d in zip(sizes, D, strict=True)):
         values = [Fraction(x) * unit * (1 + Fraction(64 * apart)) for x in sizes]
@@ -136,7 +136,7 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
     return [x * (1 + RAISE) for x in (*values, norm)]
 
 
-def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
+def _factor(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
     """Return ``D Z`` over a power of two, that power, and how far ``Z'F Z`` is from the identity, in floats."""
     rows, power = floats(D)
     with np.errstate(all="ignore"):

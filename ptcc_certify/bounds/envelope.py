@@ -378,7 +378,7 @@ class Envelope:
     def _influence(self) -> Influence:
         return influence(self.structure)
 
-    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+    def _nominal_state(self, x0: Sequence[Fraction]) -> list[Fraction]:
         """Return the initial state from which the nominal motion has the same final state."""
         return list(x0)
 
@@ -389,7 +389,7 @@ class Envelope:
         ``d = x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does
         not expand the largest entry.
         """
-        nominal = self._undriven(x0)
+        nominal = self._nominal_state(x0)
         gaps = (abs(x - Fraction(end)) for x, end in zip(x0, self._influence.apply(nominal)[0], strict=True))
         most = float_up(max(gaps) + sum((abs(x - y) for x, y in zip(x0, nominal, strict=True)), Fraction(0)))
         return np.append(np.full(len(x0), most), most * math.sqrt(len(x0)) * (1 + 1e-15))
@@ -488,7 +488,7 @@ class Envelope:
         worst = 0.0
         for x in _columns(trajectory):
             size, x0 = self._unit(x[:, 0]), [Fraction(v) for v in x[:, 0].tolist()]
-            final, _ = self._influence.apply(self._undriven(x0))
+            final, _ = self._influence.apply(self._nominal_state(x0))
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
             excess = np.vstack([excess, np.linalg.norm(excess, axis=0)])

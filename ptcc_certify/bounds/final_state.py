@@ -430,7 +430,7 @@ def enclose(influence: Influence) -> Influence:
     if F.size:
         u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
     left_null_vectors = {
-        k: _enclosed_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
+        k: _enclose_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
         for k, (component, null_vector) in enumerate(influence.groups)
         if not all(isinstance(w, Fraction | int) for w in null_vector)
     }
@@ -472,7 +472,7 @@ def enclosed_final_state(influence: Influence, initial_state: Sequence[Fraction]
     exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
     F = structure.followers
     if F.size and middle.any():
-        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, enclosure.witness)
+        middle[F], radius[F] = _enclose_followers(structure, exact, middle, radius, enclosure.witness)
     final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
     spreads = [Fraction(r) * unit for r in radius.tolist()]
     for v, x in exact.items():
@@ -515,7 +515,7 @@ def _witness(block: Any) -> np.ndarray:
     return u
 
 
-def _enclosed_left_null_vector(
+def _enclose_left_null_vector(
     structure: Structure, component: ClosedComponent, null_vector: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
@@ -544,7 +544,7 @@ def _enclosed_left_null_vector(
     return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
 
 
-def _enclosed_followers(
+def _enclose_followers(
     structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return middles and radii of the followers, in a unit near to the largest leader."""

@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 # The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
 _PIECES = 4000
-#: Arrays of instants whose bounds are kept.
-_MOST_KNOWN = 8
+#: Arrays of instants whose bounds are cached.
+_CACHE_SIZE = 8
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class SlidingEnvelope(Envelope):
         place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
         size, s, last = self._sliding(knots) / unit, self._clock_at(knots), self._clock_at(np.array(np.inf))
         later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
-        y0 = [x / Fraction(unit) for x in self._undriven(x0)]
+        y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
         for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):
             half = function.rate_below / 2
             C, B = self._drive(function)
@@ -238,17 +238,17 @@ class SlidingEnvelope(Envelope):
             yield function, v[place] * np.exp(-half * later), np.append(_column_norms(C @ size), 0.0)[place]
 
     @cached_property
-    def _known(self) -> dict[bytes, np.ndarray]:
+    def _cache(self) -> dict[bytes, np.ndarray]:
         return {}
 
     def _sliding(self, z: np.ndarray) -> np.ndarray:
         """Return :func:`sliding_bound`, which every Lyapunov function asks for at the same instants."""
         key = z.tobytes()
-        if key not in self._known:
-            if len(self._known) > _MOST_KNOWN:
-                self._known.clear()
-            self._known[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
-        return self._known[key]
+        if key not in self._cache:
+            if len(self._cache) > _CACHE_SIZE:
+                self._cache.clear()
+            self._cache[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
+        return self._cache[key]
 
     @cached_property
     def _pieces(self) -> np.ndarray:
@@ -272,7 +272,7 @@ class SlidingEnvelope(Envelope):
         deviation = function.coordinates_of(np.eye(L.shape[0]), L)
         return np.abs(function.scaled(deviation)), np.abs(function.scaled(deviation @ L))
 
-    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+    def _nominal_state(self, x0: Sequence[Fraction]) -> list[Fraction]:
         return [x - sigma for x, sigma in zip(x0, self.sigma0, strict=True)]
 
     def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:

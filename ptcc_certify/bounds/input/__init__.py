@@ -31,7 +31,7 @@ from ptcc_certify.bounds.input.effort import (
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
 from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
-from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, disturbed
+from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import (
@@ -101,7 +101,7 @@ def bound_effort(request: InputRequest) -> Effort:
     """Bound the input."""
     structure, gain, influence = request.structure, request.protocol.gain, request.influence
     still, n = structure.graph.n_edges == 0, structure.graph.n_nodes
-    bounded, by = _bounded(structure, gain.pole, request.rate, request.limit, still)
+    bounded, by = _decide_boundedness(structure, gain.pole, request.rate, request.limit, still)
     lower, upper = (None if r is None else gain.pole * r / 2 for r in (request.rate, request.limit))
     sliding = _sliding_part(request)
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
@@ -110,7 +110,7 @@ def bound_effort(request: InputRequest) -> Effort:
     constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in request.forms)
     region = request.initial_set or InitialSet(tuple(request.initial_state or ()))
     rows = structure.graph.exact_rows(range(n))
-    bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching(request))
+    bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching_phase(request))
     usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None if own is None else _peak(bounds, usable, own)
@@ -129,7 +129,7 @@ def bound_effort(request: InputRequest) -> Effort:
         path_length=least_bound(bounds, length_above, usable),
         residual=tuple(entry for entry in entries if entry is not None),
         longest_period=limited.longest_period(request.limits, entries, gain),
-        disturbed=None if request.delta is None else disturbed(bounds, usable, request.delta, influence),
+        disturbed=None if request.delta is None else bound_disturbed(bounds, usable, request.delta, influence),
         first=first_input(structure, request.protocol, region),
     )
 
@@ -142,7 +142,7 @@ def first_input(structure: Structure, protocol: Protocol, region: InitialSet) ->
     return protocol.gain.first * max(map(region.largest, structure.graph.exact_rows(range(n))))
 
 
-def _bounded(
+def _decide_boundedness(
     structure: Structure, k: Fraction, rate: Fraction | None, limit: Fraction | None, still: bool
 ) -> tuple[bool | None, str | None]:
     """Decide whether the input stays bounded for every initial state, and by what."""
@@ -174,7 +174,7 @@ def _sliding_part(request: InputRequest) -> SlidingPart | None:
     return SlidingPart(drive.pole >= 1, tuple(protocol.mu1 + drive.first * abs(s) for s in sigma0))
 
 
-def _reaching(request: InputRequest) -> Reaching | None:
+def _reaching_phase(request: InputRequest) -> Reaching | None:
     """Return how the sliding variables move; None if they do not."""
     protocol, sigma0, times = request.protocol.reaching, request.sigma0, request.reaching
     if protocol is None or sigma0 is None or not any(sigma0):

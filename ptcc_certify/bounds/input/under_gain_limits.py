@@ -66,7 +66,9 @@ class LimitedBounds:
         best = least((partial(self._bound_by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
         if best is None or self.noise is None or limits.sample_period is not None:
             return best
-        noisy = least((partial(self._noisy, k, best, top) for k in self.functions), lambda entry: entry.noisy_largest)
+        noisy = least(
+            (partial(self._add_noise, k, best, top) for k in self.functions), lambda entry: entry.noisy_largest
+        )
         return noisy or best
 
     def _bound_by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
@@ -89,7 +91,7 @@ class LimitedBounds:
             limits, clock, k, growth, norm, None if constants is None else tuple(map(round_up, sizes)), largest
         )
 
-    def _noisy(self, k: int, entry: Limited, top: Fraction) -> Limited:
+    def _add_noise(self, k: int, entry: Limited, top: Fraction) -> Limited:
         """Add the bounds under measurement noise by one Lyapunov function."""
         noise = self.noise or Fraction(0)
         whole, each = self.bounds.noisy(k, noise)
@@ -162,7 +164,7 @@ def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
     return round_up(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
 
 
-def disturbed(
+def bound_disturbed(
     bounds: InputBounds, functions: Sequence[int], delta: Fraction, influence: Influence | None
 ) -> Disturbed | None:
     """Bound what disturbances add under the nominal protocol."""
