@@ -281,7 +281,7 @@ class Content:
         return [V.form for V in self.functions]
 
     @property
-    def _rated(self) -> list[LyapunovFunction]:
+    def _functions_with_rate(self) -> list[LyapunovFunction]:
         """The functions of a proved rate, the paper's first; as ``functions``, without what is not needed for rates."""
         paper = () if self.lyapunov is None or self.lyapunov.rate is None else (self.lyapunov,)
         return [*paper, *self.searched_functions]
@@ -289,7 +289,7 @@ class Content:
     @property
     def rate(self) -> Fraction | None:
         """The largest proved rate of all Lyapunov functions; None if nothing decays or nothing was proved."""
-        return max((V.proved_rate for V in self._rated if V.proved_rate > 0), default=None)
+        return max((V.proved_rate for V in self._functions_with_rate if V.proved_rate > 0), default=None)
 
     @property
     def paper_rate(self) -> Fraction | None:
@@ -305,7 +305,7 @@ class Content:
     @property
     def fastest(self) -> LyapunovFunction:
         """The function of the largest proved rate, and of those that share it the least overshoot constant."""
-        return max(self._rated, key=lambda V: (V.proved_rate, -V.overshoot))
+        return max(self._functions_with_rate, key=lambda V: (V.proved_rate, -V.overshoot))
 
     @property
     def overshoot(self) -> Fraction | None:
@@ -328,7 +328,7 @@ class Content:
 
         Matrices are rounded to short rationals, and their rates lowered until they prove.
         """
-        pairs = [(V.proved_rate, V.numerical_rate) for V in self._rated]
+        pairs = [(V.proved_rate, V.numerical_rate) for V in self._functions_with_rate]
         losses = [
             float(1 - rate / Fraction(numerical)) * math.copysign(1, numerical)
             for rate, numerical in pairs

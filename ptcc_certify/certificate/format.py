@@ -259,7 +259,7 @@ def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | 
     """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
     if content.influence.exact:
         return _exact_final_state(content)
-    return (None, None) if content.influence.enclosure is None else _enclosed_final_state(content, out)
+    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
 
 
 def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -290,7 +290,7 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     return section, ends
 
 
-def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
+def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """Write the final state of a large graph: left null vector of leader groups, and the final state in intervals."""
     labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
@@ -301,7 +301,7 @@ def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any]
             radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
             final = {"mid": out.vector("mid", final_state.values), "radius": out.vector("radius", np.array(radius))}
         else:
-            final = {label: _enclosed_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
+            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
     for k, (component, null_vector) in enumerate(zip(matrix.balanced, matrix.left_null_vectors, strict=True)):
         if k in matrix.enclosure.left_null_vectors:
@@ -317,7 +317,7 @@ def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any]
     return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
 
 
-def _enclosed_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
+def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
     if radius == 0:
         return exact_or_ball(Fraction(x))
     if isinstance(x, float):

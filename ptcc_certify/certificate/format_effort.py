@@ -98,36 +98,36 @@ def read_effort(
         threshold=(lower, upper),
         initial_set=initial_set,
         constants=tuple(map(data.state, section["constants"])),
-        peak=_peak(section["peak"], data, steps),
-        energy=_energy(section["energy"], steps),
-        path_length=_witness(section["path_length"], "input-length", steps),
+        peak=_read_peak(section["peak"], data, steps),
+        energy=_read_energy(section["energy"], steps),
+        path_length=_read_witness(section["path_length"], "input-length", steps),
         sliding=sliding and SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
-            _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
+            _read_limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
             for k, entry in enumerate(section["residual"])
         ),
-        disturbed=_disturbed(section["disturbed"], data, steps),
+        disturbed=_read_disturbed(section["disturbed"], data, steps),
         first=None if states is None else first_input(structure, protocol, states),
     )
 
 
-def _witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
+def _read_witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
     if section is None:
         return None
     step = steps[kind, "input"]
     return Witness(exact(section), step.witness, step.numbers["z"])
 
 
-def _energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
+def _read_energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
     step = steps.get(("input-energy", "input"))
     if section is None or step is None or not isinstance(step.witness, dict):
-        return _witness(section, "input-energy", steps)
+        return _read_witness(section, "input-energy", steps)
     first, second = (triangle(step.witness[key], len(step.witness[key])) for key in ("W0", "W1"))
     p, m0, m1 = (step.numbers[key] for key in ("p", "m0", "m1"))
     return EnergyIntegral(exact(section), p, (first, second), (m0, m1))
 
 
-def _peak(section: Section | None, data: Reader, steps: Steps) -> Peak | None:
+def _read_peak(section: Section | None, data: Reader, steps: Steps) -> Peak | None:
     if section is None:
         return None
     step, agents, norm = steps["input-peak", "input"], data.agents(section["agents"]), exact(section["norm"])
@@ -136,7 +136,7 @@ def _peak(section: Section | None, data: Reader, steps: Steps) -> Peak | None:
     return Peak(agents, each, norm, Witness(norm, step.witness["norm"], step.numbers["z"]))
 
 
-def _limited(section: Section, step: Obligation, data: Reader) -> Limited:
+def _read_limited(section: Section, step: Obligation, data: Reader) -> Limited:
     noise = section["noise"] or {}
     first, second = step.witness if noise else (step.witness, None)
     return Limited(
@@ -152,7 +152,7 @@ def _limited(section: Section, step: Obligation, data: Reader) -> Limited:
     )
 
 
-def _disturbed(section: Section | None, data: Reader, steps: Steps) -> Disturbed | None:
+def _read_disturbed(section: Section | None, data: Reader, steps: Steps) -> Disturbed | None:
     if section is None:
         return None
     function = steps["nominal-disturbed", "input"].witness

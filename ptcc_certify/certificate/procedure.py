@@ -348,7 +348,7 @@ def _search_and_prove(
         return None, nothing, None
     try:
         with np.errstate(all="ignore"):
-            search = partial(_searched, theorem, structure)
+            search = partial(_search, theorem, structure)
             (V,) = apart(search) if n > APART_NODES else search()
             numerical = theorem.rate(structure, V) if V.blocks else None
     except OutOfTime:
@@ -373,7 +373,7 @@ def _search_and_prove(
     return V, proof, numerical
 
 
-def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
+def _search(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
     return [theorem.lyapunov(structure)]
 
 
