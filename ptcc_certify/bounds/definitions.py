@@ -63,7 +63,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     Parameters
     ----------
     x : sequence of N numbers, mapping or pandas Series by label, FinalState or Trajectory
-        A trajectory is judged at its deadline and at every later sample, relative to its largest start.
+        A trajectory is judged at its deadline and at every later sample, relative to its largest initial value.
     structure : Structure
     tolerance : float
         0 asks for equality, which makes sense for exact final states.
@@ -189,10 +189,10 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
     >>> is_bipartite_containment(final_state(st, [1, 0, 2]), st)
     True
     """
-    return all(_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
+    return all(_is_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
 
 
-def _contained(state: Sequence[Any], structure: Structure, tolerance: float) -> bool:
+def _is_contained(state: Sequence[Any], structure: Structure, tolerance: float) -> bool:
     for component in structure.closed_components:
         own = [state[v] for v in component.nodes]
         if component.balanced and not _same_modulus(own, tolerance):

@@ -1,7 +1,7 @@
 """How far each agent is from its final state, given a bound on ``V``.
 
 In the state, a Lyapunov function is ``V = x'F x``, and ``x - Q x = D x``; both vanish on the kernel of ``L``, so that
-only rows and columns ``kept`` count: all nodes but the first one of each balanced closed component. There
+only rows and columns ``nodes`` count: all nodes but the first one of each balanced closed component. There
 
     |x_k - (Q x)_k|^2 <= c_k V,    c_k = d_k' F^-1 d_k,
 
@@ -28,8 +28,8 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
 from ptcc_certify.theorems.matrices import integer_matrix, integer_rows
 
-#: Bits of the constants that are kept.
-KEPT_BITS = 40
+#: Bits of the constants.
+CONSTANT_BITS = 40
 #: How near a factor in floats must take a form to the identity for constants of agents, and for that of the norm.
 NEAR, FAR = 2.0**-30, 2.0**-12
 #: Below this squares of floats may have lost digits.
@@ -57,52 +57,53 @@ class DeviationGeometry:
         """Return the constants of ``V``, or None where it is not seen to be definite."""
         F, scale = self._error_form(V) if V.coordinates == "E" else self._mean_form(V.weights)
         D, common = self._deviation
-        unit, found = scale / common**2, _constants(F, D)
-        if found is None:
+        unit, constants = scale / common**2, _constants(F, D)
+        if constants is None:
             return None
-        *agents, norm = (rounded(x * unit, KEPT_BITS, up=True) for x in found)
+        *agents, norm = (rounded(x * unit, CONSTANT_BITS, up=True) for x in constants)
         return DeviationBound(tuple(agents), norm)
 
     @cached_property
-    def _kept(self) -> list[int]:
+    def _nodes(self) -> list[int]:
         """All nodes but the first one of each balanced closed component."""
         first = {c.nodes[0] for c in self._influence.balanced}
         return [v for v in range(self._structure.graph.n_nodes) if v not in first]
 
     @cached_property
     def _laplacian(self) -> tuple[Integers, int]:
-        """``L`` times a scale on the columns ``kept``, and the scale."""
-        return self._on_kept(self._structure.graph.exact_rows(range(self._structure.graph.n_nodes)))
+        """``L`` times a scale on the columns ``nodes``, and the scale."""
+        return self._on_nodes(self._structure.graph.exact_rows(range(self._structure.graph.n_nodes)))
 
     @cached_property
     def _deviation(self) -> tuple[Integers, int]:
-        """``D = I - Q`` times a scale on the columns ``kept``, and the scale."""
-        return self._on_kept(ways(self._influence))
+        """``D = I - Q`` times a scale on the columns ``nodes``, and the scale."""
+        return self._on_nodes(ways(self._influence))
 
-    def _on_kept(self, rows: Sequence[Mapping[int, Fraction]]) -> tuple[Integers, int]:
-        """Return sparse rows times a scale on the columns ``kept``, and the scale."""
-        return _over_one_scale([[row.get(j, Fraction(0)) for j in self._kept] for row in rows])
+    def _on_nodes(self, rows: Sequence[Mapping[int, Fraction]]) -> tuple[Integers, int]:
+        """Return sparse rows times a scale on the columns ``nodes``, and the scale."""
+        return _over_one_scale([[row.get(j, Fraction(0)) for j in self._nodes] for row in rows])
 
     def _error_form(self, V: LyapunovFunction) -> tuple[Integers, Fraction]:
-        """Return ``L'P L`` times a scale on ``kept``, and the scale."""
+        """Return ``L'P L`` times a scale on ``nodes``, and the scale."""
         import flint
 
         L, unit = self._laplacian
         rows = flint.fmpz_mat([L[v] for v in V.nodes])
         if V.matrix is None:
             (weights,), scale = _over_one_scale([V.weights])
-            moved = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(V.nodes, weights, strict=True)])
+            product = flint.fmpz_mat([[w * x for x in L[v]] for v, w in zip(V.nodes, weights, strict=True)])
         else:
             P, scale = integer_matrix(V.matrix)
-            moved = P * rows
-        return integer_rows(rows.transpose() * moved), Fraction(scale * unit**2)
+            product = P * rows
+        return integer_rows(rows.transpose() * product), Fraction(scale * unit**2)
 
     def _mean_form(self, p: Sequence[Fraction]) -> tuple[Integers, Fraction]:
-        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``kept``, and the scale."""
+        """Return ``Z = G (P - p p'/p'1) G``, whose form is ``eps'P eps``, times a scale on ``nodes``, and the scale."""
         (weights,), scale = _over_one_scale([p])
         (gauge,), total = (c.gauge or () for c in self._influence.balanced), sum(weights)
         Z = [
-            [gauge[i] * gauge[j] * weights[i] * (total * (i == j) - weights[j]) for j in self._kept] for i in self._kept
+            [gauge[i] * gauge[j] * weights[i] * (total * (i == j) - weights[j]) for j in self._nodes]
+            for i in self._nodes
         ]
         return Z, Fraction(total * scale)
 
@@ -119,23 +120,23 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
     By floats where they are sharp enough, else in integers; there the last one may be the sum of the others. None where
     ``F > 0`` is not proved.
     """
-    moved, power, apart = _factored(F, D)
-    unit, sizes = Fraction(4) ** power, (moved**2).sum(axis=1).tolist()
+    image, power, apart = _factor(F, D)
+    unit, sizes = Fraction(4) ** power, (image**2).sum(axis=1).tolist()
     if apart <= NEAR and all(x > LEAST or not any(d) for x, d in zip(sizes, D, strict=True)):
         values = [Fraction(x) * unit * (1 + Fraction(64 * apart)) for x in sizes]
     else:
-        proved = arithmetic().above(F, D)
-        if proved is None:
+        exact = arithmetic().above(F, D)
+        if exact is None:
             return None
-        values = proved
+        values = exact
     norm = sum(values, Fraction(0))
     if apart <= FAR:
-        raised = 1 + max(NORM_RAISE, Fraction(64 * apart))
-        norm = min(norm, Fraction(float(np.linalg.norm(moved, 2))) ** 2 * unit * raised)
+        factor = 1 + max(NORM_RAISE, Fraction(64 * apart))
+        norm = min(norm, Fraction(float(np.linalg.norm(image, 2))) ** 2 * unit * factor)
     return [x * (1 + RAISE) for x in (*values, norm)]
 
 
-def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
+def _factor(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
     """Return ``D Z`` over a power of two, that power, and how far ``Z'F Z`` is from the identity, in floats."""
     rows, power = floats(D)
     with np.errstate(all="ignore"):
@@ -144,7 +145,7 @@ def _factored(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
             Z = np.linalg.inv(np.linalg.cholesky(T)).T
         except np.linalg.LinAlgError:
             return np.zeros_like(rows), 0, math.inf
-        moved = np.ldexp(rows, [-half for half in halves]) @ Z
+        image = np.ldexp(rows, [-half for half in halves]) @ Z
         apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
-        finite = bool(np.isfinite((moved**2).sum()))
-    return (moved, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)
+        finite = bool(np.isfinite((image**2).sum()))
+    return (image, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)

@@ -68,10 +68,10 @@ def clock_values(clock: Any, name: str = "clock") -> np.ndarray:
 
 def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
     try:
-        given = np.asarray(values)
-        if given.dtype.kind in "bUS":
+        entries = np.asarray(values)
+        if entries.dtype.kind in "bUS":
             raise TypeError("truth values and texts are no numbers")
-        array = given.astype(float)
+        array = entries.astype(float)
     except (TypeError, ValueError):
         raise ParameterError(f"{name} = {shorten(repr(values))} is not a number, nor an array of numbers") from None
     outside = array[~((array >= 0) & (array <= most))]  # NaN is neither
@@ -225,10 +225,10 @@ class Envelope:
         ------
         ParameterError
             A value is negative or not a number; or there is a reaching phase: sliding variables drive the agents, and
-            no multiple of their start bounds them.
+            no multiple of their initial value bounds them.
         """
         clock = self._at(clock).clock
-        factors = (_grown(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm)
+        factors = (_decay(math.sqrt(m.overshoot_above), m.rate_below, clock) for m in self._in_norm)
         return np.minimum.reduce([np.full_like(clock, np.inf), *factors])
 
     def residual(self, remaining: float) -> float:
@@ -299,8 +299,8 @@ class Envelope:
 
     def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
         """Return the bounds of ``||z||`` from ``x0``."""
-        starts = self._starts(self._in_norm, x0)
-        bounds = (_grown(root / math.sqrt(m.lowest_below), m.rate_below, at.clock) for m, root in starts)
+        initial_values = self._initial_values(self._in_norm, x0)
+        bounds = (_decay(root / math.sqrt(m.lowest_below), m.rate_below, at.clock) for m, root in initial_values)
         return np.minimum.reduce([np.full_like(at.clock, np.inf), *bounds])
 
     def deviation_bound(self, remaining: np.ndarray | Sequence[float] | float, x0: Any) -> np.ndarray:
@@ -357,10 +357,10 @@ class Envelope:
         """Return the bounds of every agent and of the norm, (N + 1, M), in that unit or in 1."""
         x0 = [x / Fraction(unit or 1) for x in x0]
         bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
-        for m, root in self._starts(self._with_deviation, x0):
+        for m, root in self._initial_values(self._with_deviation, x0):
             with np.errstate(over="ignore", invalid="ignore"):
                 size = np.nan_to_num(deviation_constants(m) * root, posinf=np.inf)  # 0 times inf is 0
-            bounds = np.minimum(bounds, _grown(size, m.rate_below, at.clock))
+            bounds = np.minimum(bounds, _decay(size, m.rate_below, at.clock))
         if self._with_deviation:
             bounds = np.minimum(bounds.T, self._largest_deviations(x0)).T
         return bounds
@@ -378,7 +378,7 @@ class Envelope:
     def _influence(self) -> Influence:
         return influence(self.structure)
 
-    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+    def _nominal_state(self, x0: Sequence[Fraction]) -> list[Fraction]:
         """Return the initial state from which the nominal motion has the same final state."""
         return list(x0)
 
@@ -389,16 +389,16 @@ class Envelope:
         ``d = x - final_state`` obeys ``d' = -gain L d + sigma'``, every ``|sigma_k|`` falls to 0, and ``e^(-L s)`` does
         not expand the largest entry.
         """
-        start = self._undriven(x0)
-        gaps = (abs(x - Fraction(end)) for x, end in zip(x0, self._influence.apply(start)[0], strict=True))
-        most = float_up(max(gaps) + sum((abs(x - y) for x, y in zip(x0, start, strict=True)), Fraction(0)))
+        nominal = self._nominal_state(x0)
+        gaps = (abs(x - Fraction(end)) for x, end in zip(x0, self._influence.apply(nominal)[0], strict=True))
+        most = float_up(max(gaps) + sum((abs(x - y) for x, y in zip(x0, nominal, strict=True)), Fraction(0)))
         return np.append(np.full(len(x0), most), most * math.sqrt(len(x0)) * (1 + 1e-15))
 
     @cached_property
     def _rows(self) -> list[dict[int, Fraction]]:
         return self.structure.graph.exact_rows(range(self.structure.graph.n_nodes))
 
-    def _starts(
+    def _initial_values(
         self, functions: Iterable[LyapunovFunction], x0: Sequence[Fraction]
     ) -> Iterator[tuple[LyapunovFunction, float]]:
         """Yield ``sqrt(V(0))`` of functions, rounded up: coordinates in rationals, since entries may cancel in them."""
@@ -416,10 +416,10 @@ class Envelope:
     def compare(self, trajectory: Trajectory) -> Comparison:
         """Compare a simulated run with every Lyapunov function; see :class:`Comparison`.
 
-        Several starts at once, or the components of vector-valued agents, are judged column by column (a bound that
-        holds for every column holds for their sum). ``V`` is quadratic: starts and weights of any size are compared
-        in units of the initial state, so that no square overflows or vanishes. A run that begins later than 0 is judged
-        from its first sample on.
+        Several initial states at once, or the components of vector-valued agents, are judged column by column (a bound
+        that holds for every column holds for their sum). ``V`` is quadratic: initial states and weights of any size are
+        compared in units of the initial state, so that no square overflows or vanishes. A run that begins later than 0
+        is judged from its first sample on.
 
         Parameters
         ----------
@@ -487,13 +487,13 @@ class Envelope:
         judged = judged & (trajectory.t < float(self.gain.T))
         worst = 0.0
         for x in _columns(trajectory):
-            size, start = self._unit(x[:, 0]), [Fraction(v) for v in x[:, 0].tolist()]
-            final, _ = self._influence.apply(self._undriven(start))
+            size, x0 = self._unit(x[:, 0]), [Fraction(v) for v in x[:, 0].tolist()]
+            final, _ = self._influence.apply(self._nominal_state(x0))
             gap = np.abs(x / size - np.array([float(Fraction(v) / Fraction(size)) for v in final])[:, None])
             excess = np.maximum(gap - FLOOR_FACTOR * trajectory.rtol * np.abs(x / size).max(), 0.0)
             excess = np.vstack([excess, np.linalg.norm(excess, axis=0)])
             with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = np.where(excess > 0, excess / self._deviations(self._of(trajectory), start, size), 0.0)
+                ratio = np.where(excess > 0, excess / self._deviations(self._of(trajectory), x0, size), 0.0)
             worst = max(worst, float(ratio[:, judged].max(initial=0.0)))
         return worst
 
@@ -512,15 +512,15 @@ class Envelope:
         list of History
             One for each column of the states.
         """
-        found = []
+        result = []
         for x in _columns(trajectory):
             x = x / self._unit(x[:, 0])
             z = function.coordinates_of(x, self._laplacian)
             unit = float(np.abs(z[:, 0]).max(initial=0.0)) or 1.0
             root = np.sqrt(function.value(z / unit))
-            bound = _grown(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
-            found.append(History(root, bound, FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, x, unit)))
-        return found
+            bound = _decay(root[0], function.rate_below, trajectory.clock - trajectory.clock[0])
+            result.append(History(root, bound, FLOOR_FACTOR * trajectory.rtol * self._state_scale(function, x, unit)))
+        return result
 
     def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
         """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
@@ -533,16 +533,16 @@ class Envelope:
         return float(np.linalg.norm(root * size if root.ndim == 1 else root @ size))
 
 
-def _grown(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
+def _decay(size: np.ndarray | float, rate: float, clock: np.ndarray) -> np.ndarray:
     """Return ``size e^(-rate s / 2)`` for every size and every clock value, rounded up; formed in logarithms.
 
     At the deadline, where the clock is infinite, 0 if the rate is positive or the size is 0.
     """
     with np.errstate(all="ignore"):
         exponent = np.add.outer(np.log(size), -rate * clock / 2 if rate else np.zeros_like(clock))
-        grown = np.exp(exponent) * (1 + 1e-12)
-    grown = np.where((grown == 0) & (exponent > -np.inf), 5e-324, grown)
-    return np.where(np.isnan(grown), 0.0, grown)
+        value = np.exp(exponent) * (1 + 1e-12)
+    value = np.where((value == 0) & (exponent > -np.inf), 5e-324, value)
+    return np.where(np.isnan(value), 0.0, value)
 
 
 def deviation_constants(function: LyapunovFunction) -> np.ndarray:

@@ -186,8 +186,8 @@ class Influence:
         L, F = self.structure.graph.laplacian().tocsr(), self.structure.followers
         block, unit = L[F][:, F], np.zeros(F.size)
         unit[follower] = 1
-        heard = -(L[F].T @ solve(block.T.tocsr(), unit, block.diagonal()))
-        return [float(sum(g * heard[v] for v, g in zip(c.nodes, c.gauge or (), strict=True))) for c in self.balanced]
+        row = -(L[F].T @ solve(block.T.tocsr(), unit, block.diagonal()))
+        return [float(sum(g * row[v] for v, g in zip(c.nodes, c.gauge or (), strict=True))) for c in self.balanced]
 
 
 def follower_state(structure: Structure, state: np.ndarray) -> np.ndarray:
@@ -317,8 +317,8 @@ class FinalState:
         return np.array([float(x) for x in self.states])
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
-        return f"FinalState({shown}{', ...' if len(self.labels) > 8 else ''})"
+        entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
+        return f"FinalState({entries}{', ...' if len(self.labels) > 8 else ''})"
 
 
 def final_state(
@@ -361,11 +361,11 @@ def final_state(
     >>> final_state(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])), [1, 0, 2]).states
     (Fraction(1, 1), Fraction(-5, 4), Fraction(2, 1))
     """
-    start = exact_initial_state(structure, x0)
+    initial_state = exact_initial_state(structure, x0)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
-    final, values = matrix.apply(start if matrix.exact else [float(x) for x in start])
+    final, values = matrix.apply(initial_state if matrix.exact else [float(x) for x in initial_state])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
-    size = max((abs(float(x)) for x in start), default=0.0)
+    size = max((abs(float(x)) for x in initial_state), default=0.0)
     meets_at_zero = [c == 0 if matrix.exact else abs(float(c)) <= 1e-12 * size for c in values]
     degenerate = tuple(k for k, zero in zip(numbers, meets_at_zero, strict=True) if zero)
     return FinalState(structure.graph.labels, tuple(final), tuple(values), degenerate)
@@ -387,17 +387,17 @@ def exact_initial_state(
         raise ParameterError(f"the initial state {name} is a sequence of numbers in node order, or a mapping by label")
     if len(x0) != len(labels):
         raise ParameterError(f"the initial state {name} has {len(x0)} values for {len(labels)} agents")
-    start = []
+    initial_state = []
     for label, value in zip(labels, x0, strict=True):
         if type(value) is Fraction:
-            start.append(value)
+            initial_state.append(value)
             continue
         try:
-            start.append(as_fraction(value, f"{name} of agent {shorten(label)}"))
+            initial_state.append(as_fraction(value, f"{name} of agent {shorten(label)}"))
         except NumberError as error:
             where = f"{name} of agent {shorten(label)}"
             raise ParameterError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
-    return start
+    return initial_state
 
 
 # ---------------------------------------------------------------------- large graphs
@@ -420,9 +420,9 @@ def enclose(influence: Influence) -> Influence:
     >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
-    >>> who, start = enclose(influence(st, exact=False)), [Fraction(1), Fraction(0), Fraction(1)]
-    >>> found = enclosed_final_state(who, start)
-    >>> bool(abs(Fraction(found.states[1]) + Fraction(1, 3)) <= found.radius[1] < 1e-9)  # c ends at -1/3
+    >>> who, x0 = enclose(influence(st, exact=False)), [Fraction(1), Fraction(0), Fraction(1)]
+    >>> final = enclosed_final_state(who, x0)
+    >>> bool(abs(Fraction(final.states[1]) + Fraction(1, 3)) <= final.radius[1] < 1e-9)  # c ends at -1/3
     True
     """
     structure, F = influence.structure, influence.structure.followers
@@ -430,34 +430,34 @@ def enclose(influence: Influence) -> Influence:
     if F.size:
         u[F] = _witness(structure.graph.laplacian().tocsr()[F][:, F])
     left_null_vectors = {
-        k: _enclosed_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
+        k: _enclose_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
         for k, (component, null_vector) in enumerate(influence.groups)
         if not all(isinstance(w, Fraction | int) for w in null_vector)
     }
     return replace(influence, enclosure=Enclosure(left_null_vectors, u))
 
 
-def enclosed_final_state(influence: Influence, start: Sequence[Fraction]) -> FinalState:
-    """Enclose ``Q start``, what is known of ``Q`` being enclosed.
+def enclosed_final_state(influence: Influence, initial_state: Sequence[Fraction]) -> FinalState:
+    """Enclose ``Q x0``, what is known of ``Q`` being enclosed.
 
     Raises
     ------
     NotEnclosedError
         The followers' equations are too ill-conditioned for floats, or a consensus value may be 0.
     """
-    structure, n, unit, enclosure = influence.structure, len(start), Fraction(1), influence.enclosure
+    structure, n, unit, enclosure = influence.structure, len(initial_state), Fraction(1), influence.enclosure
     assert enclosure is not None
-    size = max((abs(start[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
+    size = max((abs(initial_state[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
     if 0 < size < _SMALLEST:
         unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
-        start = [x / unit for x in start]
+        initial_state = [x / unit for x in initial_state]
     middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, Fraction]()
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     degenerate = []
     for k, (number, (component, null_vector)) in enumerate(zip(numbers, influence.groups, strict=True)):
         signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
-        if k in enclosure.left_null_vectors and any(start[v] for v in component.nodes):
-            own, (weights, radii) = np.array([float(start[v]) for v in nodes]), enclosure.left_null_vectors[k]
+        if k in enclosure.left_null_vectors and any(initial_state[v] for v in component.nodes):
+            own, (weights, radii) = np.array([float(initial_state[v]) for v in nodes]), enclosure.left_null_vectors[k]
             value, total = float(weights @ own), float(np.abs(weights) @ np.abs(own))
             spread = (float(radii @ np.abs(own)) + _ROUNDING * total) * _MORE
             if abs(value) <= 2 * spread:
@@ -465,14 +465,14 @@ def enclosed_final_state(influence: Influence, start: Sequence[Fraction]) -> Fin
             middle[nodes], radius[nodes] = signs * value, spread
             continue
         shares = zip(component.nodes, null_vector, strict=True)
-        known = sum((Fraction(w) * start[v] for v, w in shares if start[v]), Fraction(0))
-        degenerate += [number] if known == 0 else []
-        exact.update((v, sign * known) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
-        middle[nodes], radius[nodes] = signs * float(known), rounding_radius(known)
+        consensus = sum((Fraction(w) * initial_state[v] for v, w in shares if initial_state[v]), Fraction(0))
+        degenerate += [number] if consensus == 0 else []
+        exact.update((v, sign * consensus) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
+        middle[nodes], radius[nodes] = signs * float(consensus), rounding_radius(consensus)
     exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
     F = structure.followers
     if F.size and middle.any():
-        middle[F], radius[F] = _enclosed_followers(structure, exact, middle, radius, enclosure.witness)
+        middle[F], radius[F] = _enclose_followers(structure, exact, middle, radius, enclosure.witness)
     final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
     spreads = [Fraction(r) * unit for r in radius.tolist()]
     for v, x in exact.items():
@@ -509,13 +509,13 @@ def _witness(block: Any) -> np.ndarray:
         rows = matrix.M.multiply(1 / matrix.diagonal[:, None]).tocsr()  # rows of every size weigh alike
         u = solve(rows, ones, ones, _LOOSE / np.sqrt(ones.size))
         u /= u.max()
-        pushed = matrix.M @ u
-    if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(pushed).all() and (pushed > 0).all()):
+        comparison = matrix.M @ u
+    if not (np.isfinite(u).all() and (u > 0).all() and np.isfinite(comparison).all() and (comparison > 0).all()):
         raise NotEnclosedError("the equations are too ill-conditioned for floats")
     return u
 
 
-def _enclosed_left_null_vector(
+def _enclose_left_null_vector(
     structure: Structure, component: ClosedComponent, null_vector: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
@@ -529,11 +529,11 @@ def _enclosed_left_null_vector(
     u[nodes[rest]] = own
     columns = block.T.tocsr()[rest]  # of the comparison matrix, but for signs
     z = eta / eta[top]
-    pushed = 2 * block.diagonal()[rest] * own - abs(columns[:, rest]) @ own
+    comparison = 2 * block.diagonal()[rest] * own - abs(columns[:, rest]) @ own
     total = abs(columns) @ z
     residual = np.abs(2 * block.diagonal()[rest] * z[rest] - total)
     with np.errstate(all="ignore"):
-        error = float(((residual + _ULP * (np.diff(columns.indptr) + 4) * total) / pushed).max()) * _MORE
+        error = float(((residual + _ULP * (np.diff(columns.indptr) + 4) * total) / comparison).max()) * _MORE
     weights = np.zeros(nodes.size)
     weights[rest] = own
     low, high = z.sum() - error * weights.sum(), z.sum() + error * weights.sum()
@@ -544,7 +544,7 @@ def _enclosed_left_null_vector(
     return signs * eta, np.maximum(*ends) * _MORE + 8 * _ULP * eta
 
 
-def _enclosed_followers(
+def _enclose_followers(
     structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return middles and radii of the followers, in a unit near to the largest leader."""
@@ -554,17 +554,17 @@ def _enclosed_followers(
     state, blur = middle / unit, abs(rows) @ (radius / unit)
     block = rows[:, F].tocsr()
     with np.errstate(all="ignore"):
-        solved = follower_state(structure, state)
-        if not np.isfinite(solved).all():
+        followers = follower_state(structure, state)
+        if not np.isfinite(followers).all():
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
-        state[F] = solved
+        state[F] = followers
         comparison = 2 * block.diagonal() * u[F] - abs(block) @ u[F]
         residual = np.abs(rows @ state) + blur + _ROUNDING * (abs(rows) @ np.abs(state))
         error = float((residual / comparison).max()) * 1.01
     if not error * u[F].max() <= _NARROW:
         error = _exact_error(structure, exact, state, blur + _ULP * (abs(rows) @ np.abs(state)), u, unit)
-    found = solved * unit
-    return found, (error * u[F] * unit + _spacing(found)) * _MORE
+    final = followers * unit
+    return final, (error * u[F] * unit + _spacing(final)) * _MORE
 
 
 def _exact_error(
@@ -573,14 +573,14 @@ def _exact_error(
     """Return ``max_i (|r_i| + s_i) / (M(L_F) u)_i``, the residual in rationals."""
     F = structure.followers.tolist()
     following = set(F)
-    known = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
+    values = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
     weights = [Fraction(x) for x in u.tolist()]
     error = Fraction(0)
     for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
-        left = sum((x * known[j] for j, x in row.items()), Fraction(0))
+        residual = sum((x * values[j] for j, x in row.items()), Fraction(0))
         signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
-        pushed = sum(signs, Fraction(0))
-        if pushed <= 0:
+        comparison = sum(signs, Fraction(0))
+        if comparison <= 0:
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
-        error = max(error, (abs(left) + Fraction(more)) / pushed)
+        error = max(error, (abs(residual) + Fraction(more)) / comparison)
     return float(error) * _MORE

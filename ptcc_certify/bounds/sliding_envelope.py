@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 
 # The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
 _PIECES = 4000
-#: Arrays of instants whose bounds are kept.
-_MOST_KNOWN = 8
+#: Arrays of instants whose bounds are cached.
+_CACHE_SIZE = 8
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class SlidingEnvelope(Envelope):
             gap = float(self.protocol.mu1 - self.protocol.delta) * float(self.protocol.T_r) * np.exp(-certain)
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 late = late + np.where(sigma0 != 0, FLOOR_FACTOR * trajectory.rtol * np.abs(sigma0) / gap, 0.0)
-        kept = bool((run.reaching_z <= certain + late).all())
+        in_time = bool((run.reaching_z <= certain + late).all())
         z = self._of(trajectory).z
         bound, size = self._sliding(z), np.abs(sigma0).max(initial=0.0)
         excess = np.maximum(np.abs(run.sigma) - FLOOR_FACTOR * trajectory.rtol * size, 0.0)
@@ -191,7 +191,7 @@ class SlidingEnvelope(Envelope):
             ratio = np.where(excess > 0, excess / bound, 0.0)
             norm = np.linalg.norm(excess / (size or 1.0), axis=0)
             ratio = np.append(ratio, np.where(norm > 0, norm / (self.sliding_norm(z) / size), 0.0))
-        return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=kept)
+        return replace(super().compare(trajectory), sliding_ratio=float(ratio.max(initial=0.0)), reaching_kept=in_time)
 
     def histories(self, function: LyapunovFunction, trajectory: Trajectory) -> list[History]:
         """Return ``sqrt(V)`` of ``x`` and of ``x - sigma`` with their bounds along a run, in units of ``x(0)``."""
@@ -199,16 +199,16 @@ class SlidingEnvelope(Envelope):
             return super().histories(function, trajectory)
         run = trajectory.sliding
         assert run is not None
-        own, start = self._unit(trajectory.states[:, 0]), [Fraction(x) for x in trajectory.states[:, 0].tolist()]
+        own, x0 = self._unit(trajectory.states[:, 0]), [Fraction(x) for x in trajectory.states[:, 0].tolist()]
         x, y = trajectory.states / own, (run.states - run.sigma) / own
-        size, found = max(float(np.abs(part).max()) for part in (x, y)), []
-        for _, v, sliding in self._bounds([function], start, own, self._of(trajectory)):
+        size, result = max(float(np.abs(part).max()) for part in (x, y)), []
+        for _, v, sliding in self._bounds([function], x0, own, self._of(trajectory)):
             unit = float((v + sliding).max()) or 1.0
             floor = FLOOR_FACTOR * trajectory.rtol * size * self._state_scale(function, np.ones((len(y), 1)), unit)
             for part, bound in ((x, v + sliding), (y, v)):
                 root = np.sqrt(function.value(function.coordinates_of(part, self._laplacian) / unit))
-                found.append(History(root, bound / unit, floor))
-        return found
+                result.append(History(root, bound / unit, floor))
+        return result
 
     def _unit(self, x0: Iterable[Any]) -> float:
         return super()._unit([*x0, *self.sigma0])
@@ -225,8 +225,8 @@ class SlidingEnvelope(Envelope):
         place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
         size, s, last = self._sliding(knots) / unit, self._clock_at(knots), self._clock_at(np.array(np.inf))
         later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
-        y0 = [x / Fraction(unit) for x in self._undriven(x0)]
-        for function, root in self._starts((m for m in functions if m.rate_below > 0), y0):
+        y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
+        for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):
             half = function.rate_below / 2
             C, B = self._drive(function)
             forcing, step = _column_norms(B @ size), half * np.diff(s, append=last)
@@ -238,17 +238,17 @@ class SlidingEnvelope(Envelope):
             yield function, v[place] * np.exp(-half * later), np.append(_column_norms(C @ size), 0.0)[place]
 
     @cached_property
-    def _known(self) -> dict[bytes, np.ndarray]:
+    def _cache(self) -> dict[bytes, np.ndarray]:
         return {}
 
     def _sliding(self, z: np.ndarray) -> np.ndarray:
         """Return :func:`sliding_bound`, which every Lyapunov function asks for at the same instants."""
         key = z.tobytes()
-        if key not in self._known:
-            if len(self._known) > _MOST_KNOWN:
-                self._known.clear()
-            self._known[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
-        return self._known[key]
+        if key not in self._cache:
+            if len(self._cache) > _CACHE_SIZE:
+                self._cache.clear()
+            self._cache[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
+        return self._cache[key]
 
     @cached_property
     def _pieces(self) -> np.ndarray:
@@ -272,7 +272,7 @@ class SlidingEnvelope(Envelope):
         deviation = function.coordinates_of(np.eye(L.shape[0]), L)
         return np.abs(function.scaled(deviation)), np.abs(function.scaled(deviation @ L))
 
-    def _undriven(self, x0: Sequence[Fraction]) -> list[Fraction]:
+    def _nominal_state(self, x0: Sequence[Fraction]) -> list[Fraction]:
         return [x - sigma for x, sigma in zip(x0, self.sigma0, strict=True)]
 
     def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:
@@ -283,8 +283,8 @@ class SlidingEnvelope(Envelope):
         bounds = np.full((len(x0) + 1, *at.clock.shape), 0.0 if self._still else np.inf)
         for function, v, _ in self._bounds(self._with_deviation, x0, own, at):
             with np.errstate(invalid="ignore", over="ignore"):
-                found = np.multiply.outer(deviation_constants(function), v * (1 + 1e-12))
-            bounds = np.minimum(bounds, np.nan_to_num(found, posinf=np.inf))
+                own_bounds = np.multiply.outer(deviation_constants(function), v * (1 + 1e-12))
+            bounds = np.minimum(bounds, np.nan_to_num(own_bounds, posinf=np.inf))
         size = self._sliding(np.atleast_1d(at.z)) / own
         bounds += np.vstack([size, _column_norms(size)]).reshape(bounds.shape)
         if self._with_deviation:

@@ -71,7 +71,7 @@ class Certificate(Content, Shown):
     ----------
     structure : Structure
     protocol : NominalProtocol or SlidingModeProtocol
-    start : tuple of N Fraction, or None
+    initial_state : tuple of N Fraction, or None
         ``X(0)``.
     sigma0 : tuple of N Fraction, or None
         ``sigma(0)`` of the sliding-mode protocol; None for the nominal one.
@@ -146,8 +146,8 @@ class Certificate(Content, Shown):
         proved = self.constant or self.rate is not None
         if not proved or not (self.influence.exact or self.influence.enclosure is not None):
             return None
-        document, written = self._document(CERTIFIED)
-        return check(document, files=written.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+        document, out = self._document(CERTIFIED)
+        return check(document, files=out.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
 
     @property
     def verdict(self) -> str:
@@ -173,8 +173,8 @@ class Certificate(Content, Shown):
         """
         if self.source is not None:
             return dict(self.source.document)
-        document, written = self._document(self.verdict)
-        return dict(document if not written.files else certificate_document(self, self.verdict)[0])
+        document, out = self._document(self.verdict)
+        return dict(document if not out.files else certificate_document(self, self.verdict)[0])
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
@@ -196,8 +196,8 @@ class Certificate(Content, Shown):
         """
         path = Path(path)
         if self.source is None:
-            document, written = self._document(self.verdict)
-            for name, content in written.files.items():
+            document, out = self._document(self.verdict)
+            for name, content in out.files.items():
                 write_atomically(path.parent / name, content)
         else:
             document = self.to_dict()

@@ -65,7 +65,7 @@ class Observations:
     spectral_rate : float or None
         ``2 min Re lambda`` in floating point, per unit of the clock: no certificate can reach further.
     search : Search
-        What was tried beside the paper's; the functions that were proved are apart.
+        What was searched beside the paper's; the functions that were proved are apart.
     cut_off : tuple of str
         The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
@@ -169,7 +169,7 @@ class Content:
 
     @property
     def initial_set(self) -> InitialSet | None:
-        """The set of initial states for which the input is bounded; None: that of ``start`` alone."""
+        """The set of initial states for which the input is bounded; None: that of ``initial_state`` alone."""
         return self.request.initial_set
 
     @property
@@ -224,7 +224,7 @@ class Content:
 
     @property
     def search(self) -> Search:
-        """Sharper Lyapunov functions than the paper's, proved, and what else was tried."""
+        """Sharper Lyapunov functions than the paper's, proved, and what else was searched."""
         return replace(self.observed.search, functions=self.searched_functions)
 
     # ------------------------------------------------------------------ claims
@@ -281,7 +281,7 @@ class Content:
         return [V.form for V in self.functions]
 
     @property
-    def _rated(self) -> list[LyapunovFunction]:
+    def _functions_with_rate(self) -> list[LyapunovFunction]:
         """The functions of a proved rate, the paper's first; as ``functions``, without what is not needed for rates."""
         paper = () if self.lyapunov is None or self.lyapunov.rate is None else (self.lyapunov,)
         return [*paper, *self.searched_functions]
@@ -289,7 +289,7 @@ class Content:
     @property
     def rate(self) -> Fraction | None:
         """The largest proved rate of all Lyapunov functions; None if nothing decays or nothing was proved."""
-        return max((V.proved_rate for V in self._rated if V.proved_rate > 0), default=None)
+        return max((V.proved_rate for V in self._functions_with_rate if V.proved_rate > 0), default=None)
 
     @property
     def paper_rate(self) -> Fraction | None:
@@ -305,7 +305,7 @@ class Content:
     @property
     def fastest(self) -> LyapunovFunction:
         """The function of the largest proved rate, and of those that share it the least overshoot constant."""
-        return max(self._rated, key=lambda V: (V.proved_rate, -V.overshoot))
+        return max(self._functions_with_rate, key=lambda V: (V.proved_rate, -V.overshoot))
 
     @property
     def overshoot(self) -> Fraction | None:
@@ -328,7 +328,7 @@ class Content:
 
         Matrices are rounded to short rationals, and their rates lowered until they prove.
         """
-        pairs = [(V.proved_rate, V.numerical_rate) for V in self._rated]
+        pairs = [(V.proved_rate, V.numerical_rate) for V in self._functions_with_rate]
         losses = [
             float(1 - rate / Fraction(numerical)) * math.copysign(1, numerical)
             for rate, numerical in pairs
@@ -382,9 +382,9 @@ class Content:
         Raises
         ------
         ParameterError
-            The certificate has no start, or an instant is not from 0 to 1.
+            The certificate has no initial state, or an instant is not from 0 to 1.
         """
-        return self.envelope.norm_bound(remaining, self._known_start())
+        return self.envelope.norm_bound(remaining, self._require_initial_state())
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the initial state, for every agent.
@@ -404,11 +404,11 @@ class Content:
         Raises
         ------
         ParameterError
-            The certificate has no start, or an instant is not from 0 to 1.
+            The certificate has no initial state, or an instant is not from 0 to 1.
         """
-        return self.envelope.deviation_bound(remaining, self._known_start())
+        return self.envelope.deviation_bound(remaining, self._require_initial_state())
 
-    def _known_start(self) -> tuple[Fraction, ...]:
+    def _require_initial_state(self) -> tuple[Fraction, ...]:
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the graph with x0")
         return self.initial_state
@@ -432,7 +432,7 @@ class Content:
             return self.source.effort
         if self.rate is None and not self.constant:
             return None
-        asked = InputRequest(
+        request = InputRequest(
             self.structure,
             self.protocol,
             self.forms,
@@ -448,11 +448,11 @@ class Content:
             delta=self.delta,
             noise=self.noise,
         )
-        return bound_effort(asked)
+        return bound_effort(request)
 
     @cached_property
     def worst_initial_state(self) -> WorstInitialState | None:
-        """The start of the set ``initial_set`` from which the input gets largest (numerical); None without a set."""
+        """The state of ``initial_set`` from which the input gets largest (numerical); None without such a set."""
         if self.initial_set is None or self.graph.n_nodes > EXACT_NODES:
             return None
         return worst_initial_state(self.structure, self.protocol, self.initial_set)
@@ -539,20 +539,20 @@ class Content:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no initial state.
         SimulationError
             The integrator failed.
         """
-        start = [float(x) for x in self._known_start()]
+        x0 = [float(x) for x in self._require_initial_state()]
         if self.sigma0 is None:
-            return simulate(self.graph, self.protocol, start, **options)
+            return simulate(self.graph, self.protocol, x0, **options)
         options["sigma0"] = [float(x) for x in self.sigma0]
         try:
-            return simulate(self.graph, self.protocol, start, disturbance=self.disturbance, **options)
+            return simulate(self.graph, self.protocol, x0, disturbance=self.disturbance, **options)
         except ParameterError:
             if self.disturbance == WORST_CASE:
                 raise
-            return simulate(self.graph, self.protocol, start, disturbance=WORST_CASE, **options)
+            return simulate(self.graph, self.protocol, x0, disturbance=WORST_CASE, **options)
 
     def with_simulation(self, **options: Any) -> Self:
         """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.
@@ -569,7 +569,7 @@ class Content:
         Raises
         ------
         ParameterError
-            The certificate has no start.
+            The certificate has no initial state.
         SimulationError
             The integrator failed.
         """

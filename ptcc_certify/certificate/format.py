@@ -94,19 +94,19 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
         for k, section in enumerate(functions)
     ]
     lyapunov = next((replace(V, objective=paper["objective"]) for V in functions if V.kind == "paper"), None)
-    start, ends = data.state(document["initial_state"]), None
+    initial_state, rho = data.state(document["initial_state"]), None
     if paper is not None and paper["rho_interval"] is not None:
-        ends = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
+        rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
     effort = read_effort(document, structure, protocol, data, steps)
     return {
         "structure": structure,
         "protocol": protocol,
-        "initial_state": start,
+        "initial_state": initial_state,
         "sigma0": data.state(document["sliding_variable"]),
         "reaching": _read_reaching(document["reaching_time"], protocol),
         "lyapunov": lyapunov,
         "proof": RateProof(
-            None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), ends
+            None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), rho
         ),
         "searched_functions": tuple(V for V in functions if V.kind != "paper"),
         "limit": _read_limit(steps, data),
@@ -136,8 +136,8 @@ def _write_protocol(content: Content) -> dict[str, Any]:
 
 
 def _read_protocol(section: Mapping[str, Any]) -> Protocol:
-    given = {key: value for key, value in section.items() if key != "disturbance"}
-    return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in given.items()})
+    parameters = {key: value for key, value in section.items() if key != "disturbance"}
+    return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in parameters.items()})
 
 
 def _write_reaching(content: Content) -> dict[str, Any] | None:
@@ -197,7 +197,7 @@ def _read_function(
     data: Reader,
     steps: Mapping[tuple[str, str], Obligation],
 ) -> LyapunovFunction:
-    given, full, rows = section["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
+    bound, full, rows = section["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
     blocks = tuple(_read_block(block, data, rows is not None) for block in section["blocks"])
     gauge = structure.closed_components[0].gauge if section["coordinates"] == "eps" else ()
     return LyapunovFunction(
@@ -209,7 +209,7 @@ def _read_function(
         None if full is None else (full.numbers["lowest"], full.numbers["highest"]),
         gauge or (),
         dominance=None if rows is None else Dominance(data.floats(rows.witness["vector"], len(blocks[0].nodes))),
-        deviation=None if given is None else DeviationBound(data.agents(given["agents"]), exact(given["norm"])),
+        deviation=None if bound is None else DeviationBound(data.agents(bound["agents"]), exact(bound["norm"])),
         name=name,
     )
 
@@ -259,7 +259,7 @@ def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | 
     """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
     if content.influence.exact:
         return _exact_final_state(content)
-    return (None, None) if content.influence.enclosure is None else _enclosed_final_state(content, out)
+    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
 
 
 def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -290,7 +290,7 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     return section, ends
 
 
-def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
+def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """Write the final state of a large graph: left null vector of leader groups, and the final state in intervals."""
     labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
@@ -301,7 +301,7 @@ def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any]
             radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
             final = {"mid": out.vector("mid", final_state.values), "radius": out.vector("radius", np.array(radius))}
         else:
-            final = {label: _enclosed_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
+            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
     for k, (component, null_vector) in enumerate(zip(matrix.balanced, matrix.left_null_vectors, strict=True)):
         if k in matrix.enclosure.left_null_vectors:
@@ -317,7 +317,7 @@ def _enclosed_final_state(content: Content, out: Writer) -> tuple[dict[str, Any]
     return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
 
 
-def _enclosed_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
+def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
     if radius == 0:
         return exact_or_ball(Fraction(x))
     if isinstance(x, float):
@@ -378,9 +378,9 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
         rate = format_exact(group.rate)
         unit = math.frexp(float(group.weights[0]))[1]
         key = first, group.rate, np.ldexp(group.weights, -unit).tobytes()
-        written = key in out.written_groups
+        repeated = key in out.written_groups
         out.written_groups.add(key)
-        if group.factor is None or written:
+        if group.factor is None or repeated:
             groups.append(rate)
         else:
             # The factor is that of the group's own weights, of which those of the function are a power of two.
@@ -423,7 +423,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
         "final_state": floats,
-        "asked": _write_asked(content.request),
+        "asked": _write_request(content.request),
         "simulation": _write_run(content),
         "time_limit": finite(content.time_limit),
         "cut_off": list(content.cut_off),
@@ -461,13 +461,13 @@ def _read_observations(section: Mapping[str, Any]) -> Observations:
     return Observations(cut_off=_texts(section.get("cut_off")), notes=_texts(section.get("notes")))
 
 
-def _write_asked(request: Request) -> dict[str, Any]:
+def _write_request(request: Request) -> dict[str, Any]:
     """Return what was asked; what became of it is no part of the claim, and follows from what is."""
-    asked = request.expectations
+    expectations = request.expectations
     return {
-        "behaviour": asked.behaviour,
-        "min_rate": text(asked.min_rate),
-        "max_input": text(asked.max_input),
+        "behaviour": expectations.behaviour,
+        "min_rate": text(expectations.min_rate),
+        "max_input": text(expectations.max_input),
         "limits": [{name: text(getattr(entry, name)) for name in _LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
@@ -476,14 +476,14 @@ def _write_asked(request: Request) -> dict[str, Any]:
 
 def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
     """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
-    asked, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
-    asked = asked if isinstance(asked, dict) else {}
-    method, behaviour = search.get("method") if isinstance(search, dict) else None, asked.get("behaviour")
+    section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
+    section = section if isinstance(section, dict) else {}
+    method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:
         behaviour = behaviour_name(behaviour) if isinstance(behaviour, str) else None
     except ValueError:
         behaviour = None
-    entries = asked.get("limits")
+    entries = section.get("limits")
     each = [
         [_positive(entry, key) for key in _LIMITS] for entry in (entries if isinstance(entries, list) else [])[:100]
     ]
@@ -491,10 +491,10 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         method=method if method in METHODS else "best",
         initial_set=initial_set,
         limits=tuple(Limits(*entry) for entry in each if any(entry)),
-        delta=_positive(asked, "delta"),
-        noise=_positive(asked, "noise"),
+        delta=_positive(section, "delta"),
+        noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, _positive(asked, "min_rate"), _positive(asked, "max_input")),
+        expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
     )
 
 

@@ -26,7 +26,7 @@ from ptcc_certify.protocols.nominal import Protocol
 from ptcc_certify.theorems.theorem import Obligation
 
 Steps = Mapping[tuple[str, str], Obligation]
-Said = Mapping[str, Any]
+Section = Mapping[str, Any]
 
 ENDS = ("lower", "upper")
 LIMITS = ("gain_cap", "stop_before", "sample_period")
@@ -67,28 +67,30 @@ def effort_section(effort: Effort | None, out: Writer) -> Any:
     }
 
 
-def peak_witness(peak: Peak, out: Writer) -> Said:
+def peak_witness(peak: Peak, out: Writer) -> Section:
     """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
     agents = {label: [how.function, text(how.z)] for label, how in zip(out.labels, peak.how, strict=True)}
     return {"agents": agents, "norm": peak.norm_how.function}
 
 
-def energy_witness(energy: EnergyIntegral) -> Said:
+def energy_witness(energy: EnergyIntegral) -> Section:
     """Return the lower triangles of the matrices that prove the energy."""
     first, second = ([list(map(text, row[: i + 1])) for i, row in enumerate(W)] for W in energy.matrices)
     return {"W0": first, "W1": second}
 
 
-def read_effort(document: Said, structure: Structure, protocol: Protocol, data: Reader, steps: Steps) -> Effort | None:
+def read_effort(
+    document: Section, structure: Structure, protocol: Protocol, data: Reader, steps: Steps
+) -> Effort | None:
     """Read the section ``input``; ``steps`` are the obligations by kind and part, whose witnesses belong to it."""
-    section, start = document["input"], data.state(document["initial_state"])
+    section, initial_state = document["input"], data.state(document["initial_state"])
     if section is None:
         return None
     region, initial_set, sliding = section["initial_set"], None, section["sliding"]
     if region is not None:
         axes = tuple(map(data.agents, region.get("axes", ())))
         initial_set = InitialSet(data.agents(region["center"]), () if axes else data.agents(region["radius"]), axes)
-    begin = initial_set or (None if start is None else InitialSet(start))
+    states = initial_set or (None if initial_state is None else InitialSet(initial_state))
     lower, upper = (number(section["threshold"][key]) for key in ENDS)
     return Effort(
         bounded=section["bounded"],
@@ -96,36 +98,36 @@ def read_effort(document: Said, structure: Structure, protocol: Protocol, data: 
         threshold=(lower, upper),
         initial_set=initial_set,
         constants=tuple(map(data.state, section["constants"])),
-        peak=_peak(section["peak"], data, steps),
-        energy=_energy(section["energy"], steps),
-        path_length=_witness(section["path_length"], "input-length", steps),
+        peak=_read_peak(section["peak"], data, steps),
+        energy=_read_energy(section["energy"], steps),
+        path_length=_read_witness(section["path_length"], "input-length", steps),
         sliding=sliding and SlidingPart(sliding["bounded"], data.state(sliding["agents"])),
         residual=tuple(
-            _limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
+            _read_limited(entry, steps["limited-gain", f"input.residual[{k}]"], data)
             for k, entry in enumerate(section["residual"])
         ),
-        disturbed=_disturbed(section["disturbed"], data, steps),
-        first=None if begin is None else first_input(structure, protocol, begin),
+        disturbed=_read_disturbed(section["disturbed"], data, steps),
+        first=None if states is None else first_input(structure, protocol, states),
     )
 
 
-def _witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
+def _read_witness(section: str | None, kind: str, steps: Steps) -> Witness | None:
     if section is None:
         return None
     step = steps[kind, "input"]
     return Witness(exact(section), step.witness, step.numbers["z"])
 
 
-def _energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
+def _read_energy(section: str | None, steps: Steps) -> Witness | EnergyIntegral | None:
     step = steps.get(("input-energy", "input"))
     if section is None or step is None or not isinstance(step.witness, dict):
-        return _witness(section, "input-energy", steps)
+        return _read_witness(section, "input-energy", steps)
     first, second = (triangle(step.witness[key], len(step.witness[key])) for key in ("W0", "W1"))
     p, m0, m1 = (step.numbers[key] for key in ("p", "m0", "m1"))
     return EnergyIntegral(exact(section), p, (first, second), (m0, m1))
 
 
-def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
+def _read_peak(section: Section | None, data: Reader, steps: Steps) -> Peak | None:
     if section is None:
         return None
     step, agents, norm = steps["input-peak", "input"], data.agents(section["agents"]), exact(section["norm"])
@@ -134,7 +136,7 @@ def _peak(section: Said | None, data: Reader, steps: Steps) -> Peak | None:
     return Peak(agents, each, norm, Witness(norm, step.witness["norm"], step.numbers["z"]))
 
 
-def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
+def _read_limited(section: Section, step: Obligation, data: Reader) -> Limited:
     noise = section["noise"] or {}
     first, second = step.witness if noise else (step.witness, None)
     return Limited(
@@ -150,7 +152,7 @@ def _limited(section: Said, step: Obligation, data: Reader) -> Limited:
     )
 
 
-def _disturbed(section: Said | None, data: Reader, steps: Steps) -> Disturbed | None:
+def _read_disturbed(section: Section | None, data: Reader, steps: Steps) -> Disturbed | None:
     if section is None:
         return None
     function = steps["nominal-disturbed", "input"].witness

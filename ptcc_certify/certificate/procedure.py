@@ -105,7 +105,7 @@ def certify(
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
     x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
-        The start, in node order, or by label where there are labels. Without it there is no final state and no
+        The initial state, in node order, or by label where there are labels. Without it there is no final state and no
         simulation.
     sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
@@ -145,8 +145,8 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a time limit that is not positive, a start of the wrong length, with other labels
-        than the nodes, beyond 1e300 or of thousands of digits, or a disturbance that exceeds ``delta``.
+        ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong length, with
+        other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond ``delta``.
 
     References
     ----------
@@ -170,14 +170,14 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
-    asked = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
-    request = read_request(structure, protocol, {**asked, "time_limit": time_limit, "expectations": expectations})
-    start = None if x0 is None else read_initial_state(structure, x0, "x0")
+    request = read_request(structure, protocol, {**options, "time_limit": time_limit, "expectations": expectations})
+    initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
-    case = Case(structure, protocol, request, start, manifold, progress)
-    runs = case.simulated(simulation) and start is not None
+    case = Case(structure, protocol, request, initial_state, manifold, progress)
+    runs = case.needs_run(simulation) and initial_state is not None
     if not runs and disturbance is not None and (sliding := protocol.reaching) is not None:
         horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
         source = as_disturbance(disturbance, graph.n_nodes, sliding.delta, horizon)
@@ -192,7 +192,7 @@ ReachingTime(0, 1 before T_r)))
     certificate = Certificate(
         structure=structure,
         protocol=protocol,
-        initial_state=start,
+        initial_state=initial_state,
         sigma0=manifold,
         reaching=reaching,
         lyapunov=lyapunov,
@@ -239,7 +239,7 @@ class Case:
     structure : Structure
     protocol : NominalProtocol or SlidingModeProtocol
     request : Request
-    start, sigma0 : tuple of N Fraction, or None
+    initial_state, sigma0 : tuple of N Fraction, or None
     progress : callable
         Is told each of :data:`STEPS` as it begins.
     notes : list of str
@@ -257,13 +257,13 @@ class Case:
     notes: list[str] = field(default_factory=list)
     cut_off: list[str] = field(default_factory=list)
 
-    def simulated(self, asked: bool | None) -> bool:
+    def needs_run(self, simulation: bool | None) -> bool:
         """Tell whether there is to be a run."""
         n = self.structure.graph.n_nodes
-        if asked is None and n > SIMULATED_NODES:
+        if simulation is None and n > SIMULATED_NODES:
             self.notes.append(f"above {SIMULATED_NODES} agents there is no CVODES run unless it is asked for")
             return False
-        return asked is not False
+        return simulation is not False
 
     def simulation(self, disturbance: Any) -> Trajectory | None:
         """Run the protocol from the initial state with CVODES."""
@@ -311,9 +311,9 @@ class Case:
     def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
-        structure, matrix, start = self.structure, influence(self.structure), self.initial_state
+        structure, matrix, x0 = self.structure, influence(self.structure), self.initial_state
         sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
-        first = None if start is None else [x - s if s else x for x, s in zip(start, sigma0, strict=True)]
+        first = None if x0 is None else [x - s if s else x for x, s in zip(x0, sigma0, strict=True)]
         result = None
         if not matrix.exact:
             try:
@@ -326,7 +326,7 @@ class Case:
             result = final_state(structure, first, matrix=matrix)
         if run is not None and result is not None:
             gap = float(np.abs(run.final_state - result.values).max())
-            if gap > SETTLED * max(float(max(map(abs, (*(start or ()), *sigma0)))), 1e-300):
+            if gap > SETTLED * max(float(max(map(abs, (*(x0 or ()), *sigma0)))), 1e-300):
                 self.notes.append(
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
@@ -343,7 +343,7 @@ def _search_and_prove(
         return None, nothing, None
     try:
         with np.errstate(all="ignore"):
-            search = partial(_searched, theorem, structure)
+            search = partial(_search, theorem, structure)
             (V,) = apart(search) if n > APART_NODES else search()
             numerical = theorem.rate(structure, V) if V.blocks else None
     except OutOfTime:
@@ -368,7 +368,7 @@ def _search_and_prove(
     return V, proof, numerical
 
 
-def _searched(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
+def _search(theorem: Theorem, structure: Structure) -> list[LyapunovFunction]:
     return [theorem.lyapunov(structure)]
 
 

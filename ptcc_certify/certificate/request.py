@@ -113,17 +113,17 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
-def read_request(structure: Structure, protocol: Protocol, asked: Mapping[str, Any]) -> Request:
+def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
-    seconds, n = asked["time_limit"], structure.graph.n_nodes
+    seconds, n = arguments["time_limit"], structure.graph.n_nodes
     request = Request(
-        method=asked["method"],
-        at=None if asked["at"] is None else _instant(asked["at"], protocol),
-        initial_set=_starts(structure, asked["initial_set"]),
-        limits=tuple(_limits(entry, protocol) for entry in asked["limits"]),
+        method=arguments["method"],
+        at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
+        initial_set=_read_initial_set(structure, arguments["initial_set"]),
+        limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
         time_limit=60 + n / 1000 if seconds is None else seconds,
-        expectations=asked["expectations"] or Expectations(),
-        **{name: None if asked[name] is None else parameter(name, asked[name]) for name in ("delta", "noise")},
+        expectations=arguments["expectations"] or Expectations(),
+        **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:
         raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
@@ -143,7 +143,7 @@ def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     return limits
 
 
-def _starts(structure: Structure, initial_set: Any) -> InitialSet | None:
+def _read_initial_set(structure: Structure, initial_set: Any) -> InitialSet | None:
     """Return a set of initial states, or refuse it."""
     if initial_set is None:
         return None
@@ -152,9 +152,9 @@ def _starts(structure: Structure, initial_set: Any) -> InitialSet | None:
     n = structure.graph.n_nodes
     for name, vector in (("center", initial_set.center), ("radius", initial_set.radius or initial_set.center)):
         if len(vector) != n:
-            raise ParameterError(f"{name} of the starts has {len(vector)} entries for {n} agents")
+            raise ParameterError(f"{name} of the initial states has {len(vector)} entries for {n} agents")
     if any(len(axis) != n for axis in initial_set.axes):
-        raise ParameterError(f"an axis of the starts has another number of entries than {n} agents")
+        raise ParameterError(f"an axis of the initial states has another number of entries than {n} agents")
     if initial_set.radius and initial_set.axes:
         raise ParameterError("initial states have a radius, for a box, or axes, for an ellipsoid; leave one out")
     if any(r < 0 for r in initial_set.radius):
@@ -204,15 +204,15 @@ def read_initial_state(
     structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str
 ) -> tuple[Fraction, ...]:
     """Return ``X(0)`` or ``sigma(0)`` in rationals, or refuse it."""
-    start = tuple(exact_initial_state(structure, values, name))
-    for label, value in zip(structure.graph.labels, start, strict=True):
+    state = tuple(exact_initial_state(structure, values, name))
+    for label, value in zip(structure.graph.labels, state, strict=True):
         if abs(value) > LARGEST_STATE:
             raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
         if not writable(value):
             raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
-    longest = max(zip(structure.graph.labels, start, strict=True), key=lambda entry: _bits(entry[1]))[0]
-    _refuse_long(start, len(start), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
-    return start
+    longest = max(zip(structure.graph.labels, state, strict=True), key=lambda entry: _bits(entry[1]))[0]
+    _refuse_long(state, len(state), f"the numbers of {name}", lambda: f"agent {shorten(longest)}")
+    return state
 
 
 def read_sliding_variable(
@@ -222,12 +222,9 @@ def read_sliding_variable(
     sliding = protocol.reaching
     if sliding is None:
         return None, None
-    start = (
-        (Fraction(0),) * len(structure.graph.labels)
-        if sigma0 is None
-        else read_initial_state(structure, sigma0, "sigma0")
-    )
-    return start, certified_reaching_times(sliding, start)
+    n = structure.graph.n_nodes
+    sigma = (Fraction(0),) * n if sigma0 is None else read_initial_state(structure, sigma0, "sigma0")
+    return sigma, certified_reaching_times(sliding, sigma)
 
 
 def _instant(at: Any, protocol: Protocol) -> Fraction:

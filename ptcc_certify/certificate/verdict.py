@@ -200,10 +200,10 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
     >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
     """
-    asked, comparison = certificate.expectations, certificate.comparison
-    answers = [] if asked.behaviour is None else [judge_behaviour(certificate.structure, asked.behaviour)]
-    answers += [] if asked.min_rate is None else [judge_rate(certificate, asked.min_rate)]
-    answers += [] if asked.max_input is None else [judge_input(certificate, asked.max_input)]
+    expectations, comparison = certificate.expectations, certificate.comparison
+    answers = [] if expectations.behaviour is None else [judge_behaviour(certificate.structure, expectations.behaviour)]
+    answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
+    answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
     useful, remark, advice = None, "", ""
     verdict = verdict_of(report)
@@ -237,8 +237,8 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
         return Answer(MET, what)
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
-    proved = "none is proved" if rate is None else f"proved: {down(rate)}"
-    return Answer(OPEN, what, proved if bound is None else f"{proved}, at most {up(bound, 8)} can be")
+    reason = "none is proved" if rate is None else f"proved: {down(rate)}"
+    return Answer(OPEN, what, reason if bound is None else f"{reason}, at most {up(bound, 8)} can be")
 
 
 def judge_input(certificate: Content, most: Fraction) -> Answer:
@@ -246,8 +246,8 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
     effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
     if certificate.constant:
         return Answer(MET, what)
-    least, proved = input_range(certificate)
-    if proved is not None and proved <= most:
+    least, bound = input_range(certificate)
+    if bound is not None and bound <= most:
         return Answer(MET, what)
     if least > most:
         first = effort is not None and effort.first is not None and effort.first >= least
@@ -258,14 +258,14 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
     )
     if effort is not None and effort.bounded is False and solid and not certificate.limits:
         return Answer(REFUTED, what, "from some of these initial states it grows without limit, proved")
-    return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(proved)}")
+    return Answer(OPEN, what, "no bound is proved" if bound is None else f"proved: {up(bound)}")
 
 
 def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None]:
-    """Return proved bounds of the largest ``|u_k|`` over all agents, starts, noise and disturbances asked about.
+    """Return proved bounds of the largest ``|u_k|`` over all agents, initial states, noise and disturbances.
 
     Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
-    attained or approached: at the start, or where noise meets the largest gain, without a limit an infinite one.
+    attained or approached: at first, or where noise meets the largest gain, without a limit an infinite one.
     The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
     under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` stays below what is proved without these.
     """
@@ -280,8 +280,8 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
         degree = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
         least = max(least, 2 * degree * certificate.noise * min(tops)) if tops else math.inf
     if certificate.limits:
-        known = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
-        most = None if len(known) < len(certificate.limits) or None in known else max(x for x in known if x is not None)
+        peaks = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
+        most = None if len(peaks) < len(certificate.limits) or None in peaks else max(x for x in peaks if x is not None)
     else:
         most = None if effort.peak is None or certificate.noise is not None else effort.peak.largest
     if most is not None and certificate.delta is not None:
@@ -316,8 +316,8 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     begin = f"{z}(0)"
     if not direct:
         begin, instant = f"{z}(T_r)", "T_r + 0.99 T_s"
-    fixed, pole = float(p.rho1 * span * (1 - LAST)), float(p.rho2 * p.kappa)
-    share = _share(envelope, fixed + pole * math.log(1 / LAST))
+    constant, pole = float(p.rho1 * span * (1 - LAST)), float(p.rho2 * p.kappa)
+    share = _share(envelope, constant + pole * math.log(1 / LAST))
     remark = f"||{z}|| <= {up(share, 2)} ||{begin}|| at {instant}"
     if share <= USEFUL:
         return True, remark, ""
@@ -326,7 +326,7 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
         worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
-    rho2 = _useful_rho2(envelope, fixed, p.kappa)
+    rho2 = _useful_rho2(envelope, constant, p.kappa)
     if rho2 is None:
         return False, remark, ""
     return False, remark, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
@@ -334,7 +334,7 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
-    effort, start, way = certificate.effort, certificate.initial_state, certificate.longest_way
+    effort, x0, way = certificate.effort, certificate.initial_state, certificate.longest_way
     residual = () if effort is None else effort.residual
     region = None if effort is None else effort.initial_set
     noisy = any(entry.noise is not None for entry in residual)
@@ -348,7 +348,7 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
         return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states", ""
-    first = Fraction(0) if start is None else sum((InitialSet(start).largest(row) ** 2 for row in rows), Fraction(0))
+    first = Fraction(0) if x0 is None else sum((InitialSet(x0).largest(row) ** 2 for row in rows), Fraction(0))
     if not first:
         return norm == 0, remark, ""
     share = root_above(norm**2 / first)
@@ -360,9 +360,9 @@ def _share(envelope: Envelope, clock: float) -> float:
     return float(Envelope(envelope.structure, envelope.gain, envelope.functions).norm_factor(clock))
 
 
-def _useful_rho2(envelope: Envelope, fixed: float, kappa: Fraction) -> Fraction | None:
+def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fraction | None:
     """Return a short ``rho2`` with which the bounds at hand leave a hundredth; None if there is none."""
-    low, high = fixed, max(fixed, 1e-300)
+    low, high = constant, max(constant, 1e-300)
     while _share(envelope, high) > USEFUL:
         low, high = high, 2 * high
         if high > _LARGEST_CLOCK:
@@ -370,8 +370,8 @@ def _useful_rho2(envelope: Envelope, fixed: float, kappa: Fraction) -> Fraction 
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if _share(envelope, middle) > USEFUL else (low, middle)
-    wanted = Fraction(high - fixed) / Fraction(math.log(1 / LAST)) / kappa
-    return Fraction(up(wanted * (1 + Fraction(1, 10**9)), _DIGITS)) if wanted > 0 else None
+    rho2 = Fraction(high - constant) / Fraction(math.log(1 / LAST)) / kappa
+    return Fraction(up(rho2 * (1 + Fraction(1, 10**9)), _DIGITS)) if rho2 > 0 else None
 
 
 # ---------------------------------------------------------------------- what to try next

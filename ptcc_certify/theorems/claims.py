@@ -100,13 +100,13 @@ class Claim:
         >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).holds("bipartite-consensus")
         True
         """
-        wanted = behaviour_name(behaviour)
-        return any(wanted in _implied(said) for said in (self.behaviour, *self.special))
+        expected = behaviour_name(behaviour)
+        return any(expected in _implications(name) for name in (self.behaviour, *self.special))
 
 
-def _implied(behaviour: str) -> set[str]:
+def _implications(behaviour: str) -> set[str]:
     """Return a behaviour and all that it implies."""
-    return {behaviour}.union(*map(_implied, _IMPLIES.get(behaviour, ())))
+    return {behaviour}.union(*map(_implications, _IMPLIES.get(behaviour, ())))
 
 
 def claim_of(component: WeakComponent) -> Claim:
@@ -120,9 +120,9 @@ def claim_of(component: WeakComponent) -> Claim:
     ('3', '4')
     """
     theorem, behaviour = _THEOREMS[component.connectivity, component.leaders_balanced]
-    held = [(number, more) for number, fact, more in _COROLLARIES.get(theorem, ()) if getattr(component, fact)]
-    special = tuple(more for _, more in held if more is not None)
-    return Claim(theorem, behaviour, tuple(number for number, _ in held), special)
+    corollaries = [(number, more) for number, fact, more in _COROLLARIES.get(theorem, ()) if getattr(component, fact)]
+    special = tuple(more for _, more in corollaries if more is not None)
+    return Claim(theorem, behaviour, tuple(number for number, _ in corollaries), special)
 
 
 def sliding_number(number: str) -> str:

@@ -37,7 +37,7 @@ from ptcc_certify.theorems.matrices import (
     symmetric_product,
     without_last,
 )
-from ptcc_certify.theorems.theorem import KEPT, ExactInterval, Obligation, RateProof, Theorem
+from ptcc_certify.theorems.theorem import CONSTANT, ExactInterval, Obligation, RateProof, Theorem
 
 #: A left null vector is kept exact when its entries are shorter than this, otherwise rounded to 53 bits.
 EXACT_VECTOR_BITS = 64
@@ -120,12 +120,12 @@ class Composite(Theorem):
         lemmas: list[Obligation] = []
         for block in V.blocks:
             if not block.times_rho:
-                found = self._proved_leader_decrease(structure, block)
-                if found is None:
+                decrease = self._prove_leader_decrease(structure, block)
+                if decrease is None:
                     failed = f"{self.positive.format(block=block.name)} is not proved positive"
                     return RateProof(None, tuple(lemmas), failed=failed)
-                gamma.append(found[0])
-                lemmas += found[1]
+                gamma.append(decrease[0])
+                lemmas += decrease[1]
         phi = _exact_phi(structure, V, gamma)
         m = _prove_margin(phi(V.rho or Fraction(1)))
         if m is None:
@@ -135,7 +135,7 @@ class Composite(Theorem):
         interval, ends = _prove_interval(V, phi)
         return RateProof(m / max(V.weights), (*lemmas, margin, *ends), interval)
 
-    def _proved_leader_decrease(
+    def _prove_leader_decrease(
         self, structure: Structure, block: LyapunovBlock
     ) -> tuple[Matrix, tuple[Obligation, ...]] | None:
         """Return the part of ``Gamma`` that belongs to one block, in rationals, and what was proved for it."""
@@ -162,10 +162,10 @@ class BalancedComposite(Composite):
         L, F = structure.graph.dense_laplacian(), structure.followers
         components = [(k, c) for k, c in enumerate(structure.closed_components, start=1) if len(c.nodes) > 1]
         if not components and F.size == 0:
-            return LyapunovFunction("paper", "E", (), objective=KEPT)
+            return LyapunovFunction("paper", "E", (), objective=CONSTANT)
         if not components:
-            found = lmi.h_matrix_lyapunov(float_block(L, F, F))
-            block = self._follower_block(structure, found.omega, False)
+            solution = lmi.h_matrix_lyapunov(float_block(L, F, F))
+            block = self._follower_block(structure, solution.omega, False)
             objective = f"lmin({self.follower} L_F + L_F' {self.follower}) / lmax({self.follower})"
             return LyapunovFunction("paper", "E", (block,), objective=objective)
         fixed: dict[int, tuple[Fraction, ...]] = {}
@@ -193,27 +193,27 @@ class BalancedComposite(Composite):
         if block.name == self.follower:
             return super()._leader_decrease(structure, block)
         graph = structure.graph.subgraph(block.nodes)
-        if _balanced(structure, block):
+        if _is_balanced(structure, block):
             return np.diag(connectivity_rate(graph, block.diagonal) * floats(self._share(block.diagonal)))
         return lmi.diagonal_margin(graph.dense_laplacian(), floats(block.diagonal)) * np.eye(graph.n_nodes)
 
-    def _proved_leader_decrease(
+    def _prove_leader_decrease(
         self, structure: Structure, block: LyapunovBlock
     ) -> tuple[Matrix, tuple[Obligation, ...]] | None:
         if block.name == self.follower:
-            return super()._proved_leader_decrease(structure, block)
+            return super()._prove_leader_decrease(structure, block)
         graph = structure.graph.subgraph(block.nodes)
         share: Sequence[Fraction] = [Fraction(1)] * len(block.nodes)
-        if _balanced(structure, block):
+        if _is_balanced(structure, block):
             kind, number, share = "leader-decrease", "b", self._share(block.diagonal)
-            proved = prove_connectivity(graph, block.diagonal, connectivity_rate(graph, block.diagonal))
+            bound = prove_connectivity(graph, block.diagonal, connectivity_rate(graph, block.diagonal))
         else:
             kind, number = "leader-margin", "m"
-            proved = _prove_margin(symmetric_product(block.diagonal, graph.exact_laplacian()))
-        if proved is None:
+            bound = _prove_margin(symmetric_product(block.diagonal, graph.exact_laplacian()))
+        if bound is None:
             return None
-        obligation = Obligation(kind, f"paper.{block.name}", {number: proved})
-        return diagonal_matrix(proved * x for x in share), (obligation,)
+        obligation = Obligation(kind, f"paper.{block.name}", {number: bound})
+        return diagonal_matrix(bound * x for x in share), (obligation,)
 
 
 def left_vector_diagonal(graph: SignedDigraph) -> tuple[Fraction, ...]:
@@ -264,7 +264,7 @@ def _product(structure: Structure, nodes: Sequence[int], weights: Iterable[Fract
     return S + S.T
 
 
-def _balanced(structure: Structure, block: LyapunovBlock) -> bool:
+def _is_balanced(structure: Structure, block: LyapunovBlock) -> bool:
     return next(c.balanced for c in structure.closed_components if c.nodes == block.nodes)
 
 
@@ -297,14 +297,14 @@ def _prove_interval(
     if V.interval is None:
         return None, ()
 
-    def proved(end: float) -> Fraction | None:
+    def prove(end: float) -> Fraction | None:
         if not math.isfinite(end):
             return None
         lowered = (Fraction(end * (1 - loss)) for loss in (1e-9, 1e-7, 1e-4, 0.01))
         # The fallback is rho itself, whose admissibility is proved with the rate.
         return next((value for value in lowered if prove_positive_definite(phi(value))), V.rho)
 
-    printed, exact = proved(V.interval.printed), proved(V.interval.exact)
+    printed, exact = prove(V.interval.printed), prove(V.interval.exact)
     if printed is not None and exact is not None:
         printed = min(printed, exact)  # they may coincide, and differ by rounding
     numbers = {name: end for name, end in (("printed", printed), ("exact", exact)) if end is not None}

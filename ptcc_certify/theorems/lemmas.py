@@ -94,10 +94,10 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
     values: list[np.ndarray] = []
     for nodes, block in component_blocks(structure):
         large = nodes.size > DENSE_NODES
-        found = _nearest_eigenvalues(block) if large else np.linalg.eigvals(block.toarray()).astype(complex)
+        eigenvalues = _nearest_eigenvalues(block) if large else np.linalg.eigvals(block.toarray()).astype(complex)
         if int(nodes[0]) in balanced:
-            found = np.delete(found, np.argmin(np.abs(found)))
-        values.append(found)
+            eigenvalues = np.delete(eigenvalues, np.argmin(np.abs(eigenvalues)))
+        values.append(eigenvalues)
     values.append(structure.graph.in_weight()[single_followers(structure)].astype(complex))
     return Spectrum(np.concatenate(values), len(balanced))
 
@@ -146,22 +146,22 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
         scaled = LinearOperator(block.shape, matvec=lambda x: x.ravel() / (diagonal - shift))
 
         def solve(x: np.ndarray) -> np.ndarray:
-            found, failed = bicgstab(shifted, x.ravel(), rtol=1e-10, maxiter=_PRODUCTS, M=scaled)
+            solution, failed = bicgstab(shifted, x.ravel(), rtol=1e-10, maxiter=_PRODUCTS, M=scaled)
             if failed:
                 raise np.linalg.LinAlgError("the inverse did not converge")
-            return found
+            return solution
 
         inverse = LinearOperator(block.shape, matvec=solve)
-    told: dict[str, Any] = {"sigma": shift, "OPinv": inverse, "return_eigenvectors": False, "maxiter": _RESTARTS}
+    options: dict[str, Any] = {"sigma": shift, "OPinv": inverse, "return_eigenvectors": False, "maxiter": _RESTARTS}
     try:
-        found = eigs(sparse.csc_array(block), k=_NEAREST, **told)
+        eigenvalues = eigs(sparse.csc_array(block), k=_NEAREST, **options)
     except ArpackNoConvergence as error:
-        found = error.eigenvalues
+        eigenvalues = error.eigenvalues
     except (ArpackError, RuntimeError) as error:
         raise np.linalg.LinAlgError(str(error)) from None
-    if len(found) < 2:
+    if len(eigenvalues) < 2:
         raise np.linalg.LinAlgError("the eigenvalues nearest to 0 were not found")
-    return np.asarray(found)
+    return np.asarray(eigenvalues)
 
 
 def left_vector(graph: SignedDigraph) -> np.ndarray:
@@ -169,7 +169,7 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
 
     Computed without subtractions (Grassmann, Taksar, Heyman 1985), hence to full relative accuracy in each entry
     however far apart the weights lie; above 500 nodes by a sparse factor, to its accuracy. Where everybody listens to
-    as much as is listened to them, as in undirected graphs, it is ``1/N``: that is tried first, exactly.
+    as much as is listened to them, as in undirected graphs, it is ``1/N``: that is checked first, exactly.
 
     Parameters
     ----------
@@ -219,10 +219,10 @@ def _all_ones(graph: SignedDigraph) -> bool:
     """Tell whether the left vector of a graph is the vector of ones, exactly; False if the graph is not connected."""
     from scipy.sparse.csgraph import connected_components
 
-    size, heard = np.abs(graph.weights), graph.in_weight()
+    size, in_weight = np.abs(graph.weights), graph.in_weight()
     with np.errstate(all="ignore"):
-        surplus = np.abs(heard - np.bincount(graph.source, size, minlength=graph.n_nodes))
-    if (surplus > 1e-9 * heard).any() or connected_components(graph.adjacency(), directed=False)[0] > 1:
+        surplus = np.abs(in_weight - np.bincount(graph.source, size, minlength=graph.n_nodes))
+    if (surplus > 1e-9 * in_weight).any() or connected_components(graph.adjacency(), directed=False)[0] > 1:
         return False
     return _annihilates(graph, [1] * graph.n_nodes)
 

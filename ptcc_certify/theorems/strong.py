@@ -13,7 +13,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.composite import Composite, connectivity_rate, left_vector_diagonal
 from ptcc_certify.theorems.matrices import floats, multiply, without_last
-from ptcc_certify.theorems.theorem import KEPT, Obligation, RateProof, Theorem
+from ptcc_certify.theorems.theorem import CONSTANT, Obligation, RateProof, Theorem
 
 
 class BalancedStrong(Theorem):
@@ -32,7 +32,7 @@ class BalancedStrong(Theorem):
     def lyapunov(self, structure: Structure) -> LyapunovFunction:
         """``P`` is forced by the graph: nothing is searched."""
         if structure.graph.n_nodes == 1:
-            return LyapunovFunction("paper", "eps", (), objective=KEPT)
+            return LyapunovFunction("paper", "eps", (), objective=CONSTANT)
         (whole,) = structure.closed_components
         block = LyapunovBlock("P", whole.nodes, left_vector_diagonal(structure.graph))
         return LyapunovFunction("paper", "eps", (block,), gauge=whole.gauge or (), objective="2 a(L)")

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 
 #: The objective where there is nothing to decrease.
-KEPT = "none: every agent keeps its state"
+CONSTANT = "none: every agent keeps its state"
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from ptcc_certify.bounds.input.effort import (
 )
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
-from ptcc_certify.bounds.input.tightest_bound import best_bound, kept, least_bound, usable_functions
-from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, disturbed
+from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
+from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import (
@@ -64,7 +64,7 @@ class InputRequest:
         The Lyapunov functions of the envelope; None for those of large graphs.
     rate, limit : Fraction or None
         The largest proved rate, and the proved upper bound on the decay rate.
-    start, starts
+    initial_state, initial_set
         ``X(0)``, or a set of initial states instead.
     sigma0 : sequence of Fraction or None
     reaching : sequence of (Fraction or None), optional
@@ -97,38 +97,40 @@ class InputRequest:
     noise: Fraction | None = None
 
 
-def bound_effort(asked: InputRequest) -> Effort:
+def bound_effort(request: InputRequest) -> Effort:
     """Bound the input."""
-    structure, gain, influence = asked.structure, asked.protocol.gain, asked.influence
+    structure, gain, influence = request.structure, request.protocol.gain, request.influence
     still, n = structure.graph.n_edges == 0, structure.graph.n_nodes
-    bounded, by = _bounded(structure, gain.pole, asked.rate, asked.limit, still)
-    lower, upper = (None if r is None else gain.pole * r / 2 for r in (asked.rate, asked.limit))
-    sliding = _sliding_part(asked)
-    effort = Effort(bounded, by, (lower, upper), None, (None,) * len(asked.forms), sliding=sliding)
-    if (asked.initial_state is None and asked.initial_set is None) or still or n > INPUT_NODES:
+    bounded, by = _decide_boundedness(structure, gain.pole, request.rate, request.limit, still)
+    lower, upper = (None if r is None else gain.pole * r / 2 for r in (request.rate, request.limit))
+    sliding = _sliding_part(request)
+    effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
+    if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
         return effort
-    constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in asked.forms)
-    region = asked.initial_set or InitialSet(tuple(asked.initial_state or ()))
+    constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in request.forms)
+    region = request.initial_set or InitialSet(tuple(request.initial_state or ()))
     rows = structure.graph.exact_rows(range(n))
-    bounds = InputBounds(rows, gain.exact, asked.forms, constants, region, _reaching(asked))
+    bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching_phase(request))
     usable = usable_functions(bounds)
     own = [Fraction(0)] * n if sliding is None else sliding.agents
     peak = None if own is None else _peak(bounds, usable, own)
-    cap = None if influence is None or not influence.exact or not asked.limits else largest_deviation(region, influence)
+    cap = (
+        None if influence is None or not influence.exact or not request.limits else largest_deviation(region, influence)
+    )
     energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, usable))
-    limited = LimitedBounds(bounds, usable, asked.deviations, cap, peak, asked.noise)
-    entries = [limited.left(entry) for entry in asked.limits]
+    limited = LimitedBounds(bounds, usable, request.deviations, cap, peak, request.noise)
+    entries = [limited.bound_residual(entry) for entry in request.limits]
     return replace(
         effort,
-        initial_set=asked.initial_set,
+        initial_set=request.initial_set,
         constants=constants,
         peak=peak,
         energy=min((e for e in energies if e is not None), key=lambda e: e.value, default=None),
         path_length=least_bound(bounds, length_above, usable),
         residual=tuple(entry for entry in entries if entry is not None),
-        longest_period=limited.longest_period(asked.limits, entries, gain),
-        disturbed=None if asked.delta is None else disturbed(bounds, usable, asked.delta, influence),
-        first=first_input(structure, asked.protocol, region),
+        longest_period=limited.longest_period(request.limits, entries, gain),
+        disturbed=None if request.delta is None else bound_disturbed(bounds, usable, request.delta, influence),
+        first=first_input(structure, request.protocol, region),
     )
 
 
@@ -140,7 +142,7 @@ def first_input(structure: Structure, protocol: Protocol, region: InitialSet) ->
     return protocol.gain.first * max(map(region.largest, structure.graph.exact_rows(range(n))))
 
 
-def _bounded(
+def _decide_boundedness(
     structure: Structure, k: Fraction, rate: Fraction | None, limit: Fraction | None, still: bool
 ) -> tuple[bool | None, str | None]:
     """Decide whether the input stays bounded for every initial state, and by what."""
@@ -161,9 +163,9 @@ def _bounded(
     return place in ("beyond", "on"), "spectrum"
 
 
-def _sliding_part(asked: InputRequest) -> SlidingPart | None:
+def _sliding_part(request: InputRequest) -> SlidingPart | None:
     """Bound the sliding part of every input; None where there is none."""
-    protocol, sigma0 = asked.protocol.reaching, asked.sigma0
+    protocol, sigma0 = request.protocol.reaching, request.sigma0
     if protocol is None or sigma0 is None:
         return None
     drive = protocol.reaching_gain
@@ -172,9 +174,9 @@ def _sliding_part(asked: InputRequest) -> SlidingPart | None:
     return SlidingPart(drive.pole >= 1, tuple(protocol.mu1 + drive.first * abs(s) for s in sigma0))
 
 
-def _reaching(asked: InputRequest) -> Reaching | None:
+def _reaching_phase(request: InputRequest) -> Reaching | None:
     """Return how the sliding variables move; None if they do not."""
-    protocol, sigma0, times = asked.protocol.reaching, asked.sigma0, asked.reaching
+    protocol, sigma0, times = request.protocol.reaching, request.sigma0, request.reaching
     if protocol is None or sigma0 is None or not any(sigma0):
         return None
     last = [None] if times is None else [z for z, s in zip(times, sigma0, strict=True) if s]
@@ -189,8 +191,8 @@ def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
     with suppress(OverflowError):
         if above is not None:
-            known = {v: kept(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
-            return tuple(known.get(v, Fraction(0)) for v in range(n))
+            by_node = {v: round_up(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
+            return tuple(by_node.get(v, Fraction(0)) for v in range(n))
     return None
 
 
@@ -202,6 +204,6 @@ def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]
     if norm is None or len(how) < len(agents):
         return None
     with suppress(OverflowError):
-        whole = kept(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
-        return Peak(tuple(kept(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
+        whole = round_up(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
+        return Peak(tuple(round_up(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
     return None

@@ -59,7 +59,7 @@ class SlidingPart:
 class Limited:
     """What is left at the deadline under limits of the gain: ``||E||``, and the deviation of each agent.
 
-    ``largest`` bounds ``max_k |u_k|``; None if the input is held. With measurement noise ``|n_k| <= noise``,
+    ``largest`` bounds ``max_k |u_k|``; None under a zero-order hold. With measurement noise ``|n_k| <= noise``,
     ``u = -gain L (X + n)``, ``noisy_norm`` bounds ``||E||`` at the deadline and ``noisy_largest`` every ``|u_k|``.
     """
 
@@ -94,13 +94,13 @@ class Effort:
     ----------
     bounded : bool or None
         Whether ``u`` (the nominal part, under the sliding-mode protocol) stays bounded up to the deadline for every
-        start; None: undecided.
+        initial state; None: undecided.
     by : {"rate", "upper_bound", "spectrum"} or None
         What decides it: a proved rate, a proved upper bound on the decay rate, or the exact location of the spectrum.
     threshold : pair of Fraction or None
         Proved bounds of ``rho2 kappa min Re lambda``; the input is bounded from 1 on.
     initial_set : InitialSet or None
-        The set of initial states that the bounds are for; None: the start of the certificate.
+        The set of initial states that the bounds are for; None: the initial state of the certificate.
     constants : tuple of (tuple of Fraction or None)
         ``c_k`` of every Lyapunov function with a full matrix, ``e_k^2 <= c_k V``.
     peak : Peak or None
@@ -119,8 +119,8 @@ class Effort:
     disturbed : Disturbed or None
         What disturbances within ``delta`` add under the nominal protocol; None if none was given.
     first : Fraction or None
-        Nominal protocol: ``sup max_k |u_k(0)|`` over the starts, exactly, which no peak falls below; None for an
-        ellipsoid.
+        Nominal protocol: ``sup max_k |u_k(0)|`` over the initial states, exactly, which no peak falls below; None
+        for an ellipsoid.
 
     Notes
     -----
@@ -159,26 +159,26 @@ class Effort:
     @property
     def obligations(self) -> list[Obligation]:
         """What the independent check verifies, in its order."""
-        found = [Obligation("input-threshold", "input", witness=self.by)] if self.bounded is not None else []
-        found += [
+        result = [Obligation("input-threshold", "input", witness=self.by)] if self.bounded is not None else []
+        result += [
             Obligation("input-constants", f"lyapunov.functions[{k}]")
             for k, c in enumerate(self.constants)
             if c is not None
         ]
         if self.sliding is not None and self.sliding.agents is not None:
-            found.append(Obligation("input-sliding", "input"))
+            result.append(Obligation("input-sliding", "input"))
         if self.peak is not None:
-            found.append(Obligation("input-peak", "input", {"z": self.peak.norm_how.z}, self.peak))
+            result.append(Obligation("input-peak", "input", {"z": self.peak.norm_how.z}, self.peak))
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
             if isinstance(bound, EnergyIntegral):
                 numbers = {"p": bound.p, "m0": bound.least[0], "m1": bound.least[1]}
-                found.append(Obligation(kind, "input", numbers, bound))
+                result.append(Obligation(kind, "input", numbers, bound))
             elif bound is not None:
-                found.append(Obligation(kind, "input", {"z": bound.z}, bound.function))
+                result.append(Obligation(kind, "input", {"z": bound.z}, bound.function))
         for k, entry in enumerate(self.residual):
             witness = entry.function if entry.noise_function is None else [entry.function, entry.noise_function]
-            found.append(Obligation("limited-gain", f"input.residual[{k}]", {"growth": entry.growth}, witness))
+            result.append(Obligation("limited-gain", f"input.residual[{k}]", {"growth": entry.growth}, witness))
         if self.disturbed is not None:
             numbers = {"delta": self.disturbed.delta}
-            found.append(Obligation("nominal-disturbed", "input", numbers, self.disturbed.function))
-        return found
+            result.append(Obligation("nominal-disturbed", "input", numbers, self.disturbed.function))
+        return result

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.input.effort import EnergyIntegral
-from ptcc_certify.bounds.input.tightest_bound import INSTANT_BITS, kept, log
+from ptcc_certify.bounds.input.tightest_bound import INSTANT_BITS, log, round_up
 from ptcc_certify.checker.input_formulas import InputBounds, Rows, integral_above, rounded
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import Structure
@@ -32,9 +32,9 @@ def energy_integral(structure: Structure, bounds: InputBounds) -> EnergyIntegral
         even, grown = bounds.largest_form(first) / m0, bounds.largest_form(second) / m1
         # The best p is ln(grown / even).
         most = gain.rho1 * gain.T / gain.k
-        wanted = max(log(grown) - log(even), 0.0) if even and grown else 0.0
-        p = min(rounded(Fraction(wanted), INSTANT_BITS), most)
-        return EnergyIntegral(kept(integral_above(gain, even, grown, p)), p, (first, second), (m0, m1))
+        best = max(log(grown) - log(even), 0.0) if even and grown else 0.0
+        p = min(rounded(Fraction(best), INSTANT_BITS), most)
+        return EnergyIntegral(round_up(integral_above(gain, even, grown, p)), p, (first, second), (m0, m1))
     except (ValueError, ArithmeticError):
         return None
 

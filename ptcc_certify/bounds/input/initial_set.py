@@ -84,7 +84,7 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> InitialSet:
     >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
     True
     """
-    low, high = _unlabelled(low, graph, "low"), _unlabelled(high, graph, "high")
+    low, high = _without_labels(low, graph, "low"), _without_labels(high, graph, "high")
     if len(low) != len(high):
         raise ParameterError(f"a box of {len(low)} lower and {len(high)} upper ends; give one of each for every agent")
     ends = [(as_fraction(a, "low"), as_fraction(b, "high")) for a, b in zip(low, high, strict=True)]
@@ -122,14 +122,14 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = No
     """
     if by_label(axes, "axes") is not None:
         raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
-    middle = tuple(as_fraction(x, "center") for x in _unlabelled(center, graph, "center"))
-    vectors = tuple(tuple(as_fraction(x, "axes") for x in _unlabelled(axis, graph, "axes")) for axis in axes)
+    middle = tuple(as_fraction(x, "center") for x in _without_labels(center, graph, "center"))
+    vectors = tuple(tuple(as_fraction(x, "axes") for x in _without_labels(axis, graph, "axes")) for axis in axes)
     if not vectors or any(len(axis) != len(middle) for axis in vectors):
         raise ParameterError(f"the axes of an ellipsoid are vectors of {len(middle)} numbers, at least one")
     return InitialSet(middle, axes=vectors)
 
 
-def _unlabelled(values: Any, graph: SignedDigraph | None, name: str) -> Any:
+def _without_labels(values: Any, graph: SignedDigraph | None, name: str) -> Any:
     if graph is not None:
         return in_node_order(values, graph, name)
     if by_label(values, name) is not None:
@@ -147,7 +147,7 @@ def ways(influence: Influence) -> list[Linear]:
 
 
 def largest_deviation(initial_set: InitialSet, influence: Influence) -> Fraction:
-    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the starts, which nominal motions never exceed.
+    """Return ``sup max_k |x_k(0) - (Q x(0))_k|`` over the initial states, which nominal motions never exceed.
 
     Parameters
     ----------

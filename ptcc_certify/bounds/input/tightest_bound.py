@@ -14,16 +14,16 @@ from ptcc_certify.checker.input_formulas import InputBounds, Of, rounded
 from ptcc_certify.graphs.rationals import nearest_float, writable
 
 #: Bits of the bounds that are written, and of the instants that witness them.
-KEPT_BITS, INSTANT_BITS = 40, 24
+BOUND_BITS, INSTANT_BITS = 40, 24
 #: Beyond this ``z = ln(T/(T - t))`` no bound is formed.
 LATEST = 5_000
 #: Bounds below are raised to this, so that they can be written.
 LEAST = Fraction(1, 2**1200)
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
-def kept(x: Fraction) -> Fraction:
+def round_up(x: Fraction) -> Fraction:
     """Round up to the bits that are written, and what is next to nothing to ``LEAST``.
 
     Raises
@@ -31,7 +31,7 @@ def kept(x: Fraction) -> Fraction:
     OverflowError
         Too large to be written.
     """
-    value = rounded(max(x, LEAST), KEPT_BITS, up=True) if x else x
+    value = rounded(max(x, LEAST), BOUND_BITS, up=True) if x else x
     if not writable(value):
         raise OverflowError("a bound that is too large to be written")
     return value
@@ -42,13 +42,13 @@ def log(x: Fraction) -> float:
     return math.log(x.numerator) - math.log(x.denominator) if x else -math.inf
 
 
-def least(attempts: Iterable[Callable[[], Found | None]], size: Callable[[Found], Any]) -> Found | None:
+def least(attempts: Iterable[Callable[[], Result | None]], size: Callable[[Result], Any]) -> Result | None:
     """Return the least of what can be proved; None if nothing can."""
-    proved = []
+    results = []
     for attempt in attempts:
         with suppress(ValueError, ArithmeticError):
-            proved.append(attempt())
-    return min((found for found in proved if found is not None), key=size, default=None)
+            results.append(attempt())
+    return min((result for result in results if result is not None), key=size, default=None)
 
 
 def usable_functions(bounds: InputBounds) -> list[int]:
@@ -69,19 +69,19 @@ def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
 
 def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequence[int]) -> Witness | None:
     """Return the bound of the function whose decay takes over first, the least peak; the least while driven."""
-    found: Witness | None = None
+    best: Witness | None = None
     for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in functions):
         if z <= LATEST:
             instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
             try:
-                own = Witness(kept(bounds.bound(of, agent, k, instant)), k, instant)
+                own = Witness(round_up(bounds.bound(of, agent, k, instant)), k, instant)
             except (ValueError, ArithmeticError):
                 continue
-            if found is None or own.value < found.value:
-                found = own
+            if best is None or own.value < best.value:
+                best = own
             if bounds.reaching is None:
                 break
-    return found
+    return best
 
 
 def least_bound(bounds: InputBounds, of: Of, functions: Sequence[int]) -> Witness | None:
@@ -90,14 +90,14 @@ def least_bound(bounds: InputBounds, of: Of, functions: Sequence[int]) -> Witnes
 
 
 def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
-    """Return ``z`` where what is held meets what decays, the instant that serves the bounds best; 0 while driven."""
+    """Return ``z`` where the constant bound meets the decaying one, the best instant for the bounds; 0 while driven."""
     if bounds.reaching is not None:
         return 0.0
-    held = bounds.held_norm if agent is None else bounds.held[agent]
-    start = decaying(bounds, k, agent)
-    if not held or not start:
+    constant = bounds.held_norm if agent is None else bounds.held[agent]
+    first = decaying(bounds, k, agent)
+    if not constant or not first:
         return 0.0
-    s = 2 * (log(start) - log(held)) / nearest_float(bounds.form(k).rate)
+    s = 2 * (log(first) - log(constant)) / nearest_float(bounds.form(k).rate)
     linear, pole = nearest_float(bounds.gain.rho1 * bounds.gain.T), nearest_float(bounds.gain.k)
     low, high = 0.0, s / pole
     if not 0 < high < math.inf:

@@ -12,13 +12,13 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
-from ptcc_certify.bounds.input.tightest_bound import decaying, kept, least, log
+from ptcc_certify.bounds.input.tightest_bound import decaying, least, log, round_up
 from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits
 
-#: Periods below this share of ``T`` are not tried; how often the interval of the longest one is halved, and which
+#: Periods below this share of ``T`` are not searched; how often the interval of the longest one is halved, and which
 #: shares of it are proved, one after the other, until one is.
 SHORTEST_SHARE, PERIOD_STEPS, PERIOD_SHARES = 1e-12, 12, (0.999, 0.99, 0.9, 0.5)
 
@@ -35,8 +35,8 @@ class LimitedBounds:
     deviations : sequence
         Of every one, the constants from ``V`` to the deviations of agents to their final states, or None.
     cap : Fraction or None
-        No agent is farther from its final state than this, the largest deviation at the start, unless the input is
-        held.
+        No agent is farther from its final state than this, the largest deviation at first, but under a zero-order
+        hold.
     peak : Peak or None
         Of the input without limits.
     noise : Fraction or None
@@ -56,51 +56,57 @@ class LimitedBounds:
         bounds = self.bounds
         return root_above(sum((bounds.initial_set.largest(row) ** 2 for row in bounds.rows), Fraction(0)))
 
-    def left(self, limits: Limits) -> Limited | None:
+    def bound_residual(self, limits: Limits) -> Limited | None:
         """Bound what is left at the deadline under limits of the gain; None if nothing is certified.
 
         With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
         first.
         """
         top, clock = limits.largest_gain(self.bounds.gain), limits.clock_below(self.bounds.gain)
-        found = least((partial(self._by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
-        if found is None or self.noise is None or limits.sample_period is not None:
-            return found
-        noisy = least((partial(self._noisy, k, found, top) for k in self.functions), lambda entry: entry.noisy_largest)
-        return noisy or found
+        best = least((partial(self._bound_by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
+        if best is None or self.noise is None or limits.sample_period is not None:
+            return best
+        noisy = least(
+            (partial(self._add_noise, k, best, top) for k in self.functions), lambda entry: entry.noisy_largest
+        )
+        return noisy or best
 
-    def _by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
+    def _bound_by(self, k: int, limits: Limits, clock: Fraction, top: Fraction) -> Limited | None:
         """Return what one Lyapunov function proves."""
-        bounds, held = self.bounds, limits.sample_period is not None
-        growth = step_growth(bounds, k) if held else Fraction(0)
+        bounds, hold = self.bounds, limits.sample_period is not None
+        growth = step_growth(bounds, k) if hold else Fraction(0)
         if growth is None:
             return None
-        left = bounds.share(k, limits, clock, growth) * bounds.start(k)
-        norm = kept(bounds.root_constant(k, None) * left)
-        if held and norm > self.first:
+        residual = bounds.share(k, limits, clock, growth) * bounds.start(k)
+        norm = round_up(bounds.root_constant(k, None) * residual)
+        if hold and norm > self.first:
             return None
-        known = self.deviations[k] if k < len(self.deviations) else None
-        sizes = [root_above(c) * left for c in known or ()]
-        if self.cap is not None and not held:
+        constants = self.deviations[k] if k < len(self.deviations) else None
+        sizes = [root_above(c) * residual for c in constants or ()]
+        if self.cap is not None and not hold:
             sizes = [min(x, self.cap) for x in sizes]
         peak = [] if self.peak is None else [self.peak.largest]
-        largest = None if held else kept(min([top * max(bounds.held), *peak]))
-        return Limited(limits, clock, k, growth, norm, None if known is None else tuple(map(kept, sizes)), largest)
+        largest = None if hold else round_up(min([top * max(bounds.held), *peak]))
+        return Limited(
+            limits, clock, k, growth, norm, None if constants is None else tuple(map(round_up, sizes)), largest
+        )
 
-    def _noisy(self, k: int, found: Limited, top: Fraction) -> Limited:
+    def _add_noise(self, k: int, entry: Limited, top: Fraction) -> Limited:
         """Add the bounds under measurement noise by one Lyapunov function."""
         noise = self.noise or Fraction(0)
         whole, each = self.bounds.noisy(k, noise)
-        norm, most = kept(found.norm + whole), kept((found.largest or 0) + top * max(each))
-        return replace(found, noise=noise, noise_function=k, noisy_norm=norm, noisy_largest=most)
+        norm, most = round_up(entry.norm + whole), round_up((entry.largest or 0) + top * max(each))
+        return replace(entry, noise=noise, noise_function=k, noisy_norm=norm, noisy_largest=most)
 
-    def longest_period(self, limits: Sequence[Limits], found: Sequence[Limited | None], gain: Gain) -> Fraction | None:
+    def longest_period(
+        self, limits: Sequence[Limits], results: Sequence[Limited | None], gain: Gain
+    ) -> Fraction | None:
         """Return a period of four digits with which all is certified that is not, near to the longest; None if none."""
-        failed = [entry for entry, known in zip(limits, found, strict=True) if known is None]
-        if not failed or any(entry.sample_period is None for entry in failed) or not self.first:
+        failures = [entry for entry, result in zip(limits, results, strict=True) if result is None]
+        if not failures or any(entry.sample_period is None for entry in failures) or not self.first:
             return None
         growths = {k: m for k in self.functions if (m := step_growth(self.bounds, k)) is not None}
-        periods = [self._longest_period(entry, gain, growths) for entry in failed]
+        periods = [self._longest_period(entry, gain, growths) for entry in failures]
         return None if None in periods else min(period for period in periods if period is not None)
 
     def _longest_period(self, limits: Limits, gain: Gain, growths: dict[int, Fraction]) -> Fraction | None:
@@ -108,8 +114,10 @@ class LimitedBounds:
         sizes = {k: log(decaying(bounds, k, None)) - log(self.first) for k in growths}
 
         def excess(period: float) -> float:
-            grown = (sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items())
-            return min(grown, default=math.inf)
+            logarithms = (
+                sizes[k] + _log_share(gain, limits, period, bounds.form(k).rate, m) for k, m in growths.items()
+            )
+            return min(logarithms, default=math.inf)
 
         high = nearest_float(limits.sample_period or gain.T)
         low = high / 2
@@ -120,12 +128,12 @@ class LimitedBounds:
         for _ in range(PERIOD_STEPS):
             middle = (low + high) / 2
             low, high = (middle, high) if excess(middle) <= 0 else (low, middle)
-        tried = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
-        return next((h for h in tried if self.left(replace(limits, sample_period=h)) is not None), None)
+        periods = (Fraction(f"{low * share:.3e}") for share in PERIOD_SHARES)
+        return next((h for h in periods if self.bound_residual(replace(limits, sample_period=h)) is not None), None)
 
 
 def _log_share(gain: Gain, limits: Limits, period: float, rate: Fraction, growth: Fraction) -> float:
-    """Return the logarithm of the bound of ``sqrt(V)`` over ``sqrt(V(0))`` if the gain is held, in floating point."""
+    """Return the logarithm of the bound of ``sqrt(V)`` over ``sqrt(V(0))`` under a zero-order hold, in floats."""
     limited = GainLimits(limits.gain_cap, limits.stop_before).limit(gain)
     b, m, end = map(nearest_float, (rate, growth, gain.T - (limits.stop_before or 0)))
     count = math.ceil(end / period * (1 - 1e-12))
@@ -153,19 +161,19 @@ def step_growth(bounds: InputBounds, k: int) -> Fraction | None:
             size = float(np.linalg.norm(R @ A @ np.linalg.inv(R), 2))
     except (ValueError, ArithmeticError):
         return None
-    return kept(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
+    return round_up(Fraction(size) ** 2 * (1 + Fraction(1, 10**9))) if math.isfinite(size) else None
 
 
-def disturbed(
+def bound_disturbed(
     bounds: InputBounds, functions: Sequence[int], delta: Fraction, influence: Influence | None
 ) -> Disturbed | None:
     """Bound what disturbances add under the nominal protocol."""
     drift = None
     if influence is not None and influence.exact:
         rows = (influence.row(v).values() for v in range(len(bounds.rows)))
-        drift = tuple(kept(delta * bounds.gain.T * sum(abs(Fraction(x)) for x in row)) for row in rows)
+        drift = tuple(round_up(delta * bounds.gain.T * sum(abs(Fraction(x)) for x in row)) for row in rows)
 
     def by(k: int) -> Disturbed:
-        return Disturbed(delta, k, tuple(map(kept, bounds.disturbed(k, delta))), drift)
+        return Disturbed(delta, k, tuple(map(round_up, bounds.disturbed(k, delta))), drift)
 
-    return least((partial(by, k) for k in functions), lambda found: max(found.inputs))
+    return least((partial(by, k) for k in functions), lambda entry: max(entry.inputs))

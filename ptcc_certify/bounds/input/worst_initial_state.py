@@ -15,7 +15,7 @@ from ptcc_certify.protocols import Protocol
 
 @dataclass(frozen=True)
 class WorstInitialState:
-    """A start of the set from which the input gets largest, in floating point.
+    """The initial state of a set from which the input gets largest, in floating point.
 
     Attributes
     ----------
