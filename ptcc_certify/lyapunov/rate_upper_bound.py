@@ -97,9 +97,9 @@ def prove_rate_bound(structure: Structure) -> RateBound | None:
         for gap in _GAPS:
             if not np.isfinite(decay * (1 + gap)):
                 break
-            found = _proved(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
-            if found is not None:
-                return min(mean, found, key=lambda bound: bound.value)
+            candidate = _prove_component(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
+            if candidate is not None:
+                return min(mean, candidate, key=lambda bound: bound.value)
     return mean
 
 
@@ -170,7 +170,7 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     return best
 
 
-def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
+def _prove_component(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]

@@ -1,4 +1,4 @@
-"""Sharper Lyapunov functions than the paper's: searched in several classes, chosen for the bound over time, proved.
+"""Lyapunov functions beyond the paper's: searched in several classes, chosen for the bound over time, proved.
 
 All are quadratic in the error: ``V = E' P E`` with ``V <= e^(-b s) V(0)``, hence
 ``||E||^2 <= overshoot e^(-b s) ||E(0)||^2``. The classes:
@@ -49,7 +49,7 @@ LARGEST_PREFACTOR = 1e6
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
 _FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
-#: A bound is useful where it leaves this share of the error. One more candidate is taken for that, if all others need
+#: A bound is useful where it leaves this share of the error. One more candidate is used for that, if all others need
 #: so many times more of the clock: it costs a proof, and tells which gains make a bound useful.
 USEFUL, _LATE = 0.01, 1.5
 #: Rates that differ by less, relatively, are the same.
@@ -57,7 +57,7 @@ _SAME_RATE = 1e-6
 #: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
 LARGEST_ENTRY = 2.0
 #: By what factor one more Lyapunov function must improve the bound of deviations at some instant.
-WORTH_A_MEMBER = 1.25
+WORTH_A_FUNCTION = 1.25
 #: Beyond this overshoot constant a diagonal matrix is of no use to anybody.
 _HOPELESS = 1e15
 _MATRIX_BITS = 60
@@ -84,7 +84,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Search:
-    """What was tried, what was taken, and how far the diagonal class reaches.
+    """What was searched, what is used, and how far the diagonal class reaches.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
     method : {"paper", "perron", "lmi", "full", "best"}
         ``paper`` searches nothing; ``best`` everything.
     clocks : sequence of float
-        Values of the stretched clock at which the bound should be small; the largest useful rate is taken besides.
+        Values of the stretched clock at which the bound should be small; the largest useful rate is searched besides.
     at : float, optional
         One more such value, for which the classes are searched more finely.
 
@@ -141,23 +141,23 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue
-            found = results[kind] = []
+            frontier = results[kind] = []
             with share_of_time(share, f"class {kind}", cut_off):
                 try:
                     for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
-                        found.append(candidate)
+                        frontier.append(candidate)
                 except OutOfTime:
                     raise
                 except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
                     notes.append(f"class {kind}: {error}")
                     continue
-            if not found and f"class {kind}" not in cut_off:
+            if not frontier and f"class {kind}" not in cut_off:
                 notes.append(f"class {kind}: nothing was found in floating point")
     with np.errstate(all="ignore"):
         every = [c for kind in METHODS for c in results.get(kind, ())]
-        tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
+        largest_rates = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
         candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
-        for kind, rate in tried.items():
+        for kind, rate in largest_rates.items():
             if not any(c.rate > 0 for c in candidates if c.kind == kind):
                 notes.append(f"class {kind}: the rate {rate:.4g} needs an overshoot constant above {_HOPELESS:.0e}")
         proved: list[LyapunovFunction] = []
@@ -182,7 +182,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         if extra.proved_rate < fastest.proved_rate or extra.overshoot >= fastest.overshoot:
             functions.append(replace(extra, rate=min(extra.proved_rate, fastest.proved_rate)))
     least = limit if math.isfinite(limit) else None
-    return Search(tuple(functions), tried, least, tuple(notes), tuple(cut_off))
+    return Search(tuple(functions), largest_rates, least, tuple(notes), tuple(cut_off))
 
 
 def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> Search:
@@ -204,7 +204,7 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
         return Search(notes=(note,))
     functions: dict[Candidate, LyapunovFunction] = {}
     notes: list[str] = []
-    tried: dict[str, float] = {}
+    largest_rates: dict[str, float] = {}
     groups = [len(c.nodes) for c in structure.closed_components]
     largest = SEARCHED_GROUP[method == "lmi"]
     searches = {"perron": 0}
@@ -214,19 +214,19 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
         notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
     cut_off: list[str] = []
     for kind, search in searches.items():
-        found: Sequence[LyapunovFunction] = ()
+        frontier: Sequence[LyapunovFunction] = ()
         try:
             with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
-                found = list(apart(partial(dominant_functions, structure, search=search)))
+                frontier = list(apart(partial(dominant_functions, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue
-        rates = [float(V.proved_rate) for V in found]
-        functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, found, strict=True))
-        if found:
-            tried[kind] = max(rates)
+        rates = [float(V.proved_rate) for V in frontier]
+        functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, frontier, strict=True))
+        if frontier:
+            largest_rates[kind] = max(rates)
     chosen = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
-    return Search(tuple(functions[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
+    return Search(tuple(functions[c] for c in chosen), largest_rates, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
@@ -335,26 +335,26 @@ def _for_deviations(
             return np.full(len(clocks), np.inf)
         return (math.log(largest) - rate * np.array(clocks)) / 2 if largest > 0 else np.full(len(clocks), np.inf)
 
-    def reduced(c: Candidate) -> np.ndarray:
+    def reduce(c: Candidate) -> np.ndarray:
         return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
 
-    known = [log_bounds(own.T @ reduced(c) @ own, c.rate) for c in chosen]
-    known.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
-    best, least, found = np.min(known, axis=0), math.log(WORTH_A_MEMBER), None
+    bounds = [log_bounds(own.T @ reduce(c) @ own, c.rate) for c in chosen]
+    bounds.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
+    best, least, candidate = np.min(bounds, axis=0), math.log(WORTH_A_FUNCTION), None
     for c in candidates:
         if c.kind == "full":
-            gain = best - log_bounds(reduced(c), c.rate)
-            if gain.max() > math.log(WORTH_A_MEMBER) and np.maximum(gain, 0).sum() > least:
-                least, found = np.maximum(gain, 0).sum(), c
-    if found is None:
+            gain = best - log_bounds(reduce(c), c.rate)
+            if gain.max() > math.log(WORTH_A_FUNCTION) and np.maximum(gain, 0).sum() > least:
+                least, candidate = np.maximum(gain, 0).sum(), c
+    if candidate is None:
         return None
-    P = inverse.T @ reduced(found) @ inverse
+    P = inverse.T @ reduce(candidate) @ inverse
     sizes = np.linalg.eigvalsh(P)
     low, high = float(sizes[0]), float(sizes[-1])
     if not low > high / _HOPELESS:
         return None
     P = U @ P @ U.T + math.sqrt(low * high) * (np.eye(len(A)) - U @ U.T)
-    return Candidate("full", found.rate, high / low, matrix=P)
+    return Candidate("full", candidate.rate, high / low, matrix=P)
 
 
 # ---------------------------------------------------------------------- classes
@@ -373,8 +373,8 @@ def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
         return
     followers = system.parts[-1]
     with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
-        for found in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
-            log_weights[followers] = found.log_omega
+        for certificate in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
+            log_weights[followers] = certificate.log_omega
             yield from _coupled("perron", A, system.parts, log_weights, basis)
 
 
@@ -406,8 +406,8 @@ def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[C
         yield Candidate("full", function.rate, function.condition, matrix=P)
 
 
-def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:
-    return Candidate(kind, found.rate, found.condition, log_weights=found.log_omega)
+def _diagonal(kind: str, certificate: lmi.DiagonalCertificate) -> Candidate:
+    return Candidate(kind, certificate.rate, certificate.condition, log_weights=certificate.log_omega)
 
 
 def _coupled(
