@@ -36,8 +36,8 @@ _OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: 
 _BINARY = frozenset(("+", "-", "*", "/", "**", "min", "max"))
 _FOREIGN = re.compile(r"[^A-Za-z0-9_+\-*/(),. \t\r\n]")
 _NUMBER_BEFORE_NAME = re.compile(r"(?<![\w.])[0-9.]++(?:[eE][+-]?[0-9]++)?+(?=[A-Za-z_])")
-_KNOWN = f"{', '.join(ATOMS)} and the functions {', '.join(FUNCTIONS)}"
-_ALLOWED = f"write numbers, + - * / ** ( ) , {_KNOWN}"
+_NAMES = f"{', '.join(ATOMS)} and the functions {', '.join(FUNCTIONS)}"
+_ALLOWED = f"write numbers, + - * / ** ( ) , {_NAMES}"
 
 
 def parse(text: str) -> Program:
@@ -108,7 +108,7 @@ def _items(node: ast.expr, text: str, shift: int) -> tuple[list[Any], Sequence[a
         case ast.Name(id=name):
             if name in ATOMS:
                 return [name], ()
-            what = f'unknown name "{shorten(name)}"; the names are {_KNOWN}'
+            what = f'unknown name "{shorten(name)}"; the names are {_NAMES}'
             if name in FUNCTIONS:
                 what = f'"(" is missing after {name}; write {name}(...)'
         case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _OPERATORS:
@@ -118,7 +118,7 @@ def _items(node: ast.expr, text: str, shift: int) -> tuple[list[Any], Sequence[a
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             several = name in ("min", "max")
             if name not in FUNCTIONS:
-                what = f'"{shorten(name)}" is no function; the names are {_KNOWN}'
+                what = f'"{shorten(name)}" is no function; the names are {_NAMES}'
             elif (several and len(arguments) > 1) or (not several and len(arguments) == 1):
                 return [name] * max(len(arguments) - 1, 1), arguments
             else:

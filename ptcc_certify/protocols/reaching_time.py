@@ -79,8 +79,8 @@ class ReachingTime:
         if not self.z:
             return 0.0 if self.z is None else float_down(self.deadline)
         z = float(min(self.z, Fraction(1000)))
-        left = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
-        return left if left > 1e-300 else 0.0
+        rest = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
+        return rest if rest > 1e-300 else 0.0
 
     @property
     def time(self) -> float:
@@ -129,24 +129,24 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     # What is below the range of floats is guessed as 0.
     guesses = {abs(size): max(z, 1e-305) for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
-    known = {Fraction(0): Fraction(0)}
+    instants = {Fraction(0): Fraction(0)}
 
     def prove(candidates: dict[Fraction, Fraction]) -> list[Fraction]:
         below = decay_integrals_below(protocol.T_r, protocol.mu2, pole, candidates.values(), REACHING_BITS)
         proved = {size: z for size, z in candidates.items() if size <= push * below[z]}
-        known.update(proved)
+        instants.update(proved)
         return list(proved)
 
     for slack in (1e-12, 1e-9, 1e-6, 1e-3):
-        finite = {size: z for size, z in guesses.items() if size not in known and math.isfinite(z)}
+        finite = {size: z for size, z in guesses.items() if size not in instants and math.isfinite(z)}
         prove({size: Fraction(z * (1 + slack)) for size, z in finite.items()})
     # What floats cannot place is within a tenth; with mu3 kappa < 1 the integral does not grow any more from ``z`` on.
     z = min(_LARGEST_Z, (60 if pole < 1 else 1600) / abs(pole - 1)) if pole != 1 else _LARGEST_Z
-    rest = [size for size in guesses if size not in known]
+    rest = [size for size in guesses if size not in instants]
     while rest:
         rest = prove(dict.fromkeys(rest, z))
         z = Fraction(float(z) / 1.1)
-    return tuple(ReachingTime(protocol.T_r, known.get(abs(size))) for size in sigma0)
+    return tuple(ReachingTime(protocol.T_r, instants.get(abs(size))) for size in sigma0)
 
 
 # ---------------------------------------------------------------------- one run
@@ -199,7 +199,7 @@ class ReachingProblem:
     def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
         """Bound the (N, M) sizes of the sliding variables at increasing ``z >= 0``, 0 from ``certain`` (N,) on.
 
-        What is left of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
+        What remains of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
         the certain instant, too, which nothing cancels.
         """
         bounds = np.zeros((self.z.size, z.size))
@@ -236,7 +236,7 @@ class ReachingProblem:
         return np.exp(-self._protocol.reaching_gain.clock_at_tau(z))
 
     def _push(self, z: np.ndarray, rows: Any) -> np.ndarray:
-        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their starts."""
+        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their initial values."""
         agents = self._agents[rows]
         unit = self._unit[agents, None]
         if self._worst:
@@ -251,7 +251,7 @@ class ReachingProblem:
         half = (b - a) / 2
         z = (a + half)[:, None] + half[:, None] * _NODES
         push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
-        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small start
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small initial value
             return (push * self._weight(z)) @ _WEIGHTS * half
 
     def _latest(self) -> float:
@@ -342,8 +342,8 @@ class ReachingProblem:
         # psi first: what it multiplies may leave the range of floats.
         with np.errstate(over="ignore", invalid="ignore"):
             grown = np.expm1(growth * beyond) / growth if growth else beyond
-            left = self._decay(z) * np.maximum(rest - self._far_push(row) * grown, 0)
-        return np.where(np.isfinite(left), left, 0.0)
+            size = self._decay(z) * np.maximum(rest - self._far_push(row) * grown, 0)
+        return np.where(np.isfinite(size), size, 0.0)
 
 
 def sliding_bound(
@@ -354,7 +354,7 @@ def sliding_bound(
 ) -> np.ndarray:
     """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below the worst case.
 
-    ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, sharper than Proposition 1 and kept by every
+    ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, below that of Proposition 1 and true for every
     disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
     lose digits, and may be 0.
     """
