@@ -59,7 +59,7 @@ class Phase:
         t = start + span (1 - e^-z),   R = dt/dz = span e^-z     towards a pole at start + span
         t = start + span z,            R = span                  past all poles
 
-    The nominal gain times ``R`` is ``rho1 R + pole R/(gap + R)``, where ``gap + R`` is the time left to ``T``; that of
+    The nominal gain times ``R`` is ``rho1 R + pole R/(gap + R)``, where ``gap + R`` is the time until ``T``; that of
     the sliding variables is ``mu2 R + reaching_pole``.
     """
 
@@ -135,8 +135,8 @@ class Motion:
 
     def imbalance(self, states: np.ndarray) -> float:
         """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
-        heard = self.in_weight > 0
-        pull = np.abs(self.laplacian @ states)[heard] / (2 * self.in_weight[heard, None])
+        listeners = self.in_weight > 0
+        pull = np.abs(self.laplacian @ states)[listeners] / (2 * self.in_weight[listeners, None])
         return float(pull.max(initial=0.0))
 
     def sample(
@@ -210,7 +210,7 @@ def _product(laplacian: ca.DM, columns: int) -> Any:
 
 
 def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
-    """Return the same function, its dependencies kept from CasADi; it must outlive the integrators that call it.
+    """Return the same function, its dependencies hidden from CasADi; it must outlive the integrators that call it.
 
     CasADi prepares the Jacobian of every right-hand side, which takes long (N = 100,000: 9 s) and which GMRES without
     a preconditioner never evaluates: it takes the exact derivatives in single directions, products with ``L`` again.
@@ -256,7 +256,7 @@ def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
         ) -> Any:
             X, Y = ca.MX.sym("X", *shape), ca.MX.sym("Y", ca.Sparsity(*shape))
             seeds = ca.MX.sym("seeds", shape[0], shape[1] * directions)
-            moved = _product(laplacian, shape[1] * directions)(seeds)
-            return ca.Function(name, [X, Y, seeds], [moved], inputs, outputs, options)
+            derivatives = _product(laplacian, shape[1] * directions)(seeds)
+            return ca.Function(name, [X, Y, seeds], [derivatives], inputs, outputs, options)
 
     return Product()
