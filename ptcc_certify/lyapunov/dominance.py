@@ -214,13 +214,13 @@ def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupP
     S = half[:, None] * graph.dense_laplacian() / half
     guess = float(np.linalg.eigvalsh(S + S.T)[int(balanced)])
     if balanced:
-        proved = prove_connectivity(graph, exact, guess)
+        rate = prove_connectivity(graph, exact, guess)
     else:
         form = symmetric_product(exact, graph.exact_laplacian())
-        proved = prove_generalized_margin(form, diagonal_matrix(exact), guess)
-    if proved is None or proved <= 0:
+        rate = prove_generalized_margin(form, diagonal_matrix(exact), guess)
+    if rate is None or rate <= 0:
         raise NoCertificate(f"the rate of a leader group of {graph.n_nodes} nodes was not proved")
-    return GroupProof(weights, proved)
+    return GroupProof(weights, rate)
 
 
 def _best_diagonal(graph: SignedDigraph, p: np.ndarray | None) -> tuple[np.ndarray, float]:
@@ -310,15 +310,15 @@ def _smallest_eigenvalue(form: Any, weights: np.ndarray, balanced: bool, factor:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     half = sparse.diags_array(1 / np.sqrt(weights))
-    scaled = sparse.csc_array(half @ form @ half)
-    top = float(abs(scaled).max())
+    operator = sparse.csc_array(half @ form @ half)
+    top = float(abs(operator).max())
     options = {"k": 1 + balanced, "sigma": -1e-3 * top} if factor else {"k": 1, "which": "SA", "tol": 1e-6}
     if balanced and not factor:  # the spectrum of the comparison matrix, whose kernel is known, moved to the other end
-        M = sparse.csc_array(2 * sparse.diags_array(scaled.diagonal()) - abs(scaled))
+        M = sparse.csc_array(2 * sparse.diags_array(operator.diagonal()) - abs(operator))
         kernel = np.sqrt(weights / weights.sum())
-        scaled = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
+        operator = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
     try:
-        smallest = float(eigsh(scaled, return_eigenvectors=False, **options).max())
+        smallest = float(eigsh(operator, return_eigenvectors=False, **options).max())
     except (ArpackError, RuntimeError):
         smallest = 0.0
     if not smallest > 0:

@@ -160,13 +160,13 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     for nodes, block in component_blocks(structure):
         if nodes.size > EXACT_NODES:
             continue
-        skipped = int(int(nodes[0]) in balanced)
+        zeros = int(int(nodes[0]) in balanced)
         try:
-            parts = np.sort(np.linalg.eigvals(block.toarray()).real)[skipped:]
+            parts = np.sort(np.linalg.eigvals(block.toarray()).real)[zeros:]
         except np.linalg.LinAlgError:
             continue
         if parts.size and np.isfinite(parts[0]) and parts[0] > 0 and (best is None or parts[0] < best[1]):
-            best = (tuple(nodes.tolist()), float(parts[0]), 1 + skipped)
+            best = (tuple(nodes.tolist()), float(parts[0]), 1 + zeros)
     return best
 
 

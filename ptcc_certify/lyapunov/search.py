@@ -129,7 +129,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
     results: dict[str, list[Candidate]] = {}
     notes: list[str] = []
     cut_off: list[str] = []
-    wanted = [*clocks] if at is None else [*clocks, at]
+    clock_values = [*clocks] if at is None else [*clocks, at]
     losses = lmi.full.LOSSES if at is None else _FINE_LOSSES
     # The quickest search first; each takes a share of the time that is left, and leaves some for the proofs.
     searches = {
@@ -163,8 +163,8 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         proved: list[LyapunovFunction] = []
         extra: LyapunovFunction | None = None
         with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
-            chosen = choose(candidates, wanted)
-            for candidate in chosen:
+            selection = choose(candidates, clock_values)
+            for candidate in selection:
                 checkpoint()
                 function = prove_function(system, candidate)
                 if function is None:
@@ -173,7 +173,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
                     proved.append(function)
             checkpoint()
             decays = any(V.proved_rate > 0 for V in proved)
-            near = _for_deviations(system, candidates, chosen, wanted) if decays else None
+            near = _for_deviations(system, candidates, selection, clock_values) if decays else None
             extra = None if near is None else prove_function(system, near)
     limit = min((c.upper for c in every), default=math.inf)
     functions = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
@@ -225,8 +225,8 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
         functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, frontier, strict=True))
         if frontier:
             largest_rates[kind] = max(rates)
-    chosen = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
-    return Search(tuple(functions[c] for c in chosen), largest_rates, notes=tuple(notes), cut_off=tuple(cut_off))
+    selection = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
+    return Search(tuple(functions[c] for c in selection), largest_rates, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
@@ -243,16 +243,16 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     if not candidates:
         return []
     useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
-    chosen = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
-    chosen += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
+    selection = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
+    selection += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
-        chosen.append(_fastest(diagonal))
+        selection.append(_fastest(diagonal))
     if decaying := [c for c in candidates if c.rate > 0]:
         first = min(decaying, key=_useful_from)
-        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
-            chosen.append(first)
-    return list(dict.fromkeys(chosen))
+        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in selection):
+            selection.append(first)
+    return list(dict.fromkeys(selection))
 
 
 def _useful_from(candidate: Candidate) -> float:
@@ -299,10 +299,10 @@ def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunctio
         size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
         whole, identity = [[x.numerator for x in row] for row in P], np.eye(len(P), dtype=int).tolist()
         lowest = prove_generalized_margin(whole, identity, float(size[0]))
-        negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
-        if lowest is None or lowest <= 0 or negated is None:
+        minus_highest = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
+        if lowest is None or lowest <= 0 or minus_highest is None:
             return None
-        ends = (lowest, -negated)
+        ends = (lowest, -minus_highest)
     return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, ends=ends, numerical_rate=candidate.rate)
 
 
@@ -310,7 +310,7 @@ def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunctio
 
 
 def _for_deviations(
-    system: ErrorSystem, candidates: Sequence[Candidate], chosen: Sequence[Candidate], clocks: Sequence[float]
+    system: ErrorSystem, candidates: Sequence[Candidate], selection: Sequence[Candidate], clocks: Sequence[float]
 ) -> Candidate | None:
     """Return, as a matrix in ``E``, what bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
 
@@ -338,7 +338,7 @@ def _for_deviations(
     def reduce(c: Candidate) -> np.ndarray:
         return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
 
-    bounds = [log_bounds(own.T @ reduce(c) @ own, c.rate) for c in chosen]
+    bounds = [log_bounds(own.T @ reduce(c) @ own, c.rate) for c in selection]
     bounds.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
     best, least, candidate = np.min(bounds, axis=0), math.log(WORTH_A_FUNCTION), None
     for c in candidates:
@@ -369,13 +369,13 @@ def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
         p = np.log(left_vector(graph))
         log_weights[rows] = p - p.max()
     if len(system.parts) == len(system.leaders):
-        yield from _coupled("perron", A, system.parts, log_weights, basis)
+        yield from _couple_blocks("perron", A, system.parts, log_weights, basis)
         return
     followers = system.parts[-1]
     with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
         for certificate in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
             log_weights[followers] = certificate.log_omega
-            yield from _coupled("perron", A, system.parts, log_weights, basis)
+            yield from _couple_blocks("perron", A, system.parts, log_weights, basis)
 
 
 def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
@@ -398,8 +398,8 @@ def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[C
     """Yield full matrices on the error's subspace, continued beyond it."""
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
-    reduced = A if U is None else U.T @ A @ U
-    for function in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
+    block = A if U is None else U.T @ A @ U
+    for function in lmi.full_frontier(block, decay=None if spectral is None else spectral / 2, losses=losses):
         P = function.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
             P = U @ P @ U.T + np.sqrt(function.condition) * (np.eye(len(A)) - U @ U.T)
@@ -410,7 +410,7 @@ def _diagonal(kind: str, certificate: lmi.DiagonalCertificate) -> Candidate:
     return Candidate(kind, certificate.rate, certificate.condition, log_weights=certificate.log_omega)
 
 
-def _coupled(
+def _couple_blocks(
     kind: str, A: np.ndarray, parts: Sequence[np.ndarray], log_weights: np.ndarray, basis: np.ndarray | None
 ) -> Iterator[Candidate]:
     """Yield the blocks coupled at several rates below the slowest of them."""
@@ -424,6 +424,6 @@ def _coupled(
         return
     for loss in _COUPLING_LOSSES:
         with contextlib.suppress(lmi.NoCertificate):
-            coupled = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
-            if (rate := lmi.diagonal_rate(A, coupled, basis)) > 0:
-                yield _diagonal(kind, lmi.DiagonalCertificate(coupled, rate))
+            log_omega = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
+            if (rate := lmi.diagonal_rate(A, log_omega, basis)) > 0:
+                yield _diagonal(kind, lmi.DiagonalCertificate(log_omega, rate))
