@@ -543,8 +543,8 @@ class StateDependent(Disturbance):
         except (TypeError, ValueError, OverflowError):
             raise ParameterError(f"{self.text} at t = {t:.9g}: {shorten(repr(value))} is no array of numbers") from None
         if values.shape not in ((), (len(labels),)):
-            wanted = f"return a number or shape ({len(labels)},)"
-            raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {wanted}")
+            hint = f"return a number or shape ({len(labels)},)"
+            raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {hint}")
         values = np.broadcast_to(values, (len(labels),))
         agents = np.arange(len(labels))
         _Limit(delta, slack, labels).refuse_beyond(values, np.array(t), agents, f"disturbance ({self.text})")

@@ -188,8 +188,8 @@ class LimitedGain:
         if self.limits.sample_period is not None:
             return self.periods(float(t.max())).value(t)
         free = self.gain.value_at_remaining(q)
-        acting = [(q <= stretch.begin) & (q > stretch.end) for stretch in self.stretches]
-        return np.select(acting, [free if stretch.level is None else stretch.level for stretch in self.stretches])
+        masks = [(q <= stretch.begin) & (q > stretch.end) for stretch in self.stretches]
+        return np.select(masks, [free if stretch.level is None else stretch.level for stretch in self.stretches])
 
     def clock(self, t: ArrayLike, remaining: ArrayLike | None = None) -> np.ndarray:
         """Return ``s_eff(t)``, the integral of the gain that acts; infinite from a pole on.

@@ -215,8 +215,8 @@ class ReachingProblem:
         """Return the size of one sliding variable in its unit, with so much added to the bracket."""
         near, size = z <= self._end, np.empty(z.size)
         panel = self._panel(z[near])
-        spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
-        size[near] = np.minimum(np.maximum(1 - spent, 0) + more, 1) * self._decay(z[near])
+        integral = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+        size[near] = np.minimum(np.maximum(1 - integral, 0) + more, 1) * self._decay(z[near])
         size[~near] = self._tail(row, z[~near], more)
         return size
 
@@ -259,8 +259,8 @@ class ReachingProblem:
         edges = np.concatenate([[0.0], np.geomspace(1e-12, 1, 400) * LAST_Z])
         low, half = edges[:-1, None], np.diff(edges)[:, None] / 2
         with np.errstate(over="ignore"):
-            spent = np.cumsum((self._weight(low + half + half * _NODES) * half) @ _WEIGHTS) * self._gap
-        return float(edges[min(int(np.searchsorted(spent, self._unit.max())) + 2, edges.size - 1)])
+            integral = np.cumsum((self._weight(low + half + half * _NODES) * half) @ _WEIGHTS) * self._gap
+        return float(edges[min(int(np.searchsorted(integral, self._unit.max())) + 2, edges.size - 1)])
 
     def _panels(self) -> tuple[np.ndarray, np.ndarray]:
         """Return panel edges and the (A, P) integrals over them, refined until halving changes nothing."""
@@ -275,7 +275,7 @@ class ReachingProblem:
         rows = range(self._agents.size)
         batch = max(1, _BATCH // self._agents.size)
         most = max(_MAX_PANELS // self._agents.size, _LEAST_PANELS)
-        done: list[tuple[np.ndarray, np.ndarray]] = []
+        panels: list[tuple[np.ndarray, np.ndarray]] = []
         count = 0
         while a.size:
             count += min(a.size, batch)
@@ -292,14 +292,14 @@ class ReachingProblem:
             # Halving makes a smooth error vanish; one that only halves is rounding, if it is small, or else a jump.
             rounding = (error <= 1e-12) & (error > before / 8)
             fits = (error <= 4e-15) | rounding | (high - low <= 1e-13 * high)
-            done.append((low[fits], (left + right)[:, fits]))
+            panels.append((low[fits], (left + right)[:, fits]))
             split = ~fits
             a = np.concatenate([a, low[split], middle[split]])
             b = np.concatenate([b, middle[split], high[split]])
             previous = np.concatenate([previous, error[split], error[split]])
-        starts = np.concatenate([part[0] for part in done])
+        starts = np.concatenate([part[0] for part in panels])
         order = np.argsort(starts)
-        steps = np.concatenate([part[1] for part in done], axis=1)[:, order]
+        steps = np.concatenate([part[1] for part in panels], axis=1)[:, order]
         return np.append(starts[order], self._end), steps
 
     def _root(self, row: int) -> float:
@@ -341,8 +341,8 @@ class ReachingProblem:
         growth, beyond = float(self._protocol.mu3 * self._protocol.kappa - 1), z - self._end
         # psi first: what it multiplies may leave the range of floats.
         with np.errstate(over="ignore", invalid="ignore"):
-            grown = np.expm1(growth * beyond) / growth if growth else beyond
-            size = self._decay(z) * np.maximum(rest - self._far_push(row) * grown, 0)
+            integral = np.expm1(growth * beyond) / growth if growth else beyond
+            size = self._decay(z) * np.maximum(rest - self._far_push(row) * integral, 0)
         return np.where(np.isfinite(size), size, 0.0)
 
 
