@@ -154,9 +154,9 @@ class Motion:
         for a, b in pairwise(stops.tolist()):
             inside = (z > a) & (z <= b)
             later = np.unique(np.append(z[inside], b))
-            reached = self._advance(phase, later, a)
-            states[inside] = reached[np.searchsorted(later, z[inside])]
-            self.state = reached[-1]
+            later_states = self._advance(phase, later, a)
+            states[inside] = later_states[np.searchsorted(later, z[inside])]
+            self.state = later_states[-1]
         return states
 
     def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
@@ -187,18 +187,18 @@ class Motion:
             )
         try:
             with interruptible():
-                reached = np.array(integrator(x0=self.state.ravel(order="F"), p=parameters)["xf"])
+                states = np.array(integrator(x0=self.state.ravel(order="F"), p=parameters)["xf"])
         except RuntimeError as error:
             flag = re.search(r"CV_\w+", str(error))
             name = flag[0] if flag else "no CVODES flag"
             cause = _CAUSES.get(name, f"an unforeseen failure; perhaps {_TOO_LARGE}")
             raise SimulationError(f"the integrator stopped: {cause} ({name})") from None
-        if not np.isfinite(reached).all():
+        if not np.isfinite(states).all():
             raise SimulationError(f"the integrator returned numbers that are not finite: {_TOO_LARGE}")
         counts = integrator.stats()
         self.stats["steps"] += counts["nsteps"]
         self.stats["rhs"] += counts["nfevals"] + counts.get("n_call_jtimesF", 0)
-        return reached.reshape(*self.state.T.shape, -1).transpose(2, 1, 0)
+        return states.reshape(*self.state.T.shape, -1).transpose(2, 1, 0)
 
 
 def _product(laplacian: ca.DM, columns: int) -> Any:

@@ -30,7 +30,7 @@ def interruptible() -> Iterator[None]:
         return
     errors: list[BaseException] = []
 
-    def recorded(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
+    def record(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
         def handler(number: int, frame: Any) -> None:
             try:
                 act(number, frame)
@@ -41,10 +41,10 @@ def interruptible() -> Iterator[None]:
 
         return handler
 
-    signal.signal(signal.SIGINT, recorded(previous))
+    signal.signal(signal.SIGINT, record(previous))
     messages = io.StringIO()  # CasADi tells in words of its own that it was interrupted
     try:
-        with contextlib.redirect_stderr(messages), _alarm(recorded(lambda *_: checkpoint())):
+        with contextlib.redirect_stderr(messages), _alarm(record(lambda *_: checkpoint())):
             yield
     except Exception:
         if errors:

@@ -123,8 +123,8 @@ class NominalMotion(Motion):
                 break
             if stretch.level is None:
                 phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, remaining)[here]
-                forced = _LAST_TAU if self.sources else begin
-                end = -math.log(stretch.end) if stretch.end else z.max(initial=forced)
+                least = _LAST_TAU if self.sources else begin
+                end = -math.log(stretch.end) if stretch.end else z.max(initial=least)
             else:
                 span = T * (stretch.begin - stretch.end) if stretch.end >= 0 else T
                 phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)

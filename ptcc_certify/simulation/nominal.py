@@ -90,7 +90,7 @@ def simulate_nominal(
     if residual is None and protocol.prescribed and late.size:
         residual = run.imbalance(states[late[0]])
 
-    def shaped(values: np.ndarray) -> np.ndarray:
+    def restore(values: np.ndarray) -> np.ndarray:
         return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*initial_state.shape, t.size)
 
     return Trajectory(
@@ -99,7 +99,7 @@ def simulate_nominal(
         t=t,
         remaining=remaining,
         clock=clock,
-        states=shaped(states),
+        states=restore(states),
         rtol=tolerances.rtol,
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
@@ -107,7 +107,7 @@ def simulate_nominal(
         stats=run.stats,
         actuator=None if actuator is None or actuator.ideal else actuator,
         forcing=None if forcing is None else forcing.text,
-        held_input=None if inputs is None else shaped(inputs),
+        held_input=None if inputs is None else restore(inputs),
     )
 
 

@@ -290,15 +290,15 @@ class SlidingTrajectory(Trajectory):
         what the switching does, which keeps it there.
         """
         if self.boundary_layer is not None:
-            return self._driven(np.tanh(self.sigma / self.boundary_layer))
+            return self._add_reaching_terms(np.tanh(self.sigma / self.boundary_layer))
         return np.where(self.sigma != 0, self.switching_input, super().input - self.disturbance)
 
     @property
     def switching_input(self) -> np.ndarray:
         """(N, M) array: ``u`` of (48) to the letter, with ``sign(0) = 0``; while sliding it jumps by up to ``mu1``."""
-        return self._driven(np.sign(self.sigma))
+        return self._add_reaching_terms(np.sign(self.sigma))
 
-    def _driven(self, sign: np.ndarray) -> np.ndarray:
+    def _add_reaching_terms(self, sign: np.ndarray) -> np.ndarray:
         gain = self.protocol.reaching_gain.value_at_remaining(self.reaching_remaining)
         return super().input - float(self.protocol.mu1) * sign - gain * self.sigma
 
