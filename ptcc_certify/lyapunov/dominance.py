@@ -78,13 +78,13 @@ def dominant_functions(
     if not structure.graph.n_edges:
         return []
     problem = _Composite(structure, search)
-    found: list[LyapunovFunction] = []
+    functions: list[LyapunovFunction] = []
     for loss in losses:
         with contextlib.suppress(LMIError):
-            found.append(problem.function(loss, "lmi" if search else "perron"))
-    if not found:
+            functions.append(problem.function(loss, "lmi" if search else "perron"))
+    if not functions:
         raise NoCertificate("no diagonal matrix was found that dominates")
-    return found
+    return functions
 
 
 class _Composite:
@@ -98,7 +98,7 @@ class _Composite:
         self.K = np.array([v for group in self.groups for v in group], dtype=np.int64)
         self.place = np.array([k for k, group in enumerate(self.groups) for _ in group], dtype=np.int64)
         rows = L[self.F]
-        self.pull: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
+        self.coupling: Any = abs(rows[:, self.K]) if self.K.size else None  # |L_FK|
         self.followers = SparseHMatrix(rows[:, self.F]) if self.F.size else None
         self.smallest = self.followers.smallest() if self.followers is not None else np.inf
         self.nodes = (*self.K.tolist(), *self.F.tolist())
@@ -127,16 +127,16 @@ class _Composite:
             if self.K.size:
                 b = min(2 * t, self.g.min() * (1 - loss))
                 slack = (self.followers.M @ u) * w + self.followers.Mt @ v - b * v
-                heard = self.pull.sum(axis=1)
+                coupling_sums = self.coupling.sum(axis=1)
                 with np.errstate(divide="ignore"):
-                    budget = np.where(heard > 0, slack / (2 * w * np.maximum(heard, 1e-300)), np.inf)
-                entries = self.pull.tocoo()
+                    budget = np.where(coupling_sums > 0, slack / (2 * w * np.maximum(coupling_sums, 1e-300)), np.inf)
+                entries = self.coupling.tocoo()
                 least = np.full(self.K.size, np.inf)
                 np.minimum.at(least, entries.col, budget[entries.row])
                 own = np.where(np.isfinite(least), least, 1.0)
                 firsts = np.flatnonzero(np.diff(self.place, prepend=-1))
                 own = np.minimum.reduceat(own, firsts)[self.place]
-                push = self.pull.T @ (w * u)
+                push = self.coupling.T @ (w * u)
                 scale = np.maximum.reduceat(2 * push / ((self.g[self.place] - b) * p * own), firsts)
                 # Powers of two keep the weights of a group the multiples for which its rate is proved.
                 scale = np.exp2(np.ceil(np.log2(np.where(scale > 0, scale, 1.0))))[self.place]
@@ -145,11 +145,11 @@ class _Composite:
         if not (np.isfinite(w).all() and np.isfinite(d).all() and w.min() > 1e-280 and d.min() > 1e-280):
             raise NoCertificate("the weights span more than float64 holds")
         w, d = round_array(w), round_array(d)
-        found = self._rate(w, d)
-        if not found > 0:
+        largest = self._rate(w, d)
+        if not largest > 0:
             raise NoCertificate("no positive rate is left")
         block = LyapunovBlock("P", self.nodes, dyadic=w)
-        rate = round_to_bits(found * (1 - _SLACK), 53)
+        rate = round_to_bits(largest * (1 - _SLACK), 53)
         firsts = np.cumsum([0, *(proof.weights.size for proof in self.proofs)])
         scales = tuple(float(w[i] / proof.weights[0]) for i, proof in zip(firsts, self.proofs, strict=False))
         proof = Dominance(d, self.proofs, scales)
@@ -167,9 +167,9 @@ class _Composite:
         # What floats may have lost where the terms of a row cancel.
         both = 4 * self.followers.diagonal * w_F * d_F
         bound = bound - _ROUNDING * (2 * both - bound)
-        if self.pull is not None:
-            bound = bound - w_F * (self.pull @ d[:k])
-            own = own - (self.pull.T @ (w_F * d_F)) / (w[:k] * d[:k])
+        if self.coupling is not None:
+            bound = bound - w_F * (self.coupling @ d[:k])
+            own = own - (self.coupling.T @ (w_F * d_F)) / (w[:k] * d[:k])
         return float(min((bound / (w_F * d_F)).min(), own.min(initial=np.inf)))
 
 
@@ -214,13 +214,13 @@ def prove_group(graph: SignedDigraph, balanced: bool, search: int = 0) -> GroupP
     S = half[:, None] * graph.dense_laplacian() / half
     guess = float(np.linalg.eigvalsh(S + S.T)[int(balanced)])
     if balanced:
-        proved = prove_connectivity(graph, exact, guess)
+        rate = prove_connectivity(graph, exact, guess)
     else:
         form = symmetric_product(exact, graph.exact_laplacian())
-        proved = prove_generalized_margin(form, diagonal_matrix(exact), guess)
-    if proved is None or proved <= 0:
+        rate = prove_generalized_margin(form, diagonal_matrix(exact), guess)
+    if rate is None or rate <= 0:
         raise NoCertificate(f"the rate of a leader group of {graph.n_nodes} nodes was not proved")
-    return GroupProof(weights, proved)
+    return GroupProof(weights, rate)
 
 
 def _best_diagonal(graph: SignedDigraph, p: np.ndarray | None) -> tuple[np.ndarray, float]:
@@ -257,8 +257,8 @@ def _prove_large_group(
     guess = _smallest_eigenvalue(form, weights, balanced, short) if guess is None else guess * 2.0**-shift
     unit = 2.0**shift
     if not short:
-        said = f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical"
-        raise NoCertificate(f"{said}: its proof would be long")
+        message = f"the rate {guess * unit:.6g} of a leader group of {n} nodes is numerical"
+        raise NoCertificate(f"{message}: its proof would be long")
     basis, parents = None, None
     if balanced and (whole := dyadic_left_vector(graph, p)) and len(set((weights / np.array(whole)).tolist())) == 1:
         parents = _spanning_tree(L)
@@ -310,17 +310,17 @@ def _smallest_eigenvalue(form: Any, weights: np.ndarray, balanced: bool, factor:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     half = sparse.diags_array(1 / np.sqrt(weights))
-    scaled = sparse.csc_array(half @ form @ half)
-    top = float(abs(scaled).max())
+    operator = sparse.csc_array(half @ form @ half)
+    top = float(abs(operator).max())
     options = {"k": 1 + balanced, "sigma": -1e-3 * top} if factor else {"k": 1, "which": "SA", "tol": 1e-6}
     if balanced and not factor:  # the spectrum of the comparison matrix, whose kernel is known, moved to the other end
-        M = sparse.csc_array(2 * sparse.diags_array(scaled.diagonal()) - abs(scaled))
+        M = sparse.csc_array(2 * sparse.diags_array(operator.diagonal()) - abs(operator))
         kernel = np.sqrt(weights / weights.sum())
-        scaled = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
+        operator = LinearOperator(M.shape, matvec=lambda x: M @ x + 4 * top * kernel * (kernel @ x))
     try:
-        found = float(eigsh(scaled, return_eigenvectors=False, **options).max())
+        smallest = float(eigsh(operator, return_eigenvectors=False, **options).max())
     except (ArpackError, RuntimeError):
-        found = 0.0
-    if not found > 0:
+        smallest = 0.0
+    if not smallest > 0:
         raise NoCertificate(f"no positive rate of a leader group of {weights.size} nodes was found")
-    return found
+    return smallest

@@ -278,8 +278,8 @@ class LyapunovFunction:
         if self.coordinates == "E":
             return [error[v] for v in self.nodes]
         own = [x[v] for v in self.nodes]
-        weighted = sum((w * g * y for w, g, y in zip(self.weights, self.gauge, own, strict=True)), Fraction(0))
-        mean = weighted / sum(self.weights)
+        total = sum((w * g * y for w, g, y in zip(self.weights, self.gauge, own, strict=True)), Fraction(0))
+        mean = total / sum(self.weights)
         return [y - g * mean for y, g in zip(own, self.gauge, strict=True)]
 
     def scaled(self, z: np.ndarray) -> np.ndarray:

@@ -97,9 +97,9 @@ def prove_rate_bound(structure: Structure) -> RateBound | None:
         for gap in _GAPS:
             if not np.isfinite(decay * (1 + gap)):
                 break
-            found = _proved(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
-            if found is not None:
-                return min(mean, found, key=lambda bound: bound.value)
+            candidate = _prove_component(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
+            if candidate is not None:
+                return min(mean, candidate, key=lambda bound: bound.value)
     return mean
 
 
@@ -160,17 +160,17 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     for nodes, block in component_blocks(structure):
         if nodes.size > EXACT_NODES:
             continue
-        skipped = int(int(nodes[0]) in balanced)
+        zeros = int(int(nodes[0]) in balanced)
         try:
-            parts = np.sort(np.linalg.eigvals(block.toarray()).real)[skipped:]
+            parts = np.sort(np.linalg.eigvals(block.toarray()).real)[zeros:]
         except np.linalg.LinAlgError:
             continue
         if parts.size and np.isfinite(parts[0]) and parts[0] > 0 and (best is None or parts[0] < best[1]):
-            best = (tuple(nodes.tolist()), float(parts[0]), 1 + skipped)
+            best = (tuple(nodes.tolist()), float(parts[0]), 1 + zeros)
     return best
 
 
-def _proved(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
+def _prove_component(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]

@@ -1,4 +1,4 @@
-"""Sharper Lyapunov functions than the paper's: searched in several classes, chosen for the bound over time, proved.
+"""Lyapunov functions beyond the paper's: searched in several classes, chosen for the bound over time, proved.
 
 All are quadratic in the error: ``V = E' P E`` with ``V <= e^(-b s) V(0)``, hence
 ``||E||^2 <= overshoot e^(-b s) ||E(0)||^2``. The classes:
@@ -49,7 +49,7 @@ LARGEST_PREFACTOR = 1e6
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
 _FINE_LOSSES = tuple(np.concatenate([np.geomspace(1e-5, 0.05, 20), np.linspace(0.07, 0.95, 20)]))
-#: A bound is useful where it leaves this share of the error. One more candidate is taken for that, if all others need
+#: A bound is useful where it leaves this share of the error. One more candidate is used for that, if all others need
 #: so many times more of the clock: it costs a proof, and tells which gains make a bound useful.
 USEFUL, _LATE = 0.01, 1.5
 #: Rates that differ by less, relatively, are the same.
@@ -57,7 +57,7 @@ _SAME_RATE = 1e-6
 #: The largest entry of deviations at random, over their mean size: bounds above this say nothing.
 LARGEST_ENTRY = 2.0
 #: By what factor one more Lyapunov function must improve the bound of deviations at some instant.
-WORTH_A_MEMBER = 1.25
+WORTH_A_FUNCTION = 1.25
 #: Beyond this overshoot constant a diagonal matrix is of no use to anybody.
 _HOPELESS = 1e15
 _MATRIX_BITS = 60
@@ -84,7 +84,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Search:
-    """What was tried, what was taken, and how far the diagonal class reaches.
+    """What was searched, what is used, and how far the diagonal class reaches.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
     method : {"paper", "perron", "lmi", "full", "best"}
         ``paper`` searches nothing; ``best`` everything.
     clocks : sequence of float
-        Values of the stretched clock at which the bound should be small; the largest useful rate is taken besides.
+        Values of the stretched clock at which the bound should be small; the largest useful rate is searched besides.
     at : float, optional
         One more such value, for which the classes are searched more finely.
 
@@ -129,7 +129,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
     results: dict[str, list[Candidate]] = {}
     notes: list[str] = []
     cut_off: list[str] = []
-    wanted = [*clocks] if at is None else [*clocks, at]
+    clock_values = [*clocks] if at is None else [*clocks, at]
     losses = lmi.full.LOSSES if at is None else _FINE_LOSSES
     # The quickest search first; each takes a share of the time that is left, and leaves some for the proofs.
     searches = {
@@ -141,30 +141,30 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue
-            found = results[kind] = []
+            frontier = results[kind] = []
             with share_of_time(share, f"class {kind}", cut_off):
                 try:
                     for candidate in apart(search) if len(system.nodes) > APART_NODES else search():
-                        found.append(candidate)
+                        frontier.append(candidate)
                 except OutOfTime:
                     raise
                 except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
                     notes.append(f"class {kind}: {error}")
                     continue
-            if not found and f"class {kind}" not in cut_off:
+            if not frontier and f"class {kind}" not in cut_off:
                 notes.append(f"class {kind}: nothing was found in floating point")
     with np.errstate(all="ignore"):
         every = [c for kind in METHODS for c in results.get(kind, ())]
-        tried = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
+        largest_rates = {c.kind: max(other.rate for other in results[c.kind]) for c in every}
         candidates = [c for c in every if math.isfinite(c.rate) and c.condition <= _HOPELESS]
-        for kind, rate in tried.items():
+        for kind, rate in largest_rates.items():
             if not any(c.rate > 0 for c in candidates if c.kind == kind):
                 notes.append(f"class {kind}: the rate {rate:.4g} needs an overshoot constant above {_HOPELESS:.0e}")
         proved: list[LyapunovFunction] = []
         extra: LyapunovFunction | None = None
         with share_of_time(1.0, "proofs of Lyapunov functions", cut_off):
-            chosen = choose(candidates, wanted)
-            for candidate in chosen:
+            selection = choose(candidates, clock_values)
+            for candidate in selection:
                 checkpoint()
                 function = prove_function(system, candidate)
                 if function is None:
@@ -173,7 +173,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
                     proved.append(function)
             checkpoint()
             decays = any(V.proved_rate > 0 for V in proved)
-            near = _for_deviations(system, candidates, chosen, wanted) if decays else None
+            near = _for_deviations(system, candidates, selection, clock_values) if decays else None
             extra = None if near is None else prove_function(system, near)
     limit = min((c.upper for c in every), default=math.inf)
     functions = _without_hair_splitting(sorted(proved, key=lambda m: m.numerical_rate or 0.0))
@@ -182,7 +182,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         if extra.proved_rate < fastest.proved_rate or extra.overshoot >= fastest.overshoot:
             functions.append(replace(extra, rate=min(extra.proved_rate, fastest.proved_rate)))
     least = limit if math.isfinite(limit) else None
-    return Search(tuple(functions), tried, least, tuple(notes), tuple(cut_off))
+    return Search(tuple(functions), largest_rates, least, tuple(notes), tuple(cut_off))
 
 
 def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> Search:
@@ -204,7 +204,7 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
         return Search(notes=(note,))
     functions: dict[Candidate, LyapunovFunction] = {}
     notes: list[str] = []
-    tried: dict[str, float] = {}
+    largest_rates: dict[str, float] = {}
     groups = [len(c.nodes) for c in structure.closed_components]
     largest = SEARCHED_GROUP[method == "lmi"]
     searches = {"perron": 0}
@@ -214,19 +214,19 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
         notes.append(f"class lmi is for leader groups of {EXACT_NODES + 1} to {largest} nodes; class perron instead")
     cut_off: list[str] = []
     for kind, search in searches.items():
-        found: Sequence[LyapunovFunction] = ()
+        frontier: Sequence[LyapunovFunction] = ()
         try:
             with np.errstate(all="ignore"), share_of_time(1.0, f"class {kind}", cut_off):
-                found = list(apart(partial(dominant_functions, structure, search=search)))
+                frontier = list(apart(partial(dominant_functions, structure, search=search)))
         except (LMIError, HypothesisError, np.linalg.LinAlgError) as error:
             notes.append(f"class {kind}: {error}")
             continue
-        rates = [float(V.proved_rate) for V in found]
-        functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, found, strict=True))
-        if found:
-            tried[kind] = max(rates)
-    chosen = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
-    return Search(tuple(functions[c] for c in chosen), tried, notes=tuple(notes), cut_off=tuple(cut_off))
+        rates = [float(V.proved_rate) for V in frontier]
+        functions.update((Candidate(kind, r, float(V.overshoot)), V) for r, V in zip(rates, frontier, strict=True))
+        if frontier:
+            largest_rates[kind] = max(rates)
+    selection = sorted(choose(list(functions), clocks), key=lambda c: c.rate)
+    return Search(tuple(functions[c] for c in selection), largest_rates, notes=tuple(notes), cut_off=tuple(cut_off))
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
@@ -243,16 +243,16 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     if not candidates:
         return []
     useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
-    chosen = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
-    chosen += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
+    selection = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
+    selection += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
     if diagonal:
-        chosen.append(_fastest(diagonal))
+        selection.append(_fastest(diagonal))
     if decaying := [c for c in candidates if c.rate > 0]:
         first = min(decaying, key=_useful_from)
-        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in chosen):
-            chosen.append(first)
-    return list(dict.fromkeys(chosen))
+        if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in selection):
+            selection.append(first)
+    return list(dict.fromkeys(selection))
 
 
 def _useful_from(candidate: Candidate) -> float:
@@ -299,10 +299,10 @@ def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunctio
         size = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in P]))
         whole, identity = [[x.numerator for x in row] for row in P], np.eye(len(P), dtype=int).tolist()
         lowest = prove_generalized_margin(whole, identity, float(size[0]))
-        negated = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
-        if lowest is None or lowest <= 0 or negated is None:
+        minus_highest = prove_generalized_margin([[-x for x in row] for row in whole], identity, -float(size[-1]))
+        if lowest is None or lowest <= 0 or minus_highest is None:
             return None
-        ends = (lowest, -negated)
+        ends = (lowest, -minus_highest)
     return LyapunovFunction(candidate.kind, "E", (block,), rate=rate, ends=ends, numerical_rate=candidate.rate)
 
 
@@ -310,7 +310,7 @@ def prove_function(system: ErrorSystem, candidate: Candidate) -> LyapunovFunctio
 
 
 def _for_deviations(
-    system: ErrorSystem, candidates: Sequence[Candidate], chosen: Sequence[Candidate], clocks: Sequence[float]
+    system: ErrorSystem, candidates: Sequence[Candidate], selection: Sequence[Candidate], clocks: Sequence[float]
 ) -> Candidate | None:
     """Return, as a matrix in ``E``, what bounds ``d = x - Q x`` best; None if the chosen ones do nearly as well.
 
@@ -335,26 +335,26 @@ def _for_deviations(
             return np.full(len(clocks), np.inf)
         return (math.log(largest) - rate * np.array(clocks)) / 2 if largest > 0 else np.full(len(clocks), np.inf)
 
-    def reduced(c: Candidate) -> np.ndarray:
+    def reduce(c: Candidate) -> np.ndarray:
         return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
 
-    known = [log_bounds(own.T @ reduced(c) @ own, c.rate) for c in chosen]
-    known.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
-    best, least, found = np.min(known, axis=0), math.log(WORTH_A_MEMBER), None
+    bounds = [log_bounds(own.T @ reduce(c) @ own, c.rate) for c in selection]
+    bounds.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
+    best, least, candidate = np.min(bounds, axis=0), math.log(WORTH_A_FUNCTION), None
     for c in candidates:
         if c.kind == "full":
-            gain = best - log_bounds(reduced(c), c.rate)
-            if gain.max() > math.log(WORTH_A_MEMBER) and np.maximum(gain, 0).sum() > least:
-                least, found = np.maximum(gain, 0).sum(), c
-    if found is None:
+            gain = best - log_bounds(reduce(c), c.rate)
+            if gain.max() > math.log(WORTH_A_FUNCTION) and np.maximum(gain, 0).sum() > least:
+                least, candidate = np.maximum(gain, 0).sum(), c
+    if candidate is None:
         return None
-    P = inverse.T @ reduced(found) @ inverse
+    P = inverse.T @ reduce(candidate) @ inverse
     sizes = np.linalg.eigvalsh(P)
     low, high = float(sizes[0]), float(sizes[-1])
     if not low > high / _HOPELESS:
         return None
     P = U @ P @ U.T + math.sqrt(low * high) * (np.eye(len(A)) - U @ U.T)
-    return Candidate("full", found.rate, high / low, matrix=P)
+    return Candidate("full", candidate.rate, high / low, matrix=P)
 
 
 # ---------------------------------------------------------------------- classes
@@ -369,13 +369,13 @@ def _perron_candidates(system: ErrorSystem) -> Iterator[Candidate]:
         p = np.log(left_vector(graph))
         log_weights[rows] = p - p.max()
     if len(system.parts) == len(system.leaders):
-        yield from _coupled("perron", A, system.parts, log_weights, basis)
+        yield from _couple_blocks("perron", A, system.parts, log_weights, basis)
         return
     followers = system.parts[-1]
     with contextlib.suppress(lmi.NoCertificate):  # no rate at this condition, and so at none of the smaller ones
-        for found in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
-            log_weights[followers] = found.log_omega
-            yield from _coupled("perron", A, system.parts, log_weights, basis)
+        for certificate in lmi.h_matrix_frontier(A[np.ix_(followers, followers)], (None, 1e6, 1e3, 30.0)):
+            log_weights[followers] = certificate.log_omega
+            yield from _couple_blocks("perron", A, system.parts, log_weights, basis)
 
 
 def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
@@ -398,19 +398,19 @@ def _full_candidates(system: ErrorSystem, losses: Sequence[float]) -> Iterator[C
     """Yield full matrices on the error's subspace, continued beyond it."""
     A, U = system.matrix, system.basis
     spectral = laplacian_spectrum(system.structure).spectral_rate
-    reduced = A if U is None else U.T @ A @ U
-    for function in lmi.full_frontier(reduced, decay=None if spectral is None else spectral / 2, losses=losses):
+    block = A if U is None else U.T @ A @ U
+    for function in lmi.full_frontier(block, decay=None if spectral is None else spectral / 2, losses=losses):
         P = function.matrix
         if U is not None:  # beyond the subspace anything between the extremes will do
             P = U @ P @ U.T + np.sqrt(function.condition) * (np.eye(len(A)) - U @ U.T)
         yield Candidate("full", function.rate, function.condition, matrix=P)
 
 
-def _diagonal(kind: str, found: lmi.DiagonalCertificate) -> Candidate:
-    return Candidate(kind, found.rate, found.condition, log_weights=found.log_omega)
+def _diagonal(kind: str, certificate: lmi.DiagonalCertificate) -> Candidate:
+    return Candidate(kind, certificate.rate, certificate.condition, log_weights=certificate.log_omega)
 
 
-def _coupled(
+def _couple_blocks(
     kind: str, A: np.ndarray, parts: Sequence[np.ndarray], log_weights: np.ndarray, basis: np.ndarray | None
 ) -> Iterator[Candidate]:
     """Yield the blocks coupled at several rates below the slowest of them."""
@@ -424,6 +424,6 @@ def _coupled(
         return
     for loss in _COUPLING_LOSSES:
         with contextlib.suppress(lmi.NoCertificate):
-            coupled = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
-            if (rate := lmi.diagonal_rate(A, coupled, basis)) > 0:
-                yield _diagonal(kind, lmi.DiagonalCertificate(coupled, rate))
+            log_omega = lmi.couple_blocks(A, parts, log_weights, slowest * (1 - loss), basis)
+            if (rate := lmi.diagonal_rate(A, log_omega, basis)) > 0:
+                yield _diagonal(kind, lmi.DiagonalCertificate(log_omega, rate))

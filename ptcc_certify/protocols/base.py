@@ -101,12 +101,12 @@ class Protocol(Parameters, ABC):
         >>> Protocol.from_dict(NominalProtocol(T=1, rho1=1, rho2="1/2", kappa=1).to_dict())
         NominalProtocol(T=1, rho1=1, rho2=0.5, kappa=1)
         """
-        given = dict(data)
-        kind = given.pop("kind", None)
+        parameters = dict(data)
+        kind = parameters.pop("kind", None)
         if kind not in Protocol._kinds:
             raise ParameterError(f'protocol "{shorten(str(kind))}" is unknown; one of {", ".join(Protocol._kinds)}')
         try:
-            return Protocol._kinds[kind](**given)
+            return Protocol._kinds[kind](**parameters)
         except TypeError as error:
             raise ParameterError(f"protocol {kind}: {error}") from None
 

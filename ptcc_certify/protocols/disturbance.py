@@ -537,14 +537,14 @@ class StateDependent(Disturbance):
         ParameterError
             The function does not return N numbers; or names agent, time and value beyond ``delta``.
         """
-        given = self.function(t, x, sigma)
+        value = self.function(t, x, sigma)
         try:
-            values = np.array(given, dtype=float)
+            values = np.array(value, dtype=float)
         except (TypeError, ValueError, OverflowError):
-            raise ParameterError(f"{self.text} at t = {t:.9g}: {shorten(repr(given))} is no array of numbers") from None
+            raise ParameterError(f"{self.text} at t = {t:.9g}: {shorten(repr(value))} is no array of numbers") from None
         if values.shape not in ((), (len(labels),)):
-            wanted = f"return a number or shape ({len(labels)},)"
-            raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {wanted}")
+            hint = f"return a number or shape ({len(labels)},)"
+            raise ParameterError(f"{self.text} at t = {t:.9g}: the shape is {values.shape}; {hint}")
         values = np.broadcast_to(values, (len(labels),))
         agents = np.arange(len(labels))
         _Limit(delta, slack, labels).refuse_beyond(values, np.array(t), agents, f"disturbance ({self.text})")
@@ -571,7 +571,7 @@ def as_disturbance(value: Any, n: int, delta: Exact, until: float, seed: int = 0
     Parameters
     ----------
     value : Disturbance, str, number, callable or sequence
-        An expression of ``k`` and ``t``; "none"; "adversary"; "telegraph" (amplitude ``delta``, 20 switches of each
+        An expression of ``k`` and ``t``; "none"; "worst-case"; "telegraph" (amplitude ``delta``, 20 switches of each
         agent to be expected until ``until``); a constant; ``n`` expressions or constants; or a function of
         ``(t, x, sigma)``.
     n : int

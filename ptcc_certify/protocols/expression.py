@@ -36,8 +36,8 @@ _OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: 
 _BINARY = frozenset(("+", "-", "*", "/", "**", "min", "max"))
 _FOREIGN = re.compile(r"[^A-Za-z0-9_+\-*/(),. \t\r\n]")
 _NUMBER_BEFORE_NAME = re.compile(r"(?<![\w.])[0-9.]++(?:[eE][+-]?[0-9]++)?+(?=[A-Za-z_])")
-_KNOWN = f"{', '.join(ATOMS)} and the functions {', '.join(FUNCTIONS)}"
-_ALLOWED = f"write numbers, + - * / ** ( ) , {_KNOWN}"
+_NAMES = f"{', '.join(ATOMS)} and the functions {', '.join(FUNCTIONS)}"
+_ALLOWED = f"write numbers, + - * / ** ( ) , {_NAMES}"
 
 
 def parse(text: str) -> Program:
@@ -79,19 +79,19 @@ def parse(text: str) -> Program:
     try:
         tree = ast.parse(source, mode="eval").body
     except SyntaxError as error:
-        raise _misplaced(text, error, shift) from None
+        raise _syntax_refusal(text, error, shift) from None
     except (RecursionError, MemoryError):
         raise _refusal(text, 0, too_deep) from None
     program: list[float | str] = []
-    waiting: list[tuple[ast.expr, int]] = [(tree, 0)]
-    while waiting:  # the last operand first; the program is turned round in the end
-        node, depth = waiting.pop()
+    stack: list[tuple[ast.expr, int]] = [(tree, 0)]
+    while stack:  # the last operand first; the program is turned round in the end
+        node, depth = stack.pop()
         items, operands = _items(node, text, shift)
         depth += isinstance(node, ast.Call) or "**" in items
         if depth > MAX_NESTING:
             raise _refusal(text, node.col_offset + shift, too_deep)
         program += items
-        waiting += [(operand, depth) for operand in operands]
+        stack += [(operand, depth) for operand in operands]
     return tuple(program[::-1])
 
 
@@ -108,7 +108,7 @@ def _items(node: ast.expr, text: str, shift: int) -> tuple[list[Any], Sequence[a
         case ast.Name(id=name):
             if name in ATOMS:
                 return [name], ()
-            what = f'unknown name "{shorten(name)}"; the names are {_KNOWN}'
+            what = f'unknown name "{shorten(name)}"; the names are {_NAMES}'
             if name in FUNCTIONS:
                 what = f'"(" is missing after {name}; write {name}(...)'
         case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _OPERATORS:
@@ -118,7 +118,7 @@ def _items(node: ast.expr, text: str, shift: int) -> tuple[list[Any], Sequence[a
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             several = name in ("min", "max")
             if name not in FUNCTIONS:
-                what = f'"{shorten(name)}" is no function; the names are {_KNOWN}'
+                what = f'"{shorten(name)}" is no function; the names are {_NAMES}'
             elif (several and len(arguments) > 1) or (not several and len(arguments) == 1):
                 return [name] * max(len(arguments) - 1, 1), arguments
             else:
@@ -128,7 +128,7 @@ def _items(node: ast.expr, text: str, shift: int) -> tuple[list[Any], Sequence[a
     raise _refusal(text, start, what)
 
 
-def _misplaced(text: str, error: SyntaxError, shift: int) -> ParameterError:
+def _syntax_refusal(text: str, error: SyntaxError, shift: int) -> ParameterError:
     """Say where Python's parser gave up."""
     at = error.offset + shift - 1 if error.offset else len(text)
     what = f'"{shorten(text[at:])}" cannot stand here; write * for a product, sin(...) for a function'
@@ -248,7 +248,7 @@ def _increasing(function: Callable[[arb], arb]) -> Callable[[Interval], Interval
     return lambda x: (function(x[0]), function(x[1]))
 
 
-def _checked(operation: Callable[..., Interval], defined: Callable[..., bool] = lambda *_: True) -> Callable:
+def _check_domain(operation: Callable[..., Interval], defined: Callable[..., bool] = lambda *_: True) -> Callable:
     """Refuse operands outside the domain, and what may be beyond the range of floats, or is not a number."""
 
     def enclose(*operands: Interval) -> Interval:
@@ -298,17 +298,17 @@ def _wave(function: Callable[[arb], arb], peak: float) -> Callable[[Interval], I
 
 _INTERVALS: dict[str, Callable[..., Interval]] = {
     "neg": lambda x: (-x[1], -x[0]),
-    "+": _checked(lambda x, y: (x[0] + y[0], x[1] + y[1])),
-    "-": _checked(lambda x, y: (x[0] - y[1], x[1] - y[0])),
-    "*": _checked(_corners(operator.mul)),
-    "/": _checked(_corners(operator.truediv), lambda x, y: _has_no_zero(y)),
-    "**": _checked(_power),
+    "+": _check_domain(lambda x, y: (x[0] + y[0], x[1] + y[1])),
+    "-": _check_domain(lambda x, y: (x[0] - y[1], x[1] - y[0])),
+    "*": _check_domain(_corners(operator.mul)),
+    "/": _check_domain(_corners(operator.truediv), lambda x, y: _has_no_zero(y)),
+    "**": _check_domain(_power),
     "sin": _wave(arb.sin, 0.25),
     "cos": _wave(arb.cos, 0.0),
-    "tan": _checked(_increasing(arb.tan), lambda x: not _reaches(x, 0.5, arb.pi())),
-    "exp": _checked(_increasing(arb.exp)),
-    "log": _checked(_increasing(arb.log), lambda x: x[0] > 0),
-    "sqrt": _checked(_increasing(arb.sqrt), lambda x: x[0] >= 0),
+    "tan": _check_domain(_increasing(arb.tan), lambda x: not _reaches(x, 0.5, arb.pi())),
+    "exp": _check_domain(_increasing(arb.exp)),
+    "log": _check_domain(_increasing(arb.log), lambda x: x[0] > 0),
+    "sqrt": _check_domain(_increasing(arb.sqrt), lambda x: x[0] >= 0),
     "atan": _increasing(arb.atan),
     "tanh": _increasing(arb.tanh),
     "sign": _increasing(arb.sgn),

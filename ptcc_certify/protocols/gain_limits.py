@@ -188,8 +188,8 @@ class LimitedGain:
         if self.limits.sample_period is not None:
             return self.periods(float(t.max())).value(t)
         free = self.gain.value_at_remaining(q)
-        acting = [(q <= stretch.begin) & (q > stretch.end) for stretch in self.stretches]
-        return np.select(acting, [free if stretch.level is None else stretch.level for stretch in self.stretches])
+        masks = [(q <= stretch.begin) & (q > stretch.end) for stretch in self.stretches]
+        return np.select(masks, [free if stretch.level is None else stretch.level for stretch in self.stretches])
 
     def clock(self, t: ArrayLike, remaining: ArrayLike | None = None) -> np.ndarray:
         """Return ``s_eff(t)``, the integral of the gain that acts; infinite from a pole on.
@@ -211,18 +211,18 @@ class LimitedGain:
     def elapsed(self, stretch: Stretch, t: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return the time spent in a stretch until instants ``t``, where ``1 - t/T = q``."""
         T, end = float(self.gain.T), max(stretch.end, 0.0)
-        left = np.clip(q, end, stretch.begin)
+        rest = np.clip(q, end, stretch.begin)
         early = np.minimum(t, T * (1 - end)) - T * (1 - stretch.begin)
         # Whichever of 1 - t/T and t is the small one holds the digits.
-        before = np.where(left > 0.5, np.maximum(early, 0), T * (stretch.begin - left))
+        before = np.where(rest > 0.5, np.maximum(early, 0), T * (stretch.begin - rest))
         return before + (np.maximum(t - T, 0) if stretch.end < 0 else 0)
 
     def tau(self, stretch: Stretch, t: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Return ``-ln(1 - t/T)``, not beyond the end of the first stretch; infinite at the pole."""
-        left = np.maximum(q, stretch.end)
+        rest = np.maximum(q, stretch.end)
         early = np.minimum(self.elapsed(stretch, t, q) / float(self.gain.T), 0.5)
         with np.errstate(divide="ignore"):
-            return np.where(left > 0.5, -np.log1p(-early), -np.log(left))
+            return np.where(rest > 0.5, -np.log1p(-early), -np.log(rest))
 
     def periods(self, until: float) -> Periods:
         """Return the sampling periods that start in [0, until], and the next one.
@@ -251,10 +251,10 @@ class LimitedGain:
         starts, durations = (
             np.array([n / unit for n in ns]) for ns in (ticks[:-1], [b - a for a, b in pairwise(ticks)])
         )
-        left = np.array([max(T - tick, 0) / unit for tick in ticks[:-1]])
+        rest = np.array([max(T - tick, 0) / unit for tick in ticks[:-1]])
         share = np.array([(b - a) / (T - a) if a < T else 0.0 for a, b in pairwise(ticks)])
         with np.errstate(divide="ignore", over="ignore"):
-            gains = np.minimum(float(gain.rho1) + np.where(left > 0, float(gain.pole) / left, 0.0), self._cap)
+            gains = np.minimum(float(gain.rho1) + np.where(rest > 0, float(gain.pole) / rest, 0.0), self._cap)
         # A period may start so close to T that the gain overflows; its integral does not.
         steps = np.minimum(float(gain.rho1) * durations + float(gain.pole) * share, self._cap * durations)
         running = np.array([tick < end or self.limits.stop_before is None for tick in ticks[:-1]])

@@ -13,7 +13,7 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
 #: Bits of the longest parameter, whose products are written in certificates.
 LONGEST_BITS = 3000
-_TAKEN = "Fraction | int | float | str"
+_EXACT_TYPES = "Fraction | int | float | str"
 
 
 class Positive:
@@ -23,7 +23,7 @@ class Positive:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
-        owner.__annotations__[name] = _TAKEN  # what the constructor takes, for help()
+        owner.__annotations__[name] = _EXACT_TYPES  # what the constructor takes, for help()
 
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
@@ -49,7 +49,7 @@ class Given:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
-        owner.__annotations__[name] = f"{_TAKEN} | None"
+        owner.__annotations__[name] = f"{_EXACT_TYPES} | None"
 
     def __get__(self, instance: Any, owner: type) -> Fraction | None:
         return None if instance is None else instance.__dict__[self.name]
@@ -84,7 +84,7 @@ def readable(value: Fraction) -> str:
     return shorten(str(value))
 
 
-def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
+def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
     """Return a parameter as an exact rational, or refuse it by name.
 
     Examples
@@ -94,10 +94,10 @@ def parameter(name: str, given: Any, zero_allowed: bool = False) -> Fraction:
     """
     domain = ">= 0" if zero_allowed else "> 0"
     try:
-        value = as_fraction(given, name)
+        value = as_fraction(number, name)
     except NumberError:
         raise ParameterError(
-            f"{name} = {shorten(str(given))} is not a finite number; {name} must be a number {domain}"
+            f"{name} = {shorten(str(number))} is not a finite number; {name} must be a number {domain}"
         ) from None
     refuse_out_of_range(name, value)
     if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:

@@ -79,8 +79,8 @@ class ReachingTime:
         if not self.z:
             return 0.0 if self.z is None else float_down(self.deadline)
         z = float(min(self.z, Fraction(1000)))
-        left = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
-        return left if left > 1e-300 else 0.0
+        rest = float(self.deadline) * math.exp(-z) * (1 - 1e-15 - 2e-16 * z)
+        return rest if rest > 1e-300 else 0.0
 
     @property
     def time(self) -> float:
@@ -129,24 +129,24 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     # What is below the range of floats is guessed as 0.
     guesses = {abs(size): max(z, 1e-305) for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
-    known = {Fraction(0): Fraction(0)}
+    instants = {Fraction(0): Fraction(0)}
 
     def prove(candidates: dict[Fraction, Fraction]) -> list[Fraction]:
         below = decay_integrals_below(protocol.T_r, protocol.mu2, pole, candidates.values(), REACHING_BITS)
         proved = {size: z for size, z in candidates.items() if size <= push * below[z]}
-        known.update(proved)
+        instants.update(proved)
         return list(proved)
 
     for slack in (1e-12, 1e-9, 1e-6, 1e-3):
-        finite = {size: z for size, z in guesses.items() if size not in known and math.isfinite(z)}
+        finite = {size: z for size, z in guesses.items() if size not in instants and math.isfinite(z)}
         prove({size: Fraction(z * (1 + slack)) for size, z in finite.items()})
     # What floats cannot place is within a tenth; with mu3 kappa < 1 the integral does not grow any more from ``z`` on.
     z = min(_LARGEST_Z, (60 if pole < 1 else 1600) / abs(pole - 1)) if pole != 1 else _LARGEST_Z
-    rest = [size for size in guesses if size not in known]
+    rest = [size for size in guesses if size not in instants]
     while rest:
         rest = prove(dict.fromkeys(rest, z))
         z = Fraction(float(z) / 1.1)
-    return tuple(ReachingTime(protocol.T_r, known.get(abs(size))) for size in sigma0)
+    return tuple(ReachingTime(protocol.T_r, instants.get(abs(size))) for size in sigma0)
 
 
 # ---------------------------------------------------------------------- one run
@@ -199,7 +199,7 @@ class ReachingProblem:
     def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
         """Bound the (N, M) sizes of the sliding variables at increasing ``z >= 0``, 0 from ``certain`` (N,) on.
 
-        What is left of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
+        What remains of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
         the certain instant, too, which nothing cancels.
         """
         bounds = np.zeros((self.z.size, z.size))
@@ -215,8 +215,8 @@ class ReachingProblem:
         """Return the size of one sliding variable in its unit, with so much added to the bracket."""
         near, size = z <= self._end, np.empty(z.size)
         panel = self._panel(z[near])
-        spent = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
-        size[near] = np.minimum(np.maximum(1 - spent, 0) + more, 1) * self._decay(z[near])
+        integral = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
+        size[near] = np.minimum(np.maximum(1 - integral, 0) + more, 1) * self._decay(z[near])
         size[~near] = self._tail(row, z[~near], more)
         return size
 
@@ -236,7 +236,7 @@ class ReachingProblem:
         return np.exp(-self._protocol.reaching_gain.clock_at_tau(z))
 
     def _push(self, z: np.ndarray, rows: Any) -> np.ndarray:
-        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their starts."""
+        """Return ``mu1 - s d`` of some agents at (M,) instants, in units of their initial values."""
         agents = self._agents[rows]
         unit = self._unit[agents, None]
         if self._worst:
@@ -251,7 +251,7 @@ class ReachingProblem:
         half = (b - a) / 2
         z = (a + half)[:, None] + half[:, None] * _NODES
         push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
-        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small start
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small initial value
             return (push * self._weight(z)) @ _WEIGHTS * half
 
     def _latest(self) -> float:
@@ -259,8 +259,8 @@ class ReachingProblem:
         edges = np.concatenate([[0.0], np.geomspace(1e-12, 1, 400) * LAST_Z])
         low, half = edges[:-1, None], np.diff(edges)[:, None] / 2
         with np.errstate(over="ignore"):
-            spent = np.cumsum((self._weight(low + half + half * _NODES) * half) @ _WEIGHTS) * self._gap
-        return float(edges[min(int(np.searchsorted(spent, self._unit.max())) + 2, edges.size - 1)])
+            integral = np.cumsum((self._weight(low + half + half * _NODES) * half) @ _WEIGHTS) * self._gap
+        return float(edges[min(int(np.searchsorted(integral, self._unit.max())) + 2, edges.size - 1)])
 
     def _panels(self) -> tuple[np.ndarray, np.ndarray]:
         """Return panel edges and the (A, P) integrals over them, refined until halving changes nothing."""
@@ -275,7 +275,7 @@ class ReachingProblem:
         rows = range(self._agents.size)
         batch = max(1, _BATCH // self._agents.size)
         most = max(_MAX_PANELS // self._agents.size, _LEAST_PANELS)
-        done: list[tuple[np.ndarray, np.ndarray]] = []
+        panels: list[tuple[np.ndarray, np.ndarray]] = []
         count = 0
         while a.size:
             count += min(a.size, batch)
@@ -292,14 +292,14 @@ class ReachingProblem:
             # Halving makes a smooth error vanish; one that only halves is rounding, if it is small, or else a jump.
             rounding = (error <= 1e-12) & (error > before / 8)
             fits = (error <= 4e-15) | rounding | (high - low <= 1e-13 * high)
-            done.append((low[fits], (left + right)[:, fits]))
+            panels.append((low[fits], (left + right)[:, fits]))
             split = ~fits
             a = np.concatenate([a, low[split], middle[split]])
             b = np.concatenate([b, middle[split], high[split]])
             previous = np.concatenate([previous, error[split], error[split]])
-        starts = np.concatenate([part[0] for part in done])
+        starts = np.concatenate([part[0] for part in panels])
         order = np.argsort(starts)
-        steps = np.concatenate([part[1] for part in done], axis=1)[:, order]
+        steps = np.concatenate([part[1] for part in panels], axis=1)[:, order]
         return np.append(starts[order], self._end), steps
 
     def _root(self, row: int) -> float:
@@ -341,9 +341,9 @@ class ReachingProblem:
         growth, beyond = float(self._protocol.mu3 * self._protocol.kappa - 1), z - self._end
         # psi first: what it multiplies may leave the range of floats.
         with np.errstate(over="ignore", invalid="ignore"):
-            grown = np.expm1(growth * beyond) / growth if growth else beyond
-            left = self._decay(z) * np.maximum(rest - self._far_push(row) * grown, 0)
-        return np.where(np.isfinite(left), left, 0.0)
+            integral = np.expm1(growth * beyond) / growth if growth else beyond
+            size = self._decay(z) * np.maximum(rest - self._far_push(row) * integral, 0)
+        return np.where(np.isfinite(size), size, 0.0)
 
 
 def sliding_bound(
@@ -354,7 +354,7 @@ def sliding_bound(
 ) -> np.ndarray:
     """Return the (N, M) bounds of ``|sigma_k|`` at increasing instants ``z``, never below the worst case.
 
-    ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, sharper than Proposition 1 and kept by every
+    ``psi(t) max(0, |sigma_k(0)| - (mu1 - delta) int_0^t dr/psi(r))``, below that of Proposition 1 and true for every
     disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
     lose digits, and may be 0.
     """

@@ -104,7 +104,9 @@ class SlidingModeProtocol(ReachingProtocol):
 
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         sigma = x + (symbols("varsigma", graph) if varsigma is None else varsigma)
-        return _driven(self.nominal.input(graph, x, t), sigma, float(self.mu1), self.reaching_gain.expression(t))
+        return _add_reaching_terms(
+            self.nominal.input(graph, x, t), sigma, float(self.mu1), self.reaching_gain.expression(t)
+        )
 
     def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
         """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "p", "ode"}``.
@@ -165,13 +167,13 @@ class SlidingModeProtocol(ReachingProtocol):
         numbers = graph is not None
         nominal = r"u_{k}^{\mathrm{nom}}"
         mu1 = float(self.mu1) if numbers else ca.SX.sym("mu1")
-        driven = _driven(ca.SX.sym(nominal), ca.SX.sym("sigma_k"), mu1, ca.SX.sym("h"))
+        expression = _add_reaching_terms(ca.SX.sym(nominal), ca.SX.sym("sigma_k"), mu1, ca.SX.sym("h"))
         sigma = ca.SX.sym("x_k") + ca.SX.sym("varsigma_k")
         gain = self.gain.latex(numbers=numbers, letters=("T_{r} + T_{s}", "rho1", "rho2", "kappa"))
         reaching = self.reaching_gain.latex(numbers=numbers, letters=("T_r", "mu2", "mu3", "kappa"))
         return aligned(
             [
-                f"u_{{k}} &= {to_latex(driven)}",
+                f"u_{{k}} &= {to_latex(expression)}",
                 rf"\sigma_{{k}} &= {to_latex(sigma)}, \quad \dot\varsigma_{{k}} = -{nominal}",
                 *nominal_rows(graph, r"^{\mathrm{nom}}"),
                 f"g &= {gain}",
@@ -180,7 +182,7 @@ class SlidingModeProtocol(ReachingProtocol):
         )
 
 
-def _driven(nominal: Any, sigma: Any, mu1: Any, gain: Any) -> ca.SX:
+def _add_reaching_terms(nominal: Any, sigma: Any, mu1: Any, gain: Any) -> ca.SX:
     """``u^nom`` with what drives the sliding variables to 0."""
     import casadi as ca
 

@@ -59,7 +59,7 @@ class Phase:
         t = start + span (1 - e^-z),   R = dt/dz = span e^-z     towards a pole at start + span
         t = start + span z,            R = span                  past all poles
 
-    The nominal gain times ``R`` is ``rho1 R + pole R/(gap + R)``, where ``gap + R`` is the time left to ``T``; that of
+    The nominal gain times ``R`` is ``rho1 R + pole R/(gap + R)``, where ``gap + R`` is the time until ``T``; that of
     the sliding variables is ``mu2 R + reaching_pole``.
     """
 
@@ -135,8 +135,8 @@ class Motion:
 
     def imbalance(self, states: np.ndarray) -> float:
         """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
-        heard = self.in_weight > 0
-        pull = np.abs(self.laplacian @ states)[heard] / (2 * self.in_weight[heard, None])
+        listeners = self.in_weight > 0
+        pull = np.abs(self.laplacian @ states)[listeners] / (2 * self.in_weight[listeners, None])
         return float(pull.max(initial=0.0))
 
     def sample(
@@ -154,9 +154,9 @@ class Motion:
         for a, b in pairwise(stops.tolist()):
             inside = (z > a) & (z <= b)
             later = np.unique(np.append(z[inside], b))
-            reached = self._advance(phase, later, a)
-            states[inside] = reached[np.searchsorted(later, z[inside])]
-            self.state = reached[-1]
+            later_states = self._advance(phase, later, a)
+            states[inside] = later_states[np.searchsorted(later, z[inside])]
+            self.state = later_states[-1]
         return states
 
     def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
@@ -187,18 +187,18 @@ class Motion:
             )
         try:
             with interruptible():
-                reached = np.array(integrator(x0=self.state.ravel(order="F"), p=parameters)["xf"])
+                states = np.array(integrator(x0=self.state.ravel(order="F"), p=parameters)["xf"])
         except RuntimeError as error:
             flag = re.search(r"CV_\w+", str(error))
             name = flag[0] if flag else "no CVODES flag"
             cause = _CAUSES.get(name, f"an unforeseen failure; perhaps {_TOO_LARGE}")
             raise SimulationError(f"the integrator stopped: {cause} ({name})") from None
-        if not np.isfinite(reached).all():
+        if not np.isfinite(states).all():
             raise SimulationError(f"the integrator returned numbers that are not finite: {_TOO_LARGE}")
         counts = integrator.stats()
         self.stats["steps"] += counts["nsteps"]
         self.stats["rhs"] += counts["nfevals"] + counts.get("n_call_jtimesF", 0)
-        return reached.reshape(*self.state.T.shape, -1).transpose(2, 1, 0)
+        return states.reshape(*self.state.T.shape, -1).transpose(2, 1, 0)
 
 
 def _product(laplacian: ca.DM, columns: int) -> Any:
@@ -210,7 +210,7 @@ def _product(laplacian: ca.DM, columns: int) -> Any:
 
 
 def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
-    """Return the same function, its dependencies kept from CasADi; it must outlive the integrators that call it.
+    """Return the same function, its dependencies hidden from CasADi; it must outlive the integrators that call it.
 
     CasADi prepares the Jacobian of every right-hand side, which takes long (N = 100,000: 9 s) and which GMRES without
     a preconditioner never evaluates: it takes the exact derivatives in single directions, products with ``L`` again.
@@ -256,7 +256,7 @@ def _product_without_pattern(laplacian: ca.DM, columns: int) -> Any:
         ) -> Any:
             X, Y = ca.MX.sym("X", *shape), ca.MX.sym("Y", ca.Sparsity(*shape))
             seeds = ca.MX.sym("seeds", shape[0], shape[1] * directions)
-            moved = _product(laplacian, shape[1] * directions)(seeds)
-            return ca.Function(name, [X, Y, seeds], [moved], inputs, outputs, options)
+            derivatives = _product(laplacian, shape[1] * directions)(seeds)
+            return ca.Function(name, [X, Y, seeds], [derivatives], inputs, outputs, options)
 
     return Product()

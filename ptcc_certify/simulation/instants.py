@@ -30,17 +30,17 @@ class Instants:
     """Where a run is sampled: ``t``, ``1 - t/T`` and ``1 - t/T_r``, each (M,); the last is 0 without a ``T_r``."""
 
     t: np.ndarray
-    left: np.ndarray
-    reaching_left: np.ndarray
+    remaining: np.ndarray
+    reaching_remaining: np.ndarray
 
     @property
     def z(self) -> np.ndarray:
         """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
-        return minus_log(self.reaching_left, 1 - self.reaching_left)
+        return minus_log(self.reaching_remaining, 1 - self.reaching_remaining)
 
     def deadline(self, protocol: Protocol) -> int | None:
         """Return which instant is ``T``; None if none is, or if there is no deadline."""
-        at = np.flatnonzero((self.left == 0) & (self.t == float(protocol.T)) & protocol.prescribed)
+        at = np.flatnonzero((self.remaining == 0) & (self.t == float(protocol.T)) & protocol.prescribed)
         return int(at[0]) if at.size else None
 
 
@@ -67,16 +67,16 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     shares = grid * (T_s / T)
     if protocol.prescribed:
         shares = shares[shares >= remaining * (1 - 1e-12)]
-    shares = np.append(shares, [left for left in _MARKS if left < T_s / T])
+    shares = np.append(shares, [share for share in _MARKS if share < T_s / T])
     between = np.stack([T * (1 - shares), shares, np.zeros(shares.size)])
     between[0, shares == T_s / T] = T_r
     later = T * (1 + past * np.arange(_PAST_SAMPLES + 1 if past else 1) / _PAST_SAMPLES)
     parts = [between, np.stack([later, np.zeros(later.size), np.zeros(later.size)])]
     if T_r:
-        marks = np.array([T * (1 - left) for left in _MARKS])
+        marks = np.array([T * (1 - share) for share in _MARKS])
         early = np.append(grid, 1 - marks[marks < T_r] / T_r)
-        left = np.minimum((T_s + T_r * early) / T, 1.0)  # 0.8 + 0.9 is more than 1.7 in floats
-        parts.append(np.stack([T_r * (1 - early), left, early]))
+        late = np.minimum((T_s + T_r * early) / T, 1.0)  # 0.8 + 0.9 is more than 1.7 in floats
+        parts.append(np.stack([T_r * (1 - early), late, early]))
     table = np.concatenate(parts, axis=1)
     table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
     fresh = np.append(True, np.diff(table, axis=1).any(axis=0))
@@ -84,7 +84,7 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
 
 
 def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
-    """Return the instants wanted, what is left until ``T`` and ``T_r`` from exact rationals.
+    """Return the instants wanted, what remains until ``T`` and ``T_r`` from exact rationals.
 
     Raises
     ------
@@ -104,20 +104,20 @@ def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
         if later <= earlier:
             raise ParameterError(f"times is not increasing: {float(later)} follows {float(earlier)}")
 
-    def left(deadline: Fraction) -> np.ndarray:
+    def remaining(deadline: Fraction) -> np.ndarray:
         share = [max(0.0, float(1 - value / deadline)) if deadline else 0.0 for value in wanted]
         return np.where(t == float(deadline), 0.0, share)
 
-    return Instants(t, left(protocol.T), left(protocol.T - protocol.span))
+    return Instants(t, remaining(protocol.T), remaining(protocol.T - protocol.span))
 
 
-def tau_before(t: np.ndarray, left: np.ndarray, T: float, remaining: float) -> np.ndarray:
-    """Return ``-ln(left T/remaining)``, ``left = 1 - t/T > 0``, of instants from ``remaining`` before ``T`` on."""
+def tau_before(t: np.ndarray, q: np.ndarray, T: float, remaining: float) -> np.ndarray:
+    """Return ``-ln(q T/remaining)``, ``q = 1 - t/T > 0``, of instants from ``remaining`` before ``T`` on."""
     share = (t - (T - remaining)) / remaining
-    return np.maximum(minus_log(left * (T / remaining), share), 0.0)
+    return np.maximum(minus_log(q * (T / remaining), share), 0.0)
 
 
-def minus_log(left: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return ``-ln(left)``, where ``left + share = 1``: whichever is the small one holds the digits."""
+def minus_log(q: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return ``-ln(q)``, where ``q + share = 1``: whichever is the small one holds the digits."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(share < 0.5, -np.log1p(-share), -np.log(left))
+        return np.where(share < 0.5, -np.log1p(-share), -np.log(q))

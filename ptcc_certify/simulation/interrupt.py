@@ -28,46 +28,46 @@ def interruptible() -> Iterator[None]:
         yield
         checkpoint()
         return
-    raised: list[BaseException] = []
+    errors: list[BaseException] = []
 
-    def recorded(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
+    def record(act: Callable[[int, Any], Any]) -> Callable[[int, Any], None]:
         def handler(number: int, frame: Any) -> None:
             try:
                 act(number, frame)
             except BaseException as error:
                 signal.signal(signal.SIGINT, previous)  # it may come before the try below, or in its finally
-                raised.append(error)
+                errors.append(error)
                 raise
 
         return handler
 
-    signal.signal(signal.SIGINT, recorded(previous))
-    said = io.StringIO()  # CasADi tells in words of its own that it was interrupted
+    signal.signal(signal.SIGINT, record(previous))
+    messages = io.StringIO()  # CasADi tells in words of its own that it was interrupted
     try:
-        with contextlib.redirect_stderr(said), _alarm(recorded(lambda *_: checkpoint())):
+        with contextlib.redirect_stderr(messages), _alarm(record(lambda *_: checkpoint())):
             yield
     except Exception:
-        if raised:
-            raise raised[0] from None
+        if errors:
+            raise errors[0] from None
         raise
     else:
-        if raised:
-            raise raised[0]
+        if errors:
+            raise errors[0]
     finally:
         signal.signal(signal.SIGINT, previous)
-        if not raised and said.getvalue():
-            sys.stderr.write(said.getvalue())
+        if not errors and messages.getvalue():
+            sys.stderr.write(messages.getvalue())
 
 
 @contextmanager
 def _alarm(handler: Callable[[int, Any], None]) -> Iterator[None]:
     """Call the handler when the time limit is reached, if there is one and nobody else has set a timer."""
-    left = seconds_left()
-    if not math.isfinite(left) or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0]:
+    limit = seconds_left()
+    if not math.isfinite(limit) or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0]:
         yield
         return
     previous = signal.signal(signal.SIGALRM, handler)
-    signal.setitimer(signal.ITIMER_REAL, max(left, 1e-3) + 1e-3)
+    signal.setitimer(signal.ITIMER_REAL, max(limit, 1e-3) + 1e-3)
     try:
         yield
     finally:

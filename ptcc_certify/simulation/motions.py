@@ -101,7 +101,7 @@ class NominalMotion(Motion):
         return R * d - phase.nominal(R) * self._product(x + noise)
 
     def follow(
-        self, limited: LimitedGain, t: np.ndarray, left: np.ndarray, begin: float = 0.0
+        self, limited: LimitedGain, t: np.ndarray, remaining: np.ndarray, begin: float = 0.0
     ) -> tuple[np.ndarray, float | None]:
         """Return the (M, N, S) states under a gain, and the residual at ``T`` if it has its pole there.
 
@@ -109,7 +109,7 @@ class NominalMotion(Motion):
         ----------
         limited : LimitedGain
             The gain that acts, not held over periods.
-        t, left : (M,) array
+        t, remaining : (M,) array
             Increasing instants, and ``1 - t/T`` there.
         begin : float
             ``ln(T/(T - t))`` at the present state; if it is not 0, nothing limits the gain.
@@ -117,17 +117,18 @@ class NominalMotion(Motion):
         T, rho1, pole = (float(value) for value in (limited.gain.T, limited.gain.rho1, limited.gain.pole))
         states, residual = np.empty((t.size, *self.state.shape)), None
         for stretch in limited.stretches:
-            here, beyond = (left <= stretch.begin) & (left > stretch.end), bool((left <= stretch.end).any())
+            here = (remaining <= stretch.begin) & (remaining > stretch.end)
+            beyond = bool((remaining <= stretch.end).any())
             if not here.any() and not beyond:
                 break
             if stretch.level is None:
-                phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, left)[here]
-                forced = _LAST_TAU if self.sources else begin
-                end = -math.log(stretch.end) if stretch.end else z.max(initial=forced)
+                phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, remaining)[here]
+                least = _LAST_TAU if self.sources else begin
+                end = -math.log(stretch.end) if stretch.end else z.max(initial=least)
             else:
                 span = T * (stretch.begin - stretch.end) if stretch.end >= 0 else T
                 phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
-                z, end = limited.elapsed(stretch, t, left)[here] / span, 1.0 if stretch.end >= 0 else math.inf
+                z, end = limited.elapsed(stretch, t, remaining)[here] / span, 1.0 if stretch.end >= 0 else math.inf
             last = end if beyond else min(float(z[-1]), end)
             states[here] = self.sample(phase, z, last, begin, [_LAST_TAU] if self.sources else [])
             if beyond and stretch.level is None and not stretch.end:

@@ -1,6 +1,6 @@
 """The nominal protocol, alone or under limits of the gain, disturbances and measurement noise.
 
-As long as nothing is held or added,
+Without a hold and without forcing,
 
     X(t) = exp(-L s_eff(t)) X(0),      s_eff(t) = integral of the gain that acts
 
@@ -37,7 +37,7 @@ _DENSE_UP_TO = 64
 def simulate_nominal(
     graph: SignedDigraph,
     protocol: Protocol,
-    start: np.ndarray,
+    initial_state: np.ndarray,
     instants: Instants,
     actuator: GainLimits | None,
     forcing: Forcing | None,
@@ -49,7 +49,7 @@ def simulate_nominal(
     ----------
     graph : SignedDigraph
     protocol : Protocol
-    start : (N,) or (N, S) array
+    initial_state : (N,) or (N, S) array
     instants : Instants
     actuator : GainLimits or None
     forcing : Forcing or None
@@ -63,43 +63,43 @@ def simulate_nominal(
         The integrator failed, or a sampled run grew beyond the range of floats.
     """
     limited = (actuator or GainLimits()).limit(protocol.gain)
-    t, left = instants.t, instants.left
+    t, remaining = instants.t, instants.remaining
     sampled = limited.limits.sample_period is not None
     if forcing is not None and sampled:
         raise ParameterError("sample_period takes no disturbance and no noise; leave one of them out")
     if forcing is not None and forcing.noisy and not limited.bounded:
         raise ParameterError("noise times a gain that becomes infinite at T is no input; give gain_cap or stop_before")
-    columns = start.reshape(graph.n_nodes, -1)
+    columns = initial_state.reshape(graph.n_nodes, -1)
     unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
     unit[unit == 0] = 1
-    held = residual = None
+    inputs = residual = None
     run = NominalMotion(graph, columns / unit, tolerances, forcing, unit)
     if sampled:
         periods = limited.periods(float(t[-1]))
         clock = periods.clock(t)
-        states, held = _sampled(graph, periods, run.state, t)
+        states, inputs = _sample_and_hold(graph, periods, run.state, t)
         run.stats["steps"] = int(periods.locate(t[-1:])[0][0])
     elif forcing is None and limited.bounded:
-        clock = limited.clock(t, left)
+        clock = limited.clock(t, remaining)
         span = float(clock[-1]) or 1.0
         states = run.sample(Phase(0.0, 1.0, span, past=True), clock / span, float(clock[-1]) / span)
     else:
-        clock = limited.clock(t, left)
-        states, residual = run.follow(limited, t, left)
-    late = np.flatnonzero(left == 0)
+        clock = limited.clock(t, remaining)
+        states, residual = run.follow(limited, t, remaining)
+    late = np.flatnonzero(remaining == 0)
     if residual is None and protocol.prescribed and late.size:
         residual = run.imbalance(states[late[0]])
 
-    def shaped(values: np.ndarray) -> np.ndarray:
-        return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*start.shape, t.size)
+    def restore(values: np.ndarray) -> np.ndarray:
+        return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*initial_state.shape, t.size)
 
     return Trajectory(
         graph=graph,
         protocol=protocol,
         t=t,
-        remaining=left,
+        remaining=remaining,
         clock=clock,
-        states=shaped(states),
+        states=restore(states),
         rtol=tolerances.rtol,
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
@@ -107,7 +107,7 @@ def simulate_nominal(
         stats=run.stats,
         actuator=None if actuator is None or actuator.ideal else actuator,
         forcing=None if forcing is None else forcing.text,
-        held_input=None if held is None else shaped(held),
+        held_input=None if inputs is None else restore(inputs),
     )
 
 
@@ -135,16 +135,16 @@ def as_forcing(
     if noise is not None and noise_bound is None:
         raise ParameterError("noise needs a bound; give noise_bound too")
     sources, bounds, words = [], [], []
-    given = (("disturbance", disturbance, "delta", delta), ("noise", noise, "noise_bound", noise_bound))
+    signals = (("disturbance", disturbance, "delta", delta), ("noise", noise, "noise_bound", noise_bound))
     # Telegraph signals of the two differ by their seeds.
-    for seed, (name, value, bound_name, bound) in enumerate(given):
+    for seed, (name, value, bound_name, bound) in enumerate(signals):
         if value is None and bound is not None:
             raise ParameterError(f"{bound_name} is the bound of a {name}; give the {name} too, or leave it out")
         limit = parameter(bound_name, 0 if bound is None else bound, zero_allowed=True)
         source = as_disturbance("none" if value is None else value, graph.n_nodes, limit, until, seed)
         if not isinstance(source, ExpressionDisturbance | SampledDisturbance):
-            taken = "the nominal protocol takes expressions of k and t, numbers and samples"
-            raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {taken}")
+            domain = "the nominal protocol takes expressions of k and t, numbers and samples"
+            raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {domain}")
         source.check(limit, graph.labels, until)
         if source.breaks(until).size > MAX_JUMPS:
             raise ParameterError(f"{name} has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
@@ -158,19 +158,21 @@ def as_forcing(
     return Forcing(sources[0], sources[1], ", ".join(words), size, noisy=bounds[1] > 0)
 
 
-def _sampled(graph: SignedDigraph, periods: Periods, state: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
+def _sample_and_hold(
+    graph: SignedDigraph, periods: Periods, state: np.ndarray, t: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Return the (M, N, S) states and held inputs of ``X_(j+1) = X_j - step_j L X_j``, linear in between."""
     L = graph.laplacian() if graph.n_nodes > _DENSE_UP_TO else graph.laplacian().toarray()
     index, share = periods.locate(t)
-    states, held = np.empty((2, t.size, *state.shape))
+    states, inputs = np.empty((2, t.size, *state.shape))
     edges = np.searchsorted(index, np.arange(index[-1] + 2))
     with np.errstate(over="ignore", invalid="ignore"):
         for j, (first, last) in enumerate(pairwise(edges.tolist())):
             pull = L @ state
             if first < last:
                 states[first:last] = state - np.multiply.outer(periods.steps[j] * share[first:last], pull)
-                held[first:last] = -periods.gains[j] * pull
+                inputs[first:last] = -periods.gains[j] * pull
             state = state - periods.steps[j] * pull
     if not np.isfinite(states).all():
         raise SimulationError("the sampled run grows beyond the range of floats; take a shorter sample_period")
-    return states, held
+    return states, inputs

@@ -68,9 +68,9 @@ def simulate(
     protocol : Protocol
         With ``rho2 = 0`` the run is on the plain clock ``t``, without a deadline.
     x0 : (N,) or (N, S) array of numbers, mapping by label, pandas Series or DataFrame
-        The start in the order of ``graph.labels``, or by label where there are labels; S columns are S starts, or the
-        S components of vector-valued agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode:
-        one column.
+        The initial state in the order of ``graph.labels``, or by label where there are labels; S columns are S initial
+        states, or the S components of vector-valued agents: the protocol acts as ``L kron I_S``, so both evolve alike.
+        Sliding mode: one column.
     sigma0 : (N,) array of numbers, mapping by label or pandas Series, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
@@ -136,9 +136,9 @@ def simulate(
     >>> run.final_state.round(9), bool((run.reaching_times < 1).all())
     (array([ 0.5, -0.5]), True)
     """
-    began = time.perf_counter()
+    begin = time.perf_counter()
     x0, sigma0 = in_node_order(x0, graph), in_node_order(sigma0, graph, "sigma0")
-    start, tolerances = _start(graph, x0), Tolerances(rtol, atol)
+    initial_states, tolerances = _read_initial_state(graph, x0), Tolerances(rtol, atol)
     tolerances.check()
     other, foreign = "sliding-mode", {"sigma0": sigma0, "boundary_layer": boundary_layer}
     if protocol.reaching is not None:
@@ -157,22 +157,22 @@ def simulate(
     else:
         instants = wanted_instants(protocol, times)
     until = float(instants.t[-1])
-    begin = start[:, 0] if np.ndim(x0) == 1 else start
+    initial_state = initial_states[:, 0] if np.ndim(x0) == 1 else initial_states
     with interruptible():
         if (sliding := protocol.reaching) is not None:
             source = "worst-case" if disturbance is None else disturbance
-            met = as_disturbance(source, graph.n_nodes, sliding.delta, until)
-            manifold = np.zeros(graph.n_nodes) if sigma0 is None else _start(graph, sigma0, "sigma0")[:, 0]
+            signal = as_disturbance(source, graph.n_nodes, sliding.delta, until)
+            manifold = np.zeros(graph.n_nodes) if sigma0 is None else _read_initial_state(graph, sigma0, "sigma0")[:, 0]
             run: Trajectory = simulate_sliding(
-                graph, sliding, begin, manifold, met, instants, tolerances, boundary_layer
+                graph, sliding, initial_state, manifold, signal, instants, tolerances, boundary_layer
             )
         else:
             forcing = as_forcing(graph, protocol.T, disturbance, delta, noise, noise_bound, until)
-            run = simulate_nominal(graph, protocol, begin, instants, actuator, forcing, tolerances)
-    return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - began})
+            run = simulate_nominal(graph, protocol, initial_state, instants, actuator, forcing, tolerances)
+    return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - begin})
 
 
-def _start(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:
+def _read_initial_state(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:
     """Return the initial state as an (N, S) float array."""
     try:
         array = np.asarray(x0)

@@ -39,7 +39,7 @@ class Trajectory(Shown):
     states : (N, M) or (N, S, M) array
         ``X``, or S columns of states.
     rtol, atol : float
-        The integrator's tolerances; ``atol`` is relative to the largest entry of each starting column.
+        The integrator's tolerances; ``atol`` is relative to the largest entry of each initial state.
     deadline_index : int or None
         Which instant is ``T``; None if none is, or if there is no deadline.
     deadline_residual : float or None
@@ -53,7 +53,7 @@ class Trajectory(Shown):
     forcing : str or None
         Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
     held_input : (N, M) or (N, S, M) array or None
-        The input held at the instants, if the actuator samples.
+        The input under zero-order hold, if the actuator samples.
 
     References
     ----------
@@ -135,7 +135,7 @@ class Trajectory(Shown):
     def input(self) -> np.ndarray:
         """``u = gain E``, of the shape of ``states``; the gain is ``rho1`` from ``T`` on.
 
-        Behind an actuator with the gain that acts, or as it is held. Measurement noise is left out.
+        Behind an actuator with the gain that acts, or its zero-order hold. Measurement noise is left out.
         """
         if self.held_input is not None:
             return self.held_input
@@ -290,15 +290,15 @@ class SlidingTrajectory(Trajectory):
         what the switching does, which keeps it there.
         """
         if self.boundary_layer is not None:
-            return self._driven(np.tanh(self.sigma / self.boundary_layer))
+            return self._add_reaching_terms(np.tanh(self.sigma / self.boundary_layer))
         return np.where(self.sigma != 0, self.switching_input, super().input - self.disturbance)
 
     @property
     def switching_input(self) -> np.ndarray:
         """(N, M) array: ``u`` of (48) to the letter, with ``sign(0) = 0``; while sliding it jumps by up to ``mu1``."""
-        return self._driven(np.sign(self.sigma))
+        return self._add_reaching_terms(np.sign(self.sigma))
 
-    def _driven(self, sign: np.ndarray) -> np.ndarray:
+    def _add_reaching_terms(self, sign: np.ndarray) -> np.ndarray:
         gain = self.protocol.reaching_gain.value_at_remaining(self.reaching_remaining)
         return super().input - float(self.protocol.mu1) * sign - gain * self.sigma
 

@@ -1,4 +1,4 @@
-"""Facts about disturbances: the grammar of their expressions, the bound on a horizon, samples, and the adversary."""
+"""Facts about disturbances: the grammar of their expressions, the bound on a horizon, samples, and the worst case."""
 
 import itertools
 import math
@@ -532,7 +532,7 @@ def test_absurd_telegraph_signals_are_refused(arguments, message):
         telegraph_noise(*arguments)
 
 
-# ---------------------------------------------------------------------- adversary and state
+# ---------------------------------------------------------------------- worst case and state
 
 
 def test_the_worst_case_pushes_away_from_sliding():

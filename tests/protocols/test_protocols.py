@@ -134,7 +134,7 @@ def test_v_dot_of_proposition_1_is_below_its_bounding_form():
         t = float(rng.uniform(0, 1))
         v_dot, bound = both(t, x, v, rng.uniform(-1, 1, 3))
         assert float(v_dot) <= float(bound) + 1e-9 * abs(float(bound))
-        v_dot, bound = both(t, x, v, np.sign(x + v))  # the adversary attains it
+        v_dot, bound = both(t, x, v, np.sign(x + v))  # the worst case attains it
         assert float(v_dot) == pytest.approx(float(bound))
 
 

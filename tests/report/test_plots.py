@@ -471,6 +471,15 @@ def test_the_energy_is_that_of_the_closed_form_or_refused(gains: tuple[float, ..
     assert np.asarray(spent)[-1] == pytest.approx(quad(power, 0, T, limit=500)[0], rel=5e-3)
 
 
+@pytest.mark.parametrize("size", [1e300, 1e154])
+@pytest.mark.parametrize("actuator", [None, Actuator(gain_cap=50), Actuator(sample_period="0.05")])
+def test_an_energy_beyond_floats_is_refused_without_a_warning(size: float, actuator: Actuator | None) -> None:
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    run = simulate(pair, PROTOCOL, [size, 0], actuator=actuator)
+    with pytest.raises(ValueError, match="the energy is beyond the range of floats"):
+        plot_effort(run)
+
+
 def test_no_certified_line_for_a_run_from_elsewhere() -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     cert = certify(pair, PROTOCOL, [3, 5], simulation=False)

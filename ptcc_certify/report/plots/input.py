@@ -96,8 +96,8 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
     Raises
     ------
     ValueError
-        The trajectory holds several initial states, its samples do not settle the energy, or the certificate is of
-        another graph, protocol or initial state.
+        The trajectory holds several initial states, the energy is beyond the range of floats or not settled by the
+        samples, or the certificate is of another graph, protocol or initial state.
 
     Examples
     --------
@@ -147,14 +147,19 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
     Raises
     ------
     ValueError
-        With every second sample it would differ by more than a hundredth.
+        It is beyond the range of floats, or with every second sample it would differ by more than a hundredth.
     """
-    power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
-    if trajectory.held_input is not None:
-        return np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(trajectory.t))])
     T, t, remaining = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
-    full = (trajectory.input**2).sum(axis=0)
-    every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+        power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
+        if trajectory.held_input is not None:
+            every = np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(t))])
+            some = every[::2]
+        else:
+            full = (trajectory.input**2).sum(axis=0)
+            every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
+    if not np.isfinite(every).all():
+        raise ValueError("the energy is beyond the range of floats; scale the initial state down")
     if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
         raise ValueError("these samples do not settle the energy: simulate with more, unless it is infinite")
     return every
