@@ -315,7 +315,10 @@ class ReachingProblem:
         def excess(z: float) -> float:
             return float(self._integrals(self._edges[[panel]], np.array([z]), [row])[0, 0] - rest)
 
-        return float(brentq(excess, start, end, xtol=1e-300, rtol=1e-15)) if excess(end) > 0 else float(end)
+        if excess(end) <= 0:
+            return float(end)
+        # Down to the smallest floats, which halving the bracket takes 1,100 steps to reach.
+        return float(brentq(excess, start, end, xtol=1e-300, rtol=1e-15, maxiter=3000))
 
     def _weight(self, z: np.ndarray | float) -> np.ndarray:
         """Return ``dt/psi``, per unit of ``z``."""

@@ -287,4 +287,4 @@ def _root(dense: Any, row: int, sign: float, low: float, high: float) -> float:
 
     if size(high) > 0:
         return math.inf
-    return low if size(low) <= 0 else float(brentq(size, low, high, xtol=1e-300, rtol=4e-16 * 4))
+    return low if size(low) <= 0 else float(brentq(size, low, high, xtol=1e-300, rtol=4e-16 * 4, maxiter=3000))
