@@ -27,8 +27,8 @@ class ArrayDigraph(Digraph):
         """The edges that leave every node; see :attr:`Digraph.out`."""
         leaving = np.argsort(np.asarray(self.source), kind="stable")
         ends, which = (array("q", np.asarray(part)[leaving].tobytes()) for part in (self.target, self.which))
-        starts = np.bincount(np.asarray(self.source), minlength=self.n).cumsum().tolist()
-        return [0, *starts], ends, which
+        offsets = np.bincount(np.asarray(self.source), minlength=self.n).cumsum().tolist()
+        return [0, *offsets], ends, which
 
     def _added(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
         total: Any = np.zeros(self.n, dtype=object)

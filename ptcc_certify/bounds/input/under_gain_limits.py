@@ -75,7 +75,7 @@ class LimitedBounds:
         growth = step_growth(bounds, k) if held else Fraction(0)
         if growth is None:
             return None
-        left = bounds.share(k, limits, clock, growth) * bounds.start(k)
+        left = bounds.share(k, limits, clock, growth) * bounds.initial_root(k)
         norm = kept(bounds.root_constant(k, None) * left)
         if held and norm > self.first:
             return None
@@ -84,7 +84,7 @@ class LimitedBounds:
         if self.cap is not None and not held:
             sizes = [min(x, self.cap) for x in sizes]
         peak = [] if self.peak is None else [self.peak.largest]
-        largest = None if held else kept(min([top * max(bounds.held), *peak]))
+        largest = None if held else kept(min([top * max(bounds.error_bounds), *peak]))
         return Limited(limits, clock, k, growth, norm, None if known is None else tuple(map(kept, sizes)), largest)
 
     def _noisy(self, k: int, found: Limited, top: Fraction) -> Limited:
