@@ -171,9 +171,9 @@ class Digraph:
         values, bits = self.values if signed else [abs(w) for w in self.values], longest(x)
         sized(self.n, self.bits + bits)
         spend(self.n_edges, self.bits, bits, "sums over edges")
-        return self._added(of, to, values, x)
+        return self._add_over_edges(of, to, values, x)
 
-    def _added(self, of: array[int], to: array[int], values: Sequence[int], x: Sequence[int]) -> list[int]:
+    def _add_over_edges(self, of: array[int], to: array[int], values: Sequence[int], x: Sequence[int]) -> list[int]:
         total = [0] * self.n
         for j, y in zip(to, map(mul, map(values.__getitem__, self.which), map(x.__getitem__, of)), strict=True):
             total[j] += y

@@ -301,8 +301,8 @@ def _followers(
     # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
     share = least * grid
     room = math.floor(spare * (share * fine))
-    for v, told, weight in zip(F, radii, final.scaled_u, strict=True):
-        _narrow(graph.labels[v], 0, worst * fine * weight, share * told, room)
+    for v, radius, weight in zip(F, radii, final.scaled_u, strict=True):
+        _narrow(graph.labels[v], 0, worst * fine * weight, share * radius, room)
     return Fraction(worst * max(final.scaled_u, default=0), share)
 
 

@@ -316,10 +316,12 @@ def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
 def _residual(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify what is left under each of the limits."""
     for k, entry in enumerate(section["residual"]):
-        _limited(doc, verified, f"input.residual[{k}]", entry, section["peak"], bounds)
+        _under_limits(doc, verified, f"input.residual[{k}]", entry, section["peak"], bounds)
 
 
-def _limited(doc: Document, verified: Verified, of: str, entry: Any, peak: Any, bounds: formulas.InputBounds) -> None:
+def _under_limits(
+    doc: Document, verified: Verified, of: str, entry: Any, peak: Any, bounds: formulas.InputBounds
+) -> None:
     """Verify what is left at the deadline under limits of the gain, and the largest input."""
     doc.at = of
     fields(entry, LIMIT_KEYS, of)
@@ -389,7 +391,7 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
-def _disturbed(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _disturbance(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
     need(not verified.protocol.sliding, "the sliding-mode protocol has its own claims")
     section = fields(section["disturbed"], ("delta", "inputs", "drift"), "disturbed")
@@ -406,4 +408,10 @@ def _disturbed(doc: Document, verified: Verified, section: Any, bounds: formulas
 
 
 #: What is verified of initial states, by key, in the order of the proof.
-PARTS = {"peak": _peak, "energy": _energy, "path_length": _path_length, "residual": _residual, "disturbed": _disturbed}
+PARTS = {
+    "peak": _peak,
+    "energy": _energy,
+    "path_length": _path_length,
+    "residual": _residual,
+    "disturbed": _disturbance,
+}

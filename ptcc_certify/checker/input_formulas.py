@@ -550,7 +550,7 @@ class InputBounds:
         entries = root_above(form.value([initial_set.largest(row) for row in rows], sizes=True))
         return min(entries, middle + root_above(excess))
 
-    def _reached(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
+    def _pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
         """Bound ``sqrt(V)`` in pieces of the time up to ``z``, while sliding variables move.
 
         From ``z`` on ``sqrt(V)`` is at most the number that is returned besides, times ``e^(-rate s / 2)``.
@@ -626,7 +626,7 @@ class InputBounds:
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
             return of(self.gain, error_bound, c * self.initial_root(k), rate, z)
-        pieces, begin = self._reached(k, z)
+        pieces, begin = self._pieces(k, z)
         late = of(self.gain, Fraction(0), c * begin, rate, z)
         if of is peak_above:  # gain e^(-rate s / 2) does not grow
             most = max(p.first * p.root + p.last * p.added for p in pieces)
