@@ -84,7 +84,7 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         there.close()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while True:
-            kind, value = _received(here)
+            kind, value = _receive(here)
             if kind == _END:
                 return
             if kind == _ERROR:
@@ -126,7 +126,7 @@ def _portable(error: BaseException) -> BaseException:
         return LMIError(f"{type(error).__name__}: {error}")
 
 
-def _received(here: Connection) -> Any:
+def _receive(here: Connection) -> Any:
     """Return what the child sent, as soon as it comes before the time limit."""
     checkpoint()
     while not here.poll(min(seconds_left(), 3600.0)):

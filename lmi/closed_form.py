@@ -124,8 +124,8 @@ def m_matrix_certificate(
 
     Examples
     --------
-    >>> found = m_matrix_certificate([[2.0, -1.0], [-4.0, 2.0 + 3.0]])
-    >>> round(found.rate, 9), round(found.upper, 9), found.omega.round(9).tolist()
+    >>> certificate = m_matrix_certificate([[2.0, -1.0], [-4.0, 2.0 + 3.0]])
+    >>> round(certificate.rate, 9), round(certificate.upper, 9), certificate.omega.round(9).tolist()
     (2.0, 2.0, [1.0, 0.25])
     >>> m_matrix_certificate([[1.0, 0.0], [-3.0, 1.0]], max_condition=100).rate > 1.39
     True
@@ -142,7 +142,7 @@ class _ClosedForm:
         self._right, self._left = _Components(self.A), _Components(self.A.T)
         self._low = max(self._right.smallest(), self._left.smallest())
         self._upper = 2 * float(min(self._right.high.min(), self._left.high.min()))
-        self._log_u, self._log_v = _checked(self.A, u, "A u", "u"), _checked(self.A.T, v, "A' v", "v")
+        self._log_u, self._log_v = _check(self.A, u, "A u", "u"), _check(self.A.T, v, "A' v", "v")
         self._at = cache(self._certificate)
 
     def _certificate(self, loss: float) -> DiagonalCertificate:
@@ -163,10 +163,10 @@ class _ClosedForm:
         if best.log_condition <= limit:
             return best
         if self._log_u is None and self._log_v is None:
-            shrunk = [_shrunk(self.A, self._at(loss), limit) for loss in LOSSES]
+            candidates = [_shrink(self.A, self._at(loss), limit) for loss in LOSSES]
             if self.A.shape[0] > FEW_ROWS:
-                shrunk = sorted(shrunk, key=lambda one: one.rate)[-MOST_TIGHTENED:]
-            best = max((_tightened(self.A, one) for one in shrunk), key=lambda one: one.rate)
+                candidates = sorted(candidates, key=lambda one: one.rate)[-MOST_TIGHTENED:]
+            best = max((_tighten(self.A, one) for one in candidates), key=lambda one: one.rate)
         if best.log_condition > limit or best.rate <= 0:
             raise NoCertificate(f"no positive rate was found with a condition of at most {max_condition:.6g}")
         return best
@@ -207,8 +207,8 @@ def h_matrix_certificate(A: Any, *, max_condition: float | None = None) -> Diago
 
     Examples
     --------
-    >>> found = h_matrix_certificate([[2.0, 1.0], [-1.0, 2.0]])
-    >>> round(found.rate, 9), found.omega.round(9).tolist()
+    >>> certificate = h_matrix_certificate([[2.0, 1.0], [-1.0, 2.0]])
+    >>> round(certificate.rate, 9), certificate.omega.round(9).tolist()
     (4.0, [1.0, 1.0])
     """
     return next(h_matrix_frontier(A, [max_condition]))
@@ -251,9 +251,9 @@ def h_matrix_frontier(A: Any, conditions: Sequence[float | None]) -> Iterator[Di
     try:
         closed = _ClosedForm(_comparison(A))
         for max_condition in conditions:
-            found = closed.best(max_condition)
-            rate = max(found.rate, _tight_rate(A, found.log_omega)) if A.shape[0] <= DENSE_ROWS else found.rate
-            yield DiagonalCertificate(found.log_omega, rate, witness=found.witness)
+            best = closed.best(max_condition)
+            rate = max(best.rate, _tight_rate(A, best.log_omega)) if A.shape[0] <= DENSE_ROWS else best.rate
+            yield DiagonalCertificate(best.log_omega, rate, witness=best.witness)
     except NotAnMMatrix as error:
         raise NotAnHMatrix(f"M(A) is not a nonsingular M-matrix: {error}") from None
 
@@ -297,8 +297,8 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
 
     Examples
     --------
-    >>> found = perron_certificate([[3.0, 3.0], [-1.0, 1.0]])
-    >>> round(found.rate, 9), found.omega.round(9).tolist()
+    >>> certificate = perron_certificate([[3.0, 3.0], [-1.0, 1.0]])
+    >>> round(certificate.rate, 9), certificate.omega.round(9).tolist()
     (2.0, [0.333333333, 1.0])
     """
     A = sparse_square(A)
@@ -374,7 +374,7 @@ class _Components:
         size = np.bincount(label)
         self.order = np.lexsort((label, size[label] > 1, level[label]))
         label = label[self.order]
-        self.start = np.flatnonzero(np.diff(label, prepend=-1))
+        self.offsets = np.flatnonzero(np.diff(label, prepend=-1))
         self.part = np.cumsum(np.diff(label, prepend=label[0]) != 0)
         entries = sparse.csr_array(A)[self.order][:, self.order].tocoo()
         inside = self.part[entries.row] == self.part[entries.col]
@@ -389,7 +389,7 @@ class _Components:
         self.levels = [
             (a, a + int(np.count_nonzero(~large[a:b])), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True)
         ]
-        self.least = np.minimum.reduceat(self.diagonal, self.start)
+        self.least = np.minimum.reduceat(self.diagonal, self.offsets)
         self._perron(singular)
         self.log_perron = np.empty(len(label))
         self.log_perron[self.order] = self._log_r
@@ -400,11 +400,11 @@ class _Components:
         ``(A - t I) y = r`` with ``t`` just below ``min (A r)_i / r_i``, which rises to ``lambda_min``: it converges
         quadratically from any ``r > 0``. In the scaled unknown ``y / r`` no entry under- or overflows.
         """
-        start, part = self.start, self.part
+        offsets, part = self.offsets, self.part
         self._log_r = np.zeros(len(part))
         self.low, self.high = self._bounds(self._log_r)
-        unit, distance = np.maximum.reduceat(self.diagonal, start), 1e-14
-        active = np.diff(start, append=len(part)) > 1
+        unit, distance = np.maximum.reduceat(self.diagonal, offsets), 1e-14
+        active = np.diff(offsets, append=len(part)) > 1
         for _ in range(200):
             rows = np.flatnonzero(active[part])
             if rows.size == 0:
@@ -423,9 +423,9 @@ class _Components:
             log_r = self._log_r.copy()
             with np.errstate(invalid="ignore", divide="ignore"):
                 log_r[rows] += np.log(z)
-            good = active & np.logical_and.reduceat(np.isfinite(log_r), start)
+            good = active & np.logical_and.reduceat(np.isfinite(log_r), offsets)
             log_r = np.where(good[part], log_r, self._log_r)
-            log_r -= np.maximum.reduceat(log_r, start)[part]
+            log_r -= np.maximum.reduceat(log_r, offsets)[part]
             low, high = self._bounds(log_r)
             better = good & (high - low < gap)
             self._log_r = np.where(better[part], log_r, self._log_r)
@@ -439,14 +439,14 @@ class _Components:
 
     def _bounds(self, log_r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         ratio, error = _ratios(self.blocks, log_r)
-        high = np.minimum(np.maximum.reduceat(ratio + error, self.start), self.least)
-        return np.minimum.reduceat(ratio - error, self.start), high
+        high = np.minimum(np.maximum.reduceat(ratio + error, self.offsets), self.least)
+        return np.minimum.reduceat(ratio - error, self.offsets), high
 
     def smallest(self) -> float:
         """Return a positive lower bound of ``lambda_min``, or refuse the matrix."""
         k = int(self.low.argmin())
         if not self.low[k] > 0:
-            row = int(self.order[self.start[k]])
+            row = int(self.order[self.offsets[k]])
             raise NotAnMMatrix(
                 f"the smallest eigenvalue of the strong component of row {row} was not confirmed to be positive"
             )
@@ -470,8 +470,8 @@ class _Components:
                 log_u[a:m] = np.maximum(0.0, log_c[: m - a] - np.log(self.diagonal[a:m] - t))
                 if m < b:
                     for k in range(self.part[m], self.part[b - 1] + 1):
-                        first = self.start[k]
-                        last = self.start[k + 1] if k + 1 < len(self.start) else len(log_u)
+                        first = self.offsets[k]
+                        last = self.offsets[k + 1] if k + 1 < len(self.offsets) else len(log_u)
                         log_u[first:last] = self._block_witness(k, slice(first, last), t, log_c[first - a : last - a])
         result = np.empty_like(log_u)
         result[self.order] = log_u
@@ -506,9 +506,9 @@ def _ratios(A: sparse.csr_array, log_u: np.ndarray, blur: float = 0.0) -> tuple[
     apart = log_u[columns] - log_u[rows]
     with np.errstate(over="ignore", invalid="ignore"):
         terms = -entries.data[away] * np.exp(apart)
-        total, spread = np.bincount(rows, terms, n), np.bincount(rows, terms * np.abs(apart), n)
+        total, moment = np.bincount(rows, terms, n), np.bincount(rows, terms * np.abs(apart), n)
         size = np.abs(diagonal) + total
-        return diagonal - total, EPS * ((np.bincount(rows, minlength=n) + 4 + blur) * size + spread)
+        return diagonal - total, EPS * ((np.bincount(rows, minlength=n) + 4 + blur) * size + moment)
 
 
 def _from_witness(A: sparse.csr_array, log_u: np.ndarray, log_v: np.ndarray, upper: float) -> DiagonalCertificate:
@@ -521,26 +521,26 @@ def _from_witness(A: sparse.csr_array, log_u: np.ndarray, log_v: np.ndarray, upp
     return DiagonalCertificate(log_omega, rate, upper, (log_u, log_v))
 
 
-def _shrunk(A: sparse.csr_array, found: DiagonalCertificate, limit: float) -> DiagonalCertificate:
+def _shrink(A: sparse.csr_array, certificate: DiagonalCertificate, limit: float) -> DiagonalCertificate:
     """Take the witness to the power at which ``log(cond(Omega)) <= limit``."""
-    if found.log_condition <= limit or found.witness is None:
-        return found
-    power = limit / found.log_condition * (1 - 1e-12)
-    log_u, log_v = found.witness
-    return _from_witness(A, power * log_u, power * log_v, found.upper)
+    if certificate.log_condition <= limit or certificate.witness is None:
+        return certificate
+    power = limit / certificate.log_condition * (1 - 1e-12)
+    log_u, log_v = certificate.witness
+    return _from_witness(A, power * log_u, power * log_v, certificate.upper)
 
 
-def _tightened(A: sparse.csr_array, found: DiagonalCertificate) -> DiagonalCertificate:
+def _tighten(A: sparse.csr_array, certificate: DiagonalCertificate) -> DiagonalCertificate:
     """Replace the witness by the best one of the same ``Omega``: ``b`` is then its tight rate.
 
     That is ``Omega^-1/2 y``, ``Omega^1/2 y`` with the Perron vectors ``y`` of the symmetric Z-matrix ``B + B'``.
     """
     if A.shape[0] > DENSE_ROWS:
-        return found
-    B = _similar(A, -found.log_omega / 2)
+        return certificate
+    B = _similar(A, -certificate.log_omega / 2)
     log_y = _Components(sparse.csr_array(B + B.T), singular=True).log_perron
-    half = found.log_omega / 2
-    return max(found, _from_witness(A, log_y - half, log_y + half, found.upper), key=lambda one: one.rate)
+    half = certificate.log_omega / 2
+    return max(certificate, _from_witness(A, log_y - half, log_y + half, certificate.upper), key=lambda one: one.rate)
 
 
 def _tight_rate(A: sparse.csr_array, log_omega: np.ndarray) -> float:
@@ -556,12 +556,12 @@ def _tight_rate(A: sparse.csr_array, log_omega: np.ndarray) -> float:
     if n <= DENSE_ROWS:
         values = np.linalg.eigvalsh(S.toarray())
         return float(values[0]) - n * EPS * float(np.abs(values).max())
-    start = np.ones(n)
+    initial_vector = np.ones(n)
     try:
-        _, x = eigsh(S, k=1, which="SA", v0=start, ncv=60, maxiter=500, tol=1e-9)
+        _, x = eigsh(S, k=1, which="SA", v0=initial_vector, ncv=60, maxiter=500, tol=1e-9)
     except ArpackError:
         below = -1e-6 * float(S.diagonal().min())
-        _, x = eigsh(S, k=1, sigma=below, v0=start)
+        _, x = eigsh(S, k=1, sigma=below, v0=initial_vector)
     x = x[:, 0] / np.linalg.norm(x)
     value = float(x @ (S @ x))
     return value - float(np.linalg.norm(S @ x - value * x))
@@ -600,7 +600,7 @@ def _similar(A: sparse.csr_array, log_u: np.ndarray) -> sparse.csr_array:
     return sparse.csr_array((np.sign(entries.data) * size, (entries.row, entries.col)), shape=A.shape)
 
 
-def _checked(A: sparse.csr_array, u: Any, product: str, name: str) -> np.ndarray | None:
+def _check(A: sparse.csr_array, u: Any, product: str, name: str) -> np.ndarray | None:
     """Return ``log u`` of a given witness, or refuse it."""
     if u is None:
         return None

@@ -162,8 +162,8 @@ def prove_positive_definite(S: Any) -> DefinitenessProof:
     rows, shift, scale = _integers(S)
     n = len(rows)
     if n > RESIDUAL_ROWS or _long(rows):
-        if (found := fast.factor(rows)) is not None:
-            R, exponents = found
+        if (factors := fast.factor(rows)) is not None:
+            R, exponents = factors
             witness = ResidualWitness(R, exponents + np.array(shift, dtype=np.int64), fast.FACTOR_BITS, scale)
             return DefinitenessProof(True, n, witness=witness)
         if n > ELIMINATION_ROWS and (x := _refuting_direction(rows)) is not None:
@@ -250,8 +250,8 @@ def _integers(S: Any) -> tuple[Any, list[int], int]:
     shift = [-((abs(row[i]).bit_length() - 1) // 2) for i, row in enumerate(whole)]
     pairs = [[(x, a + b) for x, b in zip(row, shift, strict=True)] for row, a in zip(whole, shift, strict=True)]
     power = max(0, -min((place + (x & -x).bit_length() - 1 for row in pairs for x, place in row if x), default=0))
-    moved = [[x << p + power if p + power >= 0 else x >> -p - power for x, p in row] for row in pairs]
-    return moved, shift, scale << power
+    shifted = [[x << p + power if p + power >= 0 else x >> -p - power for x, p in row] for row in pairs]
+    return shifted, shift, scale << power
 
 
 def _array_integers(S: np.ndarray) -> tuple[np.ndarray, list[int], int]:
@@ -454,8 +454,8 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     (a, unit), (y, _), ((bound,),) = integers(_fractions(A)), integers(_fractions(Y)), _fractions([[rate]])
     sizes = [sum(map(mul, row, row)) for row in y]
     columns = list(zip(*y, strict=True))
-    moved = [
+    forms = [
         sum(x * sum(map(mul, row, column)) for x, column in zip(own, columns, strict=True))
         for row, own in zip(a, y, strict=True)
     ]
-    return any(sizes) and all(2 * m <= bound * unit * size for m, size in zip(moved, sizes, strict=True))
+    return any(sizes) and all(2 * m <= bound * unit * size for m, size in zip(forms, sizes, strict=True))

@@ -110,8 +110,8 @@ def diagonal_lyapunov(
 
     Examples
     --------
-    >>> found = diagonal_lyapunov([[2.0, -1.0], [-1.0, 2.0]])
-    >>> round(found.rate, 6), found.omega.round(6)
+    >>> certificate = diagonal_lyapunov([[2.0, -1.0], [-1.0, 2.0]])
+    >>> round(certificate.rate, 6), certificate.omega.round(6)
     (2.0, array([1., 1.]))
     >>> fast = diagonal_lyapunov([[1.0, 2.0], [-1.0, 3.0]], objective="rate")
     >>> slow = diagonal_lyapunov([[1.0, 2.0], [-1.0, 3.0]])
@@ -134,10 +134,10 @@ def diagonal_lyapunov(
         raise LMIError('solver "sdpa" needs the package sdpa-python: pip install sdpa-python')
     max_condition = None if max_condition == math.inf else max_condition
     if rate:
-        known = None if start is None else np.asarray(start, dtype=float)
-        if known is not None and not (known.shape == (n,) and np.isfinite(known).all()):
+        diagonal = None if start is None else np.asarray(start, dtype=float)
+        if diagonal is not None and not (diagonal.shape == (n,) and np.isfinite(diagonal).all()):
             raise MatrixError(f"start is not a finite vector of {n} entries")
-        return _RateSearch(A, _basis(basis, n), tolerance, max_condition).optimum(known)
+        return _RateSearch(A, _basis(basis, n), tolerance, max_condition).optimum(diagonal)
     if n == 1 or max_condition == 1:
         return _margin_certificate(A, np.ones(n))
     scale, least = largest_entry(A), 0.0 if max_condition is None else 1 / max_condition
@@ -161,20 +161,20 @@ class _RateSearch:
     tolerance: float
     max_condition: float | None = None
 
-    def optimum(self, known: np.ndarray | None) -> DiagonalCertificate:
+    def optimum(self, diagonal: np.ndarray | None) -> DiagonalCertificate:
         """Search block by block where the matrix is reducible, otherwise at once.
 
-        ``known`` is a diagonal from which to climb besides, within a largest condition.
+        ``diagonal`` is one from which to climb besides, within a largest condition.
         """
         A, parts = self.A, irreducible_blocks(self.A)
         if self.max_condition is not None:
-            if known is None and len(parts) > 1:
+            if diagonal is None and len(parts) > 1:
                 with contextlib.suppress(NoCertificate):
-                    known = replace(self, max_condition=None).optimum(None).log_omega
-            _, found = self.climb(known)
-            if not found.rate > _rounding(A, found.log_omega):
-                raise NoCertificate(f"the best rate found at condition {self.max_condition:.3g} is {found.rate:.3g}")
-            return found
+                    diagonal = replace(self, max_condition=None).optimum(None).log_omega
+            _, best = self.climb(diagonal)
+            if not best.rate > _rounding(A, best.log_omega):
+                raise NoCertificate(f"the best rate found at condition {self.max_condition:.3g} is {best.rate:.3g}")
+            return best
         blocks = []
         for part in parts:
             own = None if self.basis is None else block_columns(self.basis, part)
@@ -193,8 +193,8 @@ class _RateSearch:
             witness = (np.zeros((len(A), limit.witness[0].shape[1])),)
             witness[0][part] = limit.witness[0]
         log_omega = np.zeros(len(A))
-        for part, found in blocks:
-            log_omega[part] = found.log_omega
+        for part, best in blocks:
+            log_omega[part] = best.log_omega
         coupled = couple_blocks(A, parts, log_omega, worst.rate * (1 - COUPLING_LOSS), self.basis)
         return DiagonalCertificate(coupled, diagonal_rate(A, coupled, self.basis), limit.upper, witness)
 
@@ -206,24 +206,24 @@ class _RateSearch:
             return DiagonalCertificate(np.zeros(1), rate, rate, (np.ones((1, 1)),))
         if len(A) == 2 and self.basis is None:
             return _two_rows(A)
-        frame, found = self.climb()
-        if not found.rate > 0:
-            return found
+        frame, best = self.climb()
+        if not best.rate > 0:
+            return best
         # The dual lives in other scales than the primal: frames and tolerances are tried until one shows the optimum.
         finer = self.tolerance / 100
-        attempts = [(frame, self.tolerance), (_balanced(A), finer), (frame, finer), (found.log_omega, finer)]
+        attempts = [(frame, self.tolerance), (_balance(A), finer), (frame, finer), (best.log_omega, finer)]
         for excess in (2e-6, 2e-5, 2e-4, 2e-3, 2e-2):
             for log_omega, accuracy in attempts:
-                for Y in self.dual_factors(log_omega, found.rate * (1 + excess), accuracy):
-                    if (upper := diagonal_rate_limit(A, Y)) < found.upper:
-                        found = replace(found, upper=max(upper, found.rate), witness=(Y,))
-                if found.gap <= 1.5 * excess:
-                    return found
-        return found
+                for Y in self.dual_factors(log_omega, best.rate * (1 + excess), accuracy):
+                    if (upper := diagonal_rate_limit(A, Y)) < best.upper:
+                        best = replace(best, upper=max(upper, best.rate), witness=(Y,))
+                if best.gap <= 1.5 * excess:
+                    return best
+        return best
 
-    def climb(self, known: np.ndarray | None = None, steps: int = 40) -> tuple[np.ndarray, DiagonalCertificate]:
+    def climb(self, diagonal: np.ndarray | None = None, steps: int = 40) -> tuple[np.ndarray, DiagonalCertificate]:
         """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative."""
-        best = self.start(known)
+        best = self.best_candidate(diagonal)
         frame, least, tolerance = best.log_omega, 1e-7, self.tolerance
         # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
         if self.max_condition is not None and len(self.A) > _FINE_ROWS:
@@ -238,34 +238,34 @@ class _RateSearch:
             proposal -= proposal.max()
             if self.max_condition is not None:
                 proposal = np.maximum(proposal, -math.log(self.max_condition))
-            found = self.rated(proposal)
-            if found is None or not found.rate > best.rate + _rounding(self.A, proposal):
+            candidate = self.certify(proposal)
+            if candidate is None or not candidate.rate > best.rate + _rounding(self.A, proposal):
                 break
-            gained, best = found.rate - best.rate, found
-            if gained <= least * abs(best.rate):
+            gain, best = candidate.rate - best.rate, candidate
+            if gain <= least * abs(best.rate):
                 break
         return frame, best
 
-    def start(self, known: np.ndarray | None = None) -> DiagonalCertificate:
+    def best_candidate(self, diagonal: np.ndarray | None = None) -> DiagonalCertificate:
         """Return the best of the identity, a balanced scaling, the Perron vectors of ``M(A)`` and a known diagonal."""
-        candidates = [np.zeros(len(self.A)), _balanced(self.A), *([] if known is None else [known])]
+        candidates = [np.zeros(len(self.A)), _balance(self.A), *([] if diagonal is None else [diagonal])]
         with contextlib.suppress(LMIError, np.linalg.LinAlgError):
             log_u, log_v = perron_vectors(self.A)
             candidates.append(log_v - log_u)
-        fitted = [one for log in candidates if np.isfinite(log).all() for one in self.fitted(log - log.max())]
-        rated = [found for one in fitted if (found := self.rated(one)) is not None]
-        if not rated:
+        diagonals = [one for log in candidates if np.isfinite(log).all() for one in self.fit(log - log.max())]
+        certificates = [candidate for one in diagonals if (candidate := self.certify(one)) is not None]
+        if not certificates:
             raise NoCertificate("the entries lie too far apart for floating point")
-        return max(rated, key=lambda found: found.rate)
+        return max(certificates, key=lambda candidate: candidate.rate)
 
-    def fitted(self, log_omega: np.ndarray) -> list[np.ndarray]:
+    def fit(self, log_omega: np.ndarray) -> list[np.ndarray]:
         """Return the diagonal cut, and its power shrunk, to the largest condition."""
         limit = math.inf if self.max_condition is None else math.log(self.max_condition)
         if -log_omega.min() <= limit:
             return [log_omega]
         return [np.maximum(log_omega, -limit), log_omega * (limit / -log_omega.min())]
 
-    def rated(self, log_omega: np.ndarray) -> DiagonalCertificate | None:
+    def certify(self, log_omega: np.ndarray) -> DiagonalCertificate | None:
         """Return a diagonal with its rate; None where floating point ends."""
         with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
             rate = diagonal_rate(self.A, log_omega, self.basis)
@@ -290,10 +290,10 @@ class _RateSearch:
         if self.basis is not None:
             tail = np.linalg.qr((np.exp(frame / 2) / unit)[:, None] * self.basis)[0]
         C = unit[:, None] * B * unit - np.diag(current.rate / 2 * square_unit)
-        found = maximise_margin(C, weight / weight.max(), tail, tolerance, np.exp(frame), self.max_condition)
-        values, vectors = np.linalg.eigh((found.X + found.X.T) / 2)
+        optimum = maximise_margin(C, weight / weight.max(), tail, tolerance, np.exp(frame), self.max_condition)
+        values, vectors = np.linalg.eigh((optimum.X + optimum.X.T) / 2)
         factor = vectors * np.sqrt(np.maximum(values, 0.0))
-        return found.omega, unit, factor if tail is None else tail @ factor
+        return optimum.omega, unit, factor if tail is None else tail @ factor
 
     def dual_factors(self, frame: np.ndarray, b: float, tolerance: float) -> list[np.ndarray]:
         """Return matrices ``Y``, ``X = Y Y'`` of which may show that no diagonal rate exceeds ``b``; in original rows.
@@ -305,16 +305,16 @@ class _RateSearch:
         except NoCertificate:
             return []
         size = np.einsum("ij,ij->i", factor, factor)
-        found: list[np.ndarray] = []
+        factors: list[np.ndarray] = []
         for noise in (0.0, 1e-14, 1e-12, 1e-10, 1e-8) if self.basis is None else (0.0,):
-            kept = size > noise * size.max()
-            if found and kept.all():
+            rows = size > noise * size.max()
+            if factors and rows.all():
                 continue
-            Y = np.where(kept[:, None], (unit * np.exp(-frame / 2))[:, None] * factor, 0.0)
+            Y = np.where(rows[:, None], (unit * np.exp(-frame / 2))[:, None] * factor, 0.0)
             top = np.abs(Y).max(initial=0.0)
             if top > 0 and math.isfinite(top):
-                found.append(Y / top)
-        return found
+                factors.append(Y / top)
+        return factors
 
 
 def _two_rows(A: np.ndarray) -> DiagonalCertificate:
@@ -332,7 +332,7 @@ def _two_rows(A: np.ndarray) -> DiagonalCertificate:
     return DiagonalCertificate(log_omega, rate, max(diagonal_rate_limit(A, Y), rate), (Y,))
 
 
-def _balanced(A: np.ndarray) -> np.ndarray:
+def _balance(A: np.ndarray) -> np.ndarray:
     """Return ``log_omega`` with which the rows and columns of ``Omega^1/2 A Omega^-1/2`` have norms of a size."""
     from scipy.linalg import matrix_balance
 
@@ -376,10 +376,10 @@ def diagonal_rate_limit(A: Any, Y: np.ndarray) -> float:
     A, Y = square(A), np.asarray(Y, dtype=float)
     if Y.ndim != 2 or len(Y) != len(A):
         raise MatrixError(f"Y has shape {Y.shape}, not ({len(A)}, k)")
-    moved, size, terms = ((M * N).sum(axis=1) for M, N in ((A @ Y, Y), (Y, Y), (np.abs(A) @ np.abs(Y), np.abs(Y))))
+    forms, size, terms = ((M * N).sum(axis=1) for M, N in ((A @ Y, Y), (Y, Y), (np.abs(A) @ np.abs(Y), np.abs(Y))))
     # What rounding may have taken from the sums is added.
-    moved += (len(A) + Y.shape[1] + 4) * np.finfo(float).eps * terms
-    return float((2 * moved[size > 0] / size[size > 0]).max()) if size.any() else math.inf
+    forms += (len(A) + Y.shape[1] + 4) * np.finfo(float).eps * terms
+    return float((2 * forms[size > 0] / size[size > 0]).max()) if size.any() else math.inf
 
 
 def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e-9) -> list[list[Fraction]] | None:
@@ -427,10 +427,10 @@ def refute_diagonal_lyapunov(A: Any, rate: float = 0.0, *, tolerance: float = 1e
         return [[Fraction(int(i == low[0]))] for i in range(len(A))]
     search = _RateSearch(A, None, tolerance)
     try:
-        log_omega = search.start().log_omega
+        log_omega = search.best_candidate().log_omega
     except NoCertificate:
         return None
-    attempts = [(np.zeros(len(A)), tolerance), (log_omega, tolerance), (_balanced(A), tolerance / 100)]
+    attempts = [(np.zeros(len(A)), tolerance), (log_omega, tolerance), (_balance(A), tolerance / 100)]
     for frame, accuracy in attempts:
         for Y in search.dual_factors(frame, rate, accuracy):
             # Columns by size: small ones carry the solver's noise, and the sum often passes without them.
@@ -496,18 +496,18 @@ def rate_frontier(
         raise MatrixError("A has no rows")
     search = _RateSearch(A, _basis(basis, len(A)), tolerance)
     points = [DiagonalCertificate(np.zeros(len(A)), diagonal_rate(A, np.zeros(len(A)), search.basis))]
-    known = None if best is None else best.log_omega
+    diagonal = None if best is None else best.log_omega
     if conditions is None:
         best = search.optimum(None) if best is None else best
-        known = best.log_omega
+        diagonal = best.log_omega
         top = min(best.log_condition, math.log(1e8))
         conditions = [math.exp(top * share) for share in (0.9, 0.7, 0.5, 0.35, 0.2, 0.1)]
         points.append(best)
     for condition in conditions:
         if condition > 1:
             with contextlib.suppress(NoCertificate):
-                points.append(replace(search, max_condition=condition).climb(known, steps=12)[1])
-                known = points[-1].log_omega
+                points.append(replace(search, max_condition=condition).climb(diagonal, steps=12)[1])
+                diagonal = points[-1].log_omega
     points.sort(key=lambda point: (point.log_condition, -point.rate))
     frontier: list[DiagonalCertificate] = []
     for point in points:

@@ -51,8 +51,8 @@ class FullCertificate:
     Examples
     --------
     >>> A = np.array([[1.0, 9.0], [0.0, 2.0]])
-    >>> found = full_frontier(A)[-1]
-    >>> P, rate = found.matrix, found.rate
+    >>> certificate = full_frontier(A)[-1]
+    >>> P, rate = certificate.matrix, certificate.rate
     >>> bool(np.linalg.eigvalsh(P @ A + A.T @ P - 0.999 * rate * P)[0] > 0)
     True
     """
@@ -106,17 +106,17 @@ def full_frontier(
     decay = float(values.real.min()) if decay is None else decay
     if not decay > 0:
         raise NoCertificate(f"an eigenvalue has real part {decay:.3g}: nothing decays")
-    found = [_certificate(A, np.eye(len(A)))]
-    tried = set()
+    candidates = [_certificate(A, np.eye(len(A)))]
+    searched = set()
     for split in SPLITS:
         groups = _groups(values.real, split)
-        if len(groups) in tried:
+        if len(groups) in searched:
             continue
-        tried.add(len(groups))
+        searched.add(len(groups))
         checkpoint()
         if blocks := _blocks(A, vectors, groups):
-            found += [_certificate(A, _lyapunov(blocks, decay * (1 - loss))) for loss in losses]
-    points = sorted((c for c in found if c is not None), key=lambda c: (c.condition, -c.rate))
+            candidates += [_certificate(A, _lyapunov(blocks, decay * (1 - loss))) for loss in losses]
+    points = sorted((c for c in candidates if c is not None), key=lambda c: (c.condition, -c.rate))
     frontier: list[FullCertificate] = []
     for point in points:
         if not frontier or point.rate > frontier[-1].rate + _SAME_RATE * abs(frontier[-1].rate):

@@ -115,11 +115,11 @@ def maximise_margin(
 
     Examples
     --------
-    >>> found = maximise_margin(np.array([[2.0, -1.0], [-1.0, 2.0]]), np.ones(2))
-    >>> round(found.t, 7), found.omega.round(3)
+    >>> solution = maximise_margin(np.array([[2.0, -1.0], [-1.0, 2.0]]), np.ones(2))
+    >>> round(solution.t, 7), solution.omega.round(3)
     (2.0, array([1., 1.]))
-    >>> found = maximise_margin(np.array([[2.0, -1.0], [0.0, 4.0]]), np.ones(2), least=0.0)
-    >>> round(found.t, 7), found.omega.round(6), found.value - found.t < 1e-8
+    >>> solution = maximise_margin(np.array([[2.0, -1.0], [0.0, 4.0]]), np.ones(2), least=0.0)
+    >>> round(solution.t, 7), solution.omega.round(6), solution.value - solution.t < 1e-8
     (3.763932, array([1., 1.]), True)
     >>> maximise_margin(np.diag([2.0, 1.0]), np.ones(2), least=0.0, groups=np.array([0, 0])).omega.round(6)
     array([1., 1.])
@@ -194,8 +194,8 @@ def _simplex(n: int) -> _Weights:
 
 def _cone(scale: np.ndarray, c: float) -> _Weights:
     # Strictly inside: the exponents are drawn in by a tenth, and low lies between.
-    start = np.append((scale / scale.max()) ** -0.1, c**-0.95 * scale.max())
-    start *= len(scale) / start[:-1].sum()
+    initial = np.append((scale / scale.max()) ** -0.1, c**-0.95 * scale.max())
+    initial *= len(scale) / initial[:-1].sum()
 
     def bound(pull: np.ndarray) -> float:
         """Dinkelbach's method: the weights that gain most on a mean have the next, larger mean."""
@@ -206,7 +206,7 @@ def _cone(scale: np.ndarray, c: float) -> _Weights:
             if not mean > last:
                 return len(scale) * last
 
-    return _Weights(np.array([scale, -scale]), np.array([[-1.0], [c]]), np.zeros((2, 1)), True, start, bound)
+    return _Weights(np.array([scale, -scale]), np.array([[-1.0], [c]]), np.zeros((2, 1)), True, initial, bound)
 
 
 # ---------------------------------------------------------------------- the constraint matrices
@@ -321,13 +321,13 @@ def _first_t(problem: _Problem, omega: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Direction:
-    """Steps of all variables, ``moved`` is ``dS G``; how far ``X, z`` (primal) and ``S, s`` (dual) stay positive."""
+    """Steps of all variables, ``dSG`` is ``dS G``; how far ``X, z`` (primal) and ``S, s`` (dual) stay positive."""
 
     y: np.ndarray
     X: np.ndarray
     z: np.ndarray
     s: np.ndarray
-    moved: np.ndarray
+    dSG: np.ndarray
     primal: float
     dual: float
 
@@ -381,7 +381,7 @@ class _Newton:
         centre, plain = target * self.G, target / s
         second: Any = 0.0
         if predicted is not None:
-            second = predicted.X @ predicted.moved
+            second = predicted.X @ predicted.dSG
             plain = plain - predicted.z * predicted.s / s
         pull = problem.inner(centre - second)
         rhs = self.weights.adjoint(plain, len(self.at.y))
@@ -391,13 +391,13 @@ class _Newton:
         if not np.isfinite(dy).all():
             return None
         dS, ds = problem.form(dy), self.weights.slacks(dy, 0.0)
-        moved = dS @ self.G
-        product = X @ moved + second
+        dSG = dS @ self.G
+        product = X @ dSG + second
         dX = centre - X - (product + product.T) / 2
         dz = plain - z - z * ds / s
         primal = min(_reach(self.at.own, problem.restrict(dX)), _reach_plain(z, dz))
         dual = min(_reach(self.at.factor, problem.restrict(dS)), _reach_plain(s, ds))
-        return _Direction(dy, dX, dz, ds, moved, primal, dual)
+        return _Direction(dy, dX, dz, ds, dSG, primal, dual)
 
 
 # ---------------------------------------------------------------------- linear algebra

@@ -60,8 +60,8 @@ class FreeLeader:
 
     Examples
     --------
-    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
-    >>> bool(found.leaders[0][0] > 0 and found.followers[0] > 0)
+    >>> certificate = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> bool(certificate.leaders[0][0] > 0 and certificate.followers[0] > 0)
     True
     """
 
@@ -87,8 +87,8 @@ class CoupledCertificate:
 
     Examples
     --------
-    >>> found = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
-    >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*found.leaders, found.followers])
+    >>> certificate = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
+    >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*certificate.leaders, certificate.followers])
     >>> from lmi import diagonal_margin
     >>> diagonal_margin(A, omega) > 0
     True
@@ -144,8 +144,8 @@ def coupled_lyapunov(
 
     Examples
     --------
-    >>> found = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
-    >>> (found.followers > 0).all()
+    >>> certificate = coupled_lyapunov([FixedLeader(np.ones(2), np.full(2, 2.0))], [[-1.0, 0.0]], [[1.0]])
+    >>> (certificate.followers > 0).all()
     np.True_
     """
     A_F = square(A_F, "A_F")
@@ -182,8 +182,8 @@ def coupled_lyapunov(
         followers = h_matrix_lyapunov(A_F, tolerance=tolerance).omega if n_F else np.zeros(0)
         weights = np.append(np.ones(n_L), followers)
     unit = top / weights[:n_L][np.concatenate(groups) == 0][0] if fixed else 1.0
-    found = [
+    diagonals = [
         block.omega if isinstance(block, FixedLeader) else omega * weights[start] * unit
         for block, omega, start in zip(leaders, omegas, np.cumsum([0, *sizes[:-1]]), strict=True)
     ]
-    return CoupledCertificate(tuple(found), weights[n_L:] * unit)
+    return CoupledCertificate(tuple(diagonals), weights[n_L:] * unit)

@@ -51,13 +51,13 @@ def sparse_square(A: Any) -> sparse.csr_array:
         A = square(A)
     elif A.dtype.kind not in "biuf":
         raise MatrixError("A is not a matrix of real numbers")
-    found = sparse.csr_array(A, dtype=np.float64, copy=True)
-    _require_square(found.shape, found.data, "A")
-    if found.shape[0] == 0:
+    matrix = sparse.csr_array(A, dtype=np.float64, copy=True)
+    _require_square(matrix.shape, matrix.data, "A")
+    if matrix.shape[0] == 0:
         raise MatrixError("A has no rows")
-    found.sum_duplicates()
-    found.eliminate_zeros()
-    return found
+    matrix.sum_duplicates()
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def _require_square(shape: tuple[int, ...], entries: np.ndarray, name: str) -> None:

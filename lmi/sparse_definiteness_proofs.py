@@ -135,12 +135,12 @@ def _largest_rate(edges: Any, diagonal: np.ndarray, u: np.ndarray, v: np.ndarray
     weight, top, a, b = (max(int(x.max(initial=0)), -int(x.min(initial=0))) for x in (weights, diagonal, u, v))
     # Neither the sums nor what is formed of them is larger than this in size.
     sums, products = degree * weight * max(a, b), 2 * a * b * (top + degree * weight)
-    heard, hearing = (np.zeros(n, dtype=_kind(sums)) for _ in range(2))
-    sizes = np.abs(weights.astype(heard.dtype))
-    np.add.at(heard, targets, sizes * u[sources])
-    np.add.at(hearing, sources, sizes * v[targets])
-    heard, hearing, diagonal, u, v = (x.astype(_kind(products)) for x in (heard, hearing, diagonal, u, v))
-    x, y = 2 * diagonal * u * v - v * heard - u * hearing, u * v
+    row_sums, column_sums = (np.zeros(n, dtype=_kind(sums)) for _ in range(2))
+    sizes = np.abs(weights.astype(row_sums.dtype))
+    np.add.at(row_sums, targets, sizes * u[sources])
+    np.add.at(column_sums, sources, sizes * v[targets])
+    row_sums, column_sums, diagonal, u, v = (x.astype(_kind(products)) for x in (row_sums, column_sums, diagonal, u, v))
+    x, y = 2 * diagonal * u * v - v * row_sums - u * column_sums, u * v
     try:  # floats tell which rows may be the least
         ratios = x.astype(float) / y.astype(float)
         near = np.flatnonzero(~(ratios > ratios.min() + 2.0**-48 * abs(ratios.min())))
@@ -253,18 +253,18 @@ def prove_sparse_positive_definite(S: Any) -> SparseDefinitenessProof | None:
     for bits in BITS:
         shift = 4 * int(np.diff(unit.indptr).max()) * EPS
         for _ in range(4):
-            if (proof := _proposed(unit, shift, e, bits)) is None:
+            if (proof := _propose(unit, shift, e, bits)) is None:
                 break
-            short, proved = _judged(n, entries, proof, power)
-            if proved is not None:
-                return proved
+            short, result = _judge(n, entries, proof, power)
+            if result is not None:
+                return result
             if not short < 1:
                 break
             shift += 1.25 * short
     return None
 
 
-def _proposed(unit: sparse.csc_array, shift: float, e: np.ndarray, bits: int) -> SparseDefinitenessProof | None:
+def _propose(unit: sparse.csc_array, shift: float, e: np.ndarray, bits: int) -> SparseDefinitenessProof | None:
     """Return an order and the factor of ``unit - shift I`` in that order, rounded; None if it meets a pivot <= 0."""
     n = unit.shape[0]
     try:
@@ -284,7 +284,7 @@ def _proposed(unit: sparse.csc_array, shift: float, e: np.ndarray, bits: int) ->
     return SparseDefinitenessProof(order, R.indptr.astype(np.int64), R.indices.astype(np.int64), whole, e, bits)
 
 
-def _judged(
+def _judge(
     n: int, entries: Any, proof: SparseDefinitenessProof, power: int
 ) -> tuple[float, SparseDefinitenessProof | None]:
     """Ask the kernel for the remainder of a factor: by how much its diagonal is short, and the proof if it is not."""

@@ -142,10 +142,10 @@ def fill_core(block: Any) -> int:
     near.setdiag(0)
     near.eliminate_zeros()
     near.data = np.ones_like(near.data)
-    left = np.ones(near.shape[0])
-    while (few := (left > 0) & (near @ left <= 2)).any():
-        left[few] = 0
-    return int(left.sum())
+    remaining = np.ones(near.shape[0])
+    while (few := (remaining > 0) & (near @ remaining <= 2)).any():
+        remaining[few] = 0
+    return int(remaining.sum())
 
 
 def _direct(B: Any, right: np.ndarray) -> np.ndarray:

@@ -545,7 +545,7 @@ def _options(base: Certificate, request: DesignRequest) -> list[Option]:
     bounds, residual = _bounds(base, request.initial_set), request.residual
     functions = usable_functions(bounds)
     agents: list[int | None] = [None] if request.input_norm == 2 else [*range(len(bounds.rows))]
-    largest = [bounds.held_norm if v is None else bounds.held[v] for v in agents]
+    largest = [bounds.error_norm if v is None else bounds.error_bounds[v] for v in agents]
     top = max(largest)
     if base.constant or top == 0 or not functions:
         return [Option(Fraction(1), Fraction(1), None, Fraction(0))] if base.constant or top == 0 else []
@@ -576,7 +576,7 @@ def _options(base: Certificate, request: DesignRequest) -> list[Option]:
             bound = base.functions[i].deviation
             if bound is None:
                 continue
-            excess = max(map(log, bound.agents)) / 2 + log(bounds.start(i)) - log(residual)
+            excess = max(map(log, bound.agents)) / 2 + log(bounds.initial_root(i)) - log(residual)
             clock = _decimal(Fraction(max(excess, 1e-6) * (1 + 1e-12)) * 2 / rates[i], up=True)
             options.append(Option(clock, k, clock, clock * top))
     return sorted(options, key=lambda option: option.product)
@@ -651,13 +651,15 @@ def _fit_of(cert: Certificate, request: DesignRequest) -> Fit:
     T, effort, by_norm = cert.protocol.T, cert.effort, request.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
-            return Fit(T, cert, Fraction(0) if not any(_bounds(cert, request.initial_set).held) else None, Fraction(0))
+            return Fit(
+                T, cert, Fraction(0) if not any(_bounds(cert, request.initial_set).error_bounds) else None, Fraction(0)
+            )
         return Fit(T, cert, effort.peak.norm if by_norm else effort.peak.largest, Fraction(0))
     cap = cert.limits[0].gain_cap
     entries = effort.residual if effort is not None else ()
     if cap is None or not entries or entries[0].agents is None:
         return Fit(T, cert, None, None)
-    peak = cap * _bounds(cert, request.initial_set).held_norm if by_norm else entries[0].largest
+    peak = cap * _bounds(cert, request.initial_set).error_norm if by_norm else entries[0].largest
     return Fit(T, cert, peak, max(entries[0].agents))
 
 

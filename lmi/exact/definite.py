@@ -84,19 +84,19 @@ class Factor:
         # row below (see `above`) a row of E has n of them.
         self.slack = (n + 1) * (2**bits + 1)
         for i in range(n):
-            row = self._substituted(S[i], self.shifts[i])
-            left = _scaled(S[i][i], 2 * self.shifts[i]) - sum(map(mul, row, row)) - self.slack
-            if left <= 0:
+            row = self._substitute(S[i], self.shifts[i])
+            remaining = _scale(S[i][i], 2 * self.shifts[i]) - sum(map(mul, row, row)) - self.slack
+            if remaining <= 0:
                 raise ArithmeticError("not proved")
             self.rows.append(row)
-            self.diagonal.append(isqrt(left))
+            self.diagonal.append(isqrt(remaining))
 
-    def _substituted(self, entries: Sequence[int], shift: int) -> list[int]:
+    def _substitute(self, entries: Sequence[int], shift: int) -> list[int]:
         """Return the row of ``R`` that belongs to a row of ``S``: forward substitution, each quotient rounded."""
         row: list[int] = []
-        for entry, own, known, pivot in zip(entries, self.shifts, self.rows, self.diagonal, strict=False):
-            left = _scaled(entry, own + shift) - sum(map(mul, row, known))
-            row.append((2 * left + pivot) // (2 * pivot))
+        for entry, own, previous, pivot in zip(entries, self.shifts, self.rows, self.diagonal, strict=False):
+            remaining = _scale(entry, own + shift) - sum(map(mul, row, previous))
+            row.append((2 * remaining + pivot) // (2 * pivot))
         return row
 
     def above(self, d: Sequence[int]) -> Fraction:
@@ -105,11 +105,11 @@ class Factor:
             return Fraction(0)
         # The largest of d_i^2 / S_ii, none of which exceeds the value, gets as large as a diagonal entry of S.
         shift = 2 * self.bits - max(abs(x).bit_length() + own for x, own in zip(d, self.shifts, strict=True) if x)
-        row = self._substituted(d, shift)
+        row = self._substitute(d, shift)
         return Fraction(sum(map(mul, row, row)) + self.slack) / Fraction(4) ** shift
 
 
-def _scaled(entry: int, shift: int) -> int:
+def _scale(entry: int, shift: int) -> int:
     return entry << shift if shift >= 0 else entry >> -shift
 
 
@@ -204,16 +204,16 @@ def remainder(S: Scaled) -> list[dict[int, int]] | None:
     if sum((b - a + 1) * (b - a) // 2 for a, b in pairwise(S.indptr)) > LARGEST_PAIRS:
         return None
     E: list[dict[int, int]] = [defaultdict(int) for _ in range(S.n)]
-    kept = 0
+    count = 0
     for first, last in pairwise(S.indptr):
         part = list(zip(S.indices[first:last], S.data[first:last], strict=True))
         for number, (i, x) in enumerate(part, 1):
             row = E[i]
-            kept -= len(row)
+            count -= len(row)
             for j, y in part[:number]:
                 row[j] -= x * y
-            kept += len(row)
-            if not fits(kept, LARGEST_KEPT):
+            count += len(row)
+            if not fits(count, LARGEST_KEPT):
                 return None
     if not fits(sum(map(len, E)) * S.times.bit_length(), LARGEST_BITS):
         return None
@@ -233,15 +233,15 @@ def spare(E: Sequence[Mapping[int, int]], d: Sequence[int]) -> list[int]:
     >>> spare([{0: 2}, {0: -1, 1: 3}], [1, 1])
     [1, 2]
     """
-    left = [0] * len(E)
+    margins = [0] * len(E)
     for i, row in enumerate(E):
         for j, value in row.items():
             if i == j:
-                left[i] += value * d[i]
+                margins[i] += value * d[i]
             else:
-                left[i] -= abs(value) * d[j]
-                left[j] -= abs(value) * d[i]
-    return left
+                margins[i] -= abs(value) * d[j]
+                margins[j] -= abs(value) * d[i]
+    return margins
 
 
 # ---------------------------------------------------------------------- what decides
@@ -289,7 +289,7 @@ class Arithmetic:
         (True, False)
         """
         S = scaled(n, entries, factor, power, scale)
-        return S is not None and ((left := self.spare(S)) is not None and min(left, default=1) > 0)
+        return S is not None and ((margins := self.spare(S)) is not None and min(margins, default=1) > 0)
 
     def spare(self, S: Scaled) -> list[int] | None:
         """Return by how much each row of the remainder dominates, None if that is too much work."""

@@ -21,7 +21,7 @@ def down(x: Fraction | float, digits: int = 6) -> str:
     """
     if x == 0:
         return "0"
-    return _written(x, digits, ROUND_FLOOR)
+    return _write(x, digits, ROUND_FLOOR)
 
 
 def up(x: Fraction | float, digits: int = 6) -> str:
@@ -36,7 +36,7 @@ def up(x: Fraction | float, digits: int = 6) -> str:
     """
     if x == 0:
         return "0" if isinstance(x, Fraction | int) else "1e-300"
-    return _written(x, digits, ROUND_CEILING)
+    return _write(x, digits, ROUND_CEILING)
 
 
 def near(x: Fraction, digits: int = 6) -> str:
@@ -47,7 +47,7 @@ def near(x: Fraction, digits: int = 6) -> str:
     >>> near(Fraction(3, 5)), near(Fraction(1, 3)), near(Fraction(10**9 + 1, 3 * 10**9))
     ('0.6', '1/3', '~0.333333')
     """
-    text = _written(x, digits, ROUND_HALF_EVEN) if x else "0"
+    text = _write(x, digits, ROUND_HALF_EVEN) if x else "0"
     if Fraction(text) == x:
         return text
     short = x.numerator.bit_length() + x.denominator.bit_length() <= 3 * digits
@@ -80,7 +80,7 @@ def float_up(x: Fraction) -> float:
     return nearest if nearest >= x else math.nextafter(nearest, math.inf)
 
 
-def _written(x: Fraction | float, digits: int, rounding: str) -> str:
+def _write(x: Fraction | float, digits: int, rounding: str) -> str:
     if isinstance(x, float) and not math.isfinite(x):
         return "infinity" if x > 0 else "-infinity" if x < 0 else "nan"
     exact = Fraction(x)

@@ -40,7 +40,7 @@ def sqrt(x: Fraction, bits: int = BITS) -> Enclosure:
     """
     if x < 0:
         raise ValueError("the square root of a negative number")
-    return _enclosed(Context.sqrt, x, bits)
+    return _enclose(Context.sqrt, x, bits)
 
 
 @lru_cache(maxsize=256)  # bounds of many agents ask for the same few
@@ -65,7 +65,7 @@ def exp(x: Fraction, bits: int = BITS) -> Enclosure:
         raise OverflowError("an exponential of this size is not formed")
     if x < -LARGEST_EXPONENT:
         return Fraction(0), exp(Fraction(-LARGEST_EXPONENT), bits)[1]
-    return _enclosed(Context.exp, x, bits)
+    return _enclose(Context.exp, x, bits)
 
 
 def log(x: Fraction, bits: int = BITS) -> Enclosure:
@@ -84,10 +84,10 @@ def log(x: Fraction, bits: int = BITS) -> Enclosure:
     """
     if x <= 0:
         raise ValueError("the logarithm of a number that is not positive")
-    return _enclosed(Context.ln, x, bits)
+    return _enclose(Context.ln, x, bits)
 
 
-def _enclosed(function: Callable[[Context, Decimal], Decimal], x: Fraction, bits: int) -> Enclosure:
+def _enclose(function: Callable[[Context, Decimal], Decimal], x: Fraction, bits: int) -> Enclosure:
     """Enclose a function that grows: at decimals about ``x``, its values widened by a hundred units of the last digit.
 
     Beside the bits there are digits to spare, and for an argument of up to 100,000.
@@ -153,21 +153,21 @@ def decay_integrals_below(
     if w + m > LARGEST_PUSH:
         return dict.fromkeys(instants, Fraction(0))
     elementary = Fraction(1, 2**bits) / max(w, Fraction(1))
-    found = {}
+    bounds = {}
     for z in sorted(set(instants)):
         # A shorter way gives a lower bound too.
         short = min(z, Fraction(LARGEST_EXPONENT // 4) / (m - 1)) if m > 1 else z
-        left = exp(-min(short, Fraction(4 * bits)), 2 * bits + _bits_below_one(short))[1]
-        while near > max(left, elementary):
+        remaining = exp(-min(short, Fraction(4 * bits)), 2 * bits + _bits_below_one(short))[1]
+        while near > max(remaining, elementary):
             share = min(Fraction(1, 2), 16 / (w * near + m))
-            following = max(rounded(near * (1 - share), 64, up=True), left)
+            following = max(rounded(near * (1 - share), 64, up=True), remaining)
             share = rounded(1 - following / near, bits)
-            start = exp(w * (1 - near) + m * log(1 / near, 2 * bits)[0], bits)[0]
-            total += rounded(T_r * near * start * _series_below(w * near, m, share, bits), bits)
+            decay = exp(w * (1 - near) + m * log(1 / near, 2 * bits)[0], bits)[0]
+            total += rounded(T_r * near * decay * _series_below(w * near, m, share, bits), bits)
             near = following
         rest = T_r * exp(w * (1 - near), bits)[0] * _power_integral_below(m - 1, log(1 / near)[1], short, bits)
-        found[z] = rounded(total + rest, bits)
-    return found
+        bounds[z] = rounded(total + rest, bits)
+    return bounds
 
 
 def _bits_below_one(x: Fraction) -> int:

@@ -53,7 +53,7 @@ class FastArithmetic(Arithmetic):
     def product(self, A: Rows, B: Rows) -> list[list[int]]:
         """Return ``A B``, by python-flint unless some entries are much longer than others, which it pads all to."""
         long, short = sorted((_longest(A), _longest(B)), reverse=True)
-        if not A or not B or _padded(A) or _padded(B) or long > max(PADDED_BITS, PADDED**2 * short):
+        if not A or not B or _needs_padding(A) or _needs_padding(B) or long > max(PADDED_BITS, PADDED**2 * short):
             return super().product(A, B)
         return _rows(_flint(A) * _flint(B))
 
@@ -90,7 +90,7 @@ def _longest(rows: Rows) -> int:
     return longest(chain.from_iterable(rows))
 
 
-def _padded(rows: Rows) -> bool:
+def _needs_padding(rows: Rows) -> bool:
     """Tell whether all entries are much shorter than the longest one, on average."""
     most, count = _longest(rows), sum(map(len, rows))
     return most > PADDED_BITS and sum(map(int.bit_length, chain.from_iterable(rows))) < most * count // PADDED
@@ -130,24 +130,24 @@ def _above_by_congruence(S: Rows, D: Rows) -> list[Fraction] | None:
     """Bound ``d'S^-1 d`` by ``|Y'd|^2 / least``, since ``Y'S Y >= least I`` is dominated by its diagonal."""
     T, halves = unit_diagonal(S)
     try:
-        found = np.linalg.inv(np.linalg.cholesky(T)).T
+        inverse = np.linalg.inv(np.linalg.cholesky(T)).T
     except np.linalg.LinAlgError:
         return None
-    # Y = 2^-power U found, U diagonal, in integers: columns of S and D are multiplied by U first
+    # Y = 2^-power U inverse, U diagonal, in integers: columns of S and D are multiplied by U first
     up = [max(halves) - half for half in halves]
     bits = len(S) * _longest(S) + len(D) * _longest(D) + 2 * (len(S) + len(D)) * max(up)
-    if not fits(bits * len(S), LONGEST) or not np.isfinite(found).all():
+    if not fits(bits * len(S), LONGEST) or not np.isfinite(inverse).all():
         return None
     spend((len(S) + len(D)) * len(S) ** 2 // 10, bits // len(S), FLOAT_BITS, "constants of many agents")
-    power = FLOAT_BITS - int(np.frexp(np.abs(found).max())[1])
-    Y = _flint([[int(x) for x in row] for row in np.ldexp(found, power).tolist()])
+    power = FLOAT_BITS - int(np.frexp(np.abs(inverse).max())[1])
+    Y = _flint([[int(x) for x in row] for row in np.ldexp(inverse, power).tolist()])
     SU = _flint([[x << i + j for x, j in zip(row, up, strict=True)] for row, i in zip(S, up, strict=True)])
     G = _rows(Y.transpose() * (SU * Y))
     least, one = min(2 * row[i] - sum(map(abs, row)) for i, row in enumerate(G)), 4 ** (max(halves) + power)
     if (one - least) << CONGRUENCE > one:
         return None
-    moved = _flint([[x << j for x, j in zip(d, up, strict=True)] for d in D]) * Y
-    return [Fraction(int(sum(x * x for x in row)), least) for row in moved.tolist()]
+    product = _flint([[x << j for x, j in zip(d, up, strict=True)] for d in D]) * Y
+    return [Fraction(int(sum(x * x for x in row)), least) for row in product.tolist()]
 
 
 # ---------------------------------------------------------------------- exact products of arrays
@@ -172,7 +172,7 @@ def square(R: np.ndarray) -> np.ndarray | None:
         for b, right in enumerate(halves[: a + 1]):
             product = (left @ right.T).astype(np.int64)
             limbs[a + b] += product if a == b else product + product.T
-    return _joined(limbs, width)
+    return _join(limbs, width)
 
 
 def _digits(whole: np.ndarray, terms: int) -> tuple[list[np.ndarray], int]:
@@ -186,7 +186,7 @@ def _digits(whole: np.ndarray, terms: int) -> tuple[list[np.ndarray], int]:
     return [*digits, whole], width
 
 
-def _joined(limbs: list[np.ndarray], width: int) -> np.ndarray:
+def _join(limbs: list[np.ndarray], width: int) -> np.ndarray:
     """Return ``sum_m limbs[m] 2^(width m)`` in Python integers, of as few pieces of int64 as hold them."""
     for m in range(len(limbs) - 1):
         carry = limbs[m] >> width
@@ -236,7 +236,7 @@ def factor(S: Any) -> tuple[np.ndarray, np.ndarray] | None:
     if not all(lengths):
         return None
     exponents = np.array([-((length + 1) // 2) for length in lengths])
-    T, down = _shifted(S, exponents, FACTOR_BITS)
+    T, down = _shift(S, exponents, FACTOR_BITS)
     if (T != T.T).any():
         return None
     one = 2 * FACTOR_BITS + down  # the diagonal is in [2^(one - 2), 2^one), nothing above 2^one if S > 0
@@ -253,10 +253,10 @@ def factor(S: Any) -> tuple[np.ndarray, np.ndarray] | None:
         if not np.abs(whole).max(initial=0) <= INT64_SAFE:
             return None
         R = whole.astype(np.int64)
-        left = _spare(T, down, R)
-        if left is None or min(left, default=1) > 0:
-            return None if left is None else (R, exponents)
-        missing = Fraction(-min(left), 1 << one)
+        margins = _spare(T, down, R)
+        if margins is None or min(margins, default=1) > 0:
+            return None if margins is None else (R, exponents)
+        missing = Fraction(-min(margins), 1 << one)
         if missing > 1:
             return None
         shift += 1.25 * float(missing)
@@ -271,11 +271,11 @@ def dense_spare(S: Any, R: np.ndarray, exponents: Any, bits: int) -> list[int] |
     >>> dense_spare([[4, 2], [2, 5]], np.array([[31, 0], [16, 31]]), [0, 0], 4)
     [47, 47]
     """
-    T, down = _shifted(S, np.asarray(exponents), bits)
+    T, down = _shift(S, np.asarray(exponents), bits)
     return None if (T != T.T).any() else _spare(T, down, R)
 
 
-def _shifted(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]:
+def _shift(S: Any, exponents: np.ndarray, bits: int) -> tuple[np.ndarray, int]:
     """Return ``2^(e_i + e_j + 2 bits + down) S_ij`` in an array of integers, and ``down >= 0``."""
     T = np.empty((len(S), len(S)), dtype=object)
     T[:] = S
@@ -306,17 +306,17 @@ class Remainder(NamedTuple):
 
     def spare(self, weights: Any) -> list[int]:
         """Return ``E_ii d_i - sum_j |E_ij| d_j``."""
-        d, left = np.array(weights, dtype=object), np.zeros(self.n, dtype=object)
+        d, margins = np.array(weights, dtype=object), np.zeros(self.n, dtype=object)
         off = self.i != self.j
         i, j, size, on = self.i[off], self.j[off], np.abs(self.value[off]), self.i[~off]
-        np.subtract.at(left, i, size * d[j])
-        np.subtract.at(left, j, size * d[i])
-        left[on] += self.value[~off] * d[on]
+        np.subtract.at(margins, i, size * d[j])
+        np.subtract.at(margins, j, size * d[i])
+        margins[on] += self.value[~off] * d[on]
         m = self.n - len(self.block)
         if m < self.n:
             diagonal = np.diag(self.block)
-            left[m:] += (diagonal + np.abs(diagonal)) * d[m:] - np.abs(self.block) @ d[m:]
-        return list(left)
+            margins[m:] += (diagonal + np.abs(diagonal)) * d[m:] - np.abs(self.block) @ d[m:]
+        return list(margins)
 
 
 def remainder(S: Scaled) -> Remainder | None:
@@ -327,16 +327,16 @@ def remainder(S: Scaled) -> Remainder | None:
     n = S.n
     indptr, indices, data = (np.array(x, dtype=np.int64) for x in (S.indptr, S.indices, S.data))
     counts = np.diff(indptr)
-    left = n - np.arange(n + 1.0)
+    remaining = n - np.arange(n + 1.0)
     before = np.concatenate([[0.0], np.cumsum(counts.astype(float) ** 2)])
-    first = int(np.argmin(100 * before + 0.1 * left**3 + 500 * left**2))
+    first = int(np.argmin(100 * before + 0.1 * remaining**3 + 500 * remaining**2))
     if int(counts[:first].max(initial=0)) > LONGEST_COLUMN or before[first] > LARGEST_PAIRS:
         return None
     if not fits((n - first) ** 2, LARGEST_BLOCK):
         return None
     corner = np.zeros((n - first, n - first), dtype=np.int64)
-    start = indptr[first]
-    corner[indices[start:] - first, np.repeat(np.arange(n - first), counts[first:])] = data[start:]
+    offset = indptr[first]
+    corner[indices[offset:] - first, np.repeat(np.arange(n - first), counts[first:])] = data[offset:]
     block, sums = square(corner), _pair_products(n, first, indptr, indices, data)
     if block is None or sums is None or not fits((len(sums[0]) + corner.size) * S.times.bit_length(), LARGEST_BITS):
         return None
@@ -372,11 +372,11 @@ def _pair_products(
         many = entry - head + 1
         upper = np.repeat(entry, many)
         lower = np.arange(len(upper)) - np.repeat(np.cumsum(many) - many - head, many)
-        found = np.concatenate([keys, indices[upper] * n + indices[lower]])
-        keys, inverse = np.unique(found, return_inverse=True)
+        positions = np.concatenate([keys, indices[upper] * n + indices[lower]])
+        keys, inverse = np.unique(positions, return_inverse=True)
         for m in range(count):
             parts = [x[upper] * digits[m - a][lower] for a, x in enumerate(digits) if 0 <= m - a < len(digits)]
             total = np.zeros(len(keys), dtype=np.int64)
             np.add.at(total, inverse, np.concatenate([limbs[m], np.sum(parts, axis=0)]))
             limbs[m] = total
-    return keys, _joined(limbs, width)
+    return keys, _join(limbs, width)

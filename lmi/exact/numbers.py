@@ -51,13 +51,13 @@ def parse(text: str) -> Fraction:
     (Fraction(1, 10), Fraction(-3, 4), Fraction(1, 400), Fraction(3, 4))
     """
     if len(text) <= CACHED:
-        return _parsed(text)
+        return _parse(text)
     spend(1, 2 * len(text), 2 * len(text), "reading long numbers")
-    return _parsed.__wrapped__(text)  # which is not kept
+    return _parse.__wrapped__(text)  # which is not kept
 
 
 @lru_cache(maxsize=10_000)
-def _parsed(text: str) -> Fraction:
+def _parse(text: str) -> Fraction:
     if len(text) > MAX_CHARACTERS:
         raise NumberError(f"a number of {len(text)} characters is too long; the limit is {MAX_CHARACTERS}")
     if match := _QUOTIENT.fullmatch(text):

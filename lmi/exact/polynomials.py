@@ -74,15 +74,15 @@ def quotient(p: Polynomial, q: Polynomial) -> Polynomial | None:
     >>> quotient([2, 1, -1], [2, -1]), quotient([2, 1, -1], [2, 1])
     ([1, 1], None)
     """
-    left, result = list(p), []
+    remaining, result = list(p), []
     for k in range(len(p) - len(q) + 1):
-        c, over = divmod(left[k], q[0])
+        c, over = divmod(remaining[k], q[0])
         if over:
             return None
         result.append(c)
         for j, b in enumerate(q, k):
-            left[j] -= c * b
-    return None if any(left) else result
+            remaining[j] -= c * b
+    return None if any(remaining) else result
 
 
 def evaluated(p: Polynomial, matrix: Matrix) -> list[dict[int, int]]:
@@ -126,16 +126,16 @@ def rank(rows: Matrix) -> int:
     >>> rank([{0: 1, 1: 2}, {0: 2, 1: 4}, {2: 5}])
     2
     """
-    left, found = [_primitive_row(row) for row in rows], 0
-    while left := [row for row in left if row]:
-        pivot = min(left, key=len)
+    remaining, count = [_primitive_row(row) for row in rows], 0
+    while remaining := [row for row in remaining if row]:
+        pivot = min(remaining, key=len)
         column = min(pivot, key=lambda j: abs(pivot[j]))
-        left.remove(pivot)
-        found += 1
-        for k, row in enumerate(left):
+        remaining.remove(pivot)
+        count += 1
+        for k, row in enumerate(remaining):
             if column in row:
-                left[k] = _primitive_row(row_sum({0: pivot[column], 1: -row[column]}, [row, pivot]))
-    return found
+                remaining[k] = _primitive_row(row_sum({0: pivot[column], 1: -row[column]}, [row, pivot]))
+    return count
 
 
 def _primitive_row(row: Mapping[int, int]) -> dict[int, int]:

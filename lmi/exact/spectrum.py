@@ -94,16 +94,16 @@ def nonzero_spectrum_beyond(
         p = product(p, polynomial([{index[j]: x for j, x in rows[v].items() if j in index} for v in nodes]))
     while not p[-1]:  # an eigenvalue 0
         p = p[:-1]
-    found = _roots_on_axis(shifted(p, place))
-    if found is None:
+    roots = _roots_on_axis(shifted(p, place))
+    if roots is None:
         return "below"
-    count, simple = found
+    count, simple = roots
     if len(simple) - 1 == count:
         return "on" if count else "beyond"
     # y = b x - a at the eigenvalue x of `rows`, as in `shifted`.
     a, b = place.as_integer_ratio()
-    moved = [{**{j: b * v for j, v in row.items()}, i: b * row.get(i, 0) - a} for i, row in enumerate(rows)]
-    return "on" if rank(evaluated(simple, moved)) == len(rows) - count else "defective"
+    matrix = [{**{j: b * v for j, v in row.items()}, i: b * row.get(i, 0) - a} for i, row in enumerate(rows)]
+    return "on" if rank(evaluated(simple, matrix)) == len(rows) - count else "defective"
 
 
 def _roots_on_axis(p: Polynomial) -> tuple[int, Polynomial] | None:
@@ -142,15 +142,15 @@ def _symmetric_part(p: Polynomial) -> Polynomial | None:
     """
     if any(c < 0 for c in p):  # neither a factor y + r nor (y + r)^2 + s^2 with r >= 0 brings in a minus
         return None
-    found = [1]
+    part = [1]
     for bits in (*BITS, None):
         stable, divisor = _array(p, bits)
         # p is monic with integer coefficients, and so is each monic divisor.
         while len(divisor) > 1 and (rest := quotient(p, _of_square(divisor))) is not None:
-            p, found = rest, product(found, divisor)
+            p, part = rest, product(part, divisor)
             stable, divisor = _array(p, bits)
         if stable is not None:
-            return found if stable else None
+            return part if stable else None
     raise AssertionError("the exact array decides")
 
 

@@ -33,21 +33,21 @@ class Account:
     ----------
     allowed : int
         Bytes that are allowed.
-    spent : int
+    work : int
         Work that is done, in the unit of :func:`cost`.
     largest : int
         Bytes for which all sizes so far would have been allowed.
-    kept : int
+    permanent : int
         Bytes of what stays to the end.
     """
 
     def __init__(self, memory: float):
-        self.allowed, self.spent, self.largest, self.kept = int(Fraction(memory) * GB), 0, 0, 0
+        self.allowed, self.work, self.largest, self.permanent = int(Fraction(memory) * GB), 0, 0, 0
 
     @property
     def needed(self) -> Fraction:
         """GB for which all that was counted so far would have been allowed."""
-        return Fraction(max(self.largest, -(-self.spent // EACH_BYTE)), GB)
+        return Fraction(max(self.largest, -(-self.work // EACH_BYTE)), GB)
 
 
 _account: ContextVar[Account | None] = ContextVar("account", default=None)
@@ -105,8 +105,8 @@ def spend(products: int, a: int = 0, b: int = 0, what: str = "exact arithmetic")
     lmi.exact.work.WorkError: a product of long matrices would take too long
     """
     if (account := _account.get()) is not None:
-        account.spent += cost(products, a, b)
-        if account.spent > EACH_BYTE * account.allowed:
+        account.work += cost(products, a, b)
+        if account.work > EACH_BYTE * account.allowed:
             raise WorkError(f"{what} would take too long")
 
 
@@ -140,8 +140,8 @@ def keeps(size: int) -> bool:
     """
     if (account := _account.get()) is None:
         return True
-    account.kept += size
-    return fits(account.kept, GB)
+    account.permanent += size
+    return fits(account.permanent, GB)
 
 
 @contextmanager

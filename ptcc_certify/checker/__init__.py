@@ -26,7 +26,7 @@ from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
 from ptcc_certify.checker.lyapunov import check_functions
-from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, Statement, Step
+from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, ProofObligation, VerifiedObligation
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import (
     REACHING_BITS,
@@ -62,9 +62,9 @@ __all__ = [
     "SLIDING_BOUND",
     "SLIDING_CLOCK",
     "CheckReport",
-    "Statement",
-    "Step",
+    "ProofObligation",
     "UnreadableError",
+    "VerifiedObligation",
     "check",
     "digest",
     "read",
@@ -127,8 +127,8 @@ def read_and_check(
             reason = str(error)
         except MALFORMED as error:
             reason = f"malformed ({type(error).__name__})"
-        at, steps, needed = None if reason is None else doc.at, tuple(doc.steps), float(account.needed)
-        return data, CheckReport(reason is None, verdict, steps, at, reason, doc.exact.name, doc.sha256, needed)
+        at, obligations, needed = None if reason is None else doc.at, tuple(doc.obligations), float(account.needed)
+        return data, CheckReport(reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
 
 
 def _verdict(doc: Document) -> str:
@@ -158,7 +158,7 @@ def _verdict(doc: Document) -> str:
     check_sliding(doc, graph, protocol, begin)
     check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
     doc.at = "proof"
-    need(len(doc.steps) == len(data["proof"]), "an obligation that nothing asks for")
+    need(len(doc.obligations) == len(data["proof"]), "an obligation that nothing asks for")
     proved = data["influence"] is not None and (rate is not None or not graph.listening)
     verdict = "certified" if proved else "undecided"
     need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")

@@ -27,10 +27,10 @@ class ArrayDigraph(Digraph):
         """The edges that leave every node; see :attr:`Digraph.out`."""
         leaving = np.argsort(np.asarray(self.source), kind="stable")
         ends, which = (array("q", np.asarray(part)[leaving].tobytes()) for part in (self.target, self.which))
-        starts = np.bincount(np.asarray(self.source), minlength=self.n).cumsum().tolist()
-        return [0, *starts], ends, which
+        offsets = np.bincount(np.asarray(self.source), minlength=self.n).cumsum().tolist()
+        return [0, *offsets], ends, which
 
-    def _added(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
+    def _add_over_edges(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
         total: Any = np.zeros(self.n, dtype=object)
         weights, numbers = np.array(values, dtype=object), np.array(x, dtype=object)
         step = min(CHUNK, self.n)  # so many products take no more memory than the sums

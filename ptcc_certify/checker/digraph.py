@@ -57,7 +57,7 @@ class Digraph:
     Attributes
     ----------
     into, out : Adjacency
-        The edges that enter ``v``, and those that leave it, are those from ``starts[v]`` to ``starts[v + 1]``.
+        The edges that enter ``v``, and those that leave it, are those from ``offsets[v]`` to ``offsets[v + 1]``.
     distinct : list
         The weights that occur.
 
@@ -69,7 +69,7 @@ class Digraph:
     Examples
     --------
     >>> g = Digraph("abc", [1, 0, 1], [0, 1, 2], [2, -3, 1], 1)
-    >>> g.row(1), g.heard([1, 10, 100]), g.hearing([1, 10, 100])
+    >>> g.row(1), g.sums_in([1, 10, 100]), g.sums_out([1, 10, 100])
     ({1: 3, 0: 3}, [20, 3, 10], [30, 102, 0])
     """
 
@@ -86,17 +86,17 @@ class Digraph:
         self.distinct, self.which = numbered(weights)
         self.minus = [w < 0 for w in self.distinct]
         self.ratios = [w.as_integer_ratio() for w in self.distinct]
-        self.into: Adjacency = _starts(self.n, self.target), self.source, self.which
+        self.into: Adjacency = _offsets(self.n, self.target), self.source, self.which
 
     @cached_property
     def out(self) -> Adjacency:
         """The edges that leave every node; see the class."""
-        starts, ends, which = _starts(self.n, self.source), array("q", self.target), array("q", self.which)
-        place = list(starts)
+        offsets, ends, which = _offsets(self.n, self.source), array("q", self.target), array("q", self.which)
+        place = list(offsets)
         for s, t, k in zip(self.source, self.target, self.which, strict=True):
             ends[place[s]], which[place[s]] = t, k
             place[s] += 1
-        return starts, ends, which
+        return offsets, ends, which
 
     # ------------------------------------------------------------------ weights
 
@@ -131,13 +131,13 @@ class Digraph:
     @cached_property
     def diagonal(self) -> list[int]:
         """The diagonal of the signed Laplacian, times ``unit``."""
-        return self.heard([1] * self.n)
+        return self.sums_in([1] * self.n)
 
     def sign(self, s: int, t: int) -> int:
         """Return the sign of the edge from ``s`` to ``t``, 0 if there is none."""
-        starts, ends, which = self.into
-        at = bisect_left(ends, s, starts[t], starts[t + 1])
-        return 0 if at == starts[t + 1] or ends[at] != s else -1 if self.minus[which[at]] else 1
+        offsets, ends, which = self.into
+        at = bisect_left(ends, s, offsets[t], offsets[t + 1])
+        return 0 if at == offsets[t + 1] or ends[at] != s else -1 if self.minus[which[at]] else 1
 
     @cached_property
     def listening(self) -> list[int]:
@@ -146,19 +146,19 @@ class Digraph:
 
     # ------------------------------------------------------------------ sums
 
-    def heard(self, x: Sequence[int], signed: bool = False) -> list[int]:
+    def sums_in(self, x: Sequence[int], signed: bool = False) -> list[int]:
         """Return the sums of ``|w| x[s]``, or ``w x[s]``, over the edges into every node; weights times ``unit``."""
         return self._sums(self.source, self.target, x, signed)
 
-    def hearing(self, x: Sequence[int]) -> list[int]:
+    def sums_out(self, x: Sequence[int]) -> list[int]:
         """Return the sums of ``|w| x[t]`` over the edges out of every node; weights times ``unit``."""
         return self._sums(self.target, self.source, x, False)
 
-    def moved(self, x: Sequence[int], signed: bool = True) -> list[int]:
+    def laplacian_product(self, x: Sequence[int], signed: bool = True) -> list[int]:
         """Return ``L x``, or ``M(L) x`` with the comparison matrix of ``L``; times ``unit``."""
-        return [d * y - h for d, y, h in zip(self.diagonal, x, self.heard(x, signed), strict=True)]
+        return [d * y - h for d, y, h in zip(self.diagonal, x, self.sums_in(x, signed), strict=True)]
 
-    def left(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
+    def left_product(self, group: Sequence[int], x: Sequence[int]) -> list[int]:
         """Return ``x' M(L_k)``, times ``unit``, for a group of nodes that no edge enters."""
         sums, rows = dict.fromkeys(group, 0), [self.row(v) for v in group]
         spend(sum(map(len, rows)), self.bits, longest(x), "left null vectors")
@@ -171,9 +171,9 @@ class Digraph:
         values, bits = self.values if signed else [abs(w) for w in self.values], longest(x)
         sized(self.n, self.bits + bits)
         spend(self.n_edges, self.bits, bits, "sums over edges")
-        return self._added(of, to, values, x)
+        return self._add_over_edges(of, to, values, x)
 
-    def _added(self, of: array[int], to: array[int], values: Sequence[int], x: Sequence[int]) -> list[int]:
+    def _add_over_edges(self, of: array[int], to: array[int], values: Sequence[int], x: Sequence[int]) -> list[int]:
         total = [0] * self.n
         for j, y in zip(to, map(mul, map(values.__getitem__, self.which), map(x.__getitem__, of)), strict=True):
             total[j] += y
@@ -189,17 +189,17 @@ class Digraph:
         >>> list(Digraph("abc", [0, 1], [1, 2], [1, 1], 1).reached([1]))
         [0, 1, 1]
         """
-        starts, ends, _ = self.into if back else self.out
-        seen, todo = bytearray(self.n), list(first)
+        offsets, ends, _ = self.into if back else self.out
+        marks, todo = bytearray(self.n), list(first)
         for v in todo:
-            seen[v] = 1
+            marks[v] = 1
         while todo:
             v = todo.pop()
-            for u in ends[starts[v] : starts[v + 1]]:
-                if not seen[u] and (group is None or group[u] == group[v]):
-                    seen[u] = 1
+            for u in ends[offsets[v] : offsets[v + 1]]:
+                if not marks[u] and (group is None or group[u] == group[v]):
+                    marks[u] = 1
                     todo.append(u)
-        return seen
+        return marks
 
     @cached_property
     def pieces(self) -> tuple[list[int], set[int]]:
@@ -235,10 +235,10 @@ class Digraph:
         """Whether no two opposite edges differ in sign, and the pieces with an edge whose opposite is not its equal."""
         piece, symmetric, odd = self.pieces[0], True, set()
         for v in range(self.n):
-            heard, hearing = edges_of(self.into, v), edges_of(self.out, v)
-            if heard != hearing:
+            sources, targets = edges_of(self.into, v), edges_of(self.out, v)
+            if sources != targets:
                 odd.add(piece[v])
-                both = set(heard[0]).intersection(hearing[0])
+                both = set(sources[0]).intersection(targets[0])
                 symmetric &= all(self.sign(u, v) == self.sign(v, u) for u in both)
         return symmetric, odd
 
@@ -271,12 +271,12 @@ class Digraph:
 
 def edges_of(adjacency: Adjacency, v: int) -> tuple[array[int], array[int]]:
     """Return the other ends of the edges of a node, and the numbers of their weights."""
-    starts, ends, which = adjacency
-    part = slice(starts[v], starts[v + 1])
+    offsets, ends, which = adjacency
+    part = slice(offsets[v], offsets[v + 1])
     return ends[part], which[part]
 
 
-def _starts(n: int, nodes: Iterable[int]) -> list[int]:
+def _offsets(n: int, nodes: Iterable[int]) -> list[int]:
     """Return where every node's part of a sorted list begins, and the end."""
     counts = Counter(nodes)
     return [0, *accumulate(counts[v] for v in range(n))]

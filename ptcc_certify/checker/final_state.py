@@ -66,7 +66,7 @@ class FinalState:
         """``M(L_F) u`` on the followers, times the scales of ``u`` and ``L``."""
         graph = self.structure.graph
         each = dict(zip(self.structure.followers, self.scaled_u, strict=True))
-        return graph.moved([each.get(v, 0) for v in range(graph.n)], signed=False)
+        return graph.laplacian_product([each.get(v, 0) for v in range(graph.n)], signed=False)
 
     def error(self, residuals: Sequence[int] | Mapping[int, int]) -> tuple[int, int]:
         """Return ``e = max_i |r_i| / (M(L_F) u)_i`` as numerator and denominator; 0 where nothing is left over.
@@ -101,8 +101,8 @@ class FinalState:
 
     @cached_property
     def deviations(self) -> tuple[Matrix, int, Matrix]:
-        """``D = I - Q`` on the columns ``kept``, times a scale; the scale; ``D'D``."""
-        place, Q = {v: j for j, v in enumerate(self.structure.kept)}, self.projection
+        """``D = I - Q`` on the columns ``free_nodes``, times a scale; the scale; ``D'D``."""
+        place, Q = {v: j for j, v in enumerate(self.structure.free_nodes)}, self.projection
         rows = [[(i == v) - row.get(v, Fraction(0)) for v in place] for i, row in enumerate(Q)]
         D, scale = integers(rows)
         columns, bits = list(zip(*D, strict=True)), longest(x for row in D for x in row)
@@ -114,38 +114,41 @@ class FinalState:
 
 def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
     """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
-    given, said, graph = doc.section("final_state"), doc.section("influence"), structure.graph
-    if said is None or begin.state is None:
-        without = "the influence of the leaders" if said is None else "an initial state"
-        need(given is None, f"a final state without {without}")
+    final_state, influence, graph = doc.section("final_state"), doc.section("influence"), structure.graph
+    if influence is None or begin.state is None:
+        without = "the influence of the leaders" if influence is None else "an initial state"
+        need(final_state is None, f"a final state without {without}")
         need(all(state is None for _, state in claim.components), "a final state of a component without one of all")
-    if said is None:
+    if influence is None:
         return FinalState(structure, {})
     witness = doc.open("final-state", "graph", witness=True)["witness"]
-    fields(said, ("components", "containment_weights", "degenerate"), "influence")
+    fields(influence, ("components", "containment_weights", "degenerate"), "influence")
     u = None if witness is None else by_agent(doc, graph, fields(witness, ("u",), "the witness")["u"], "u")
     need(u is None or u.positive(), "u is not positive")
-    large = said["containment_weights"] is None  # no weights of followers
-    final = FinalState(structure, _left_null_vectors(doc, structure, said["components"], large, u), None, u)
+    large = influence["containment_weights"] is None  # no weights of followers
+    final = FinalState(structure, _left_null_vectors(doc, structure, influence["components"], large, u), None, u)
     if not large:
-        final = replace(final, weights=_weights(final, said["containment_weights"]))
+        final = replace(final, weights=_weights(final, influence["containment_weights"]))
     detail = "influence of leader groups"
     if begin.state is None:
-        need(said["degenerate"] is None, "a final state without an initial state")
+        need(influence["degenerate"] is None, "a final state without an initial state")
     else:
-        detail = f"enclosed, radius at most {up(_final(doc, final, given, said['degenerate'], begin))}"
-        _components(graph, claim, given)
+        detail = f"enclosed, radius at most {up(_final(doc, final, final_state, influence['degenerate'], begin))}"
+        _components(graph, claim, final_state)
     doc.done("exact" if final.exact else detail)
     return final
 
 
-def _components(graph: Digraph, claim: Claim, said: Any) -> None:
+def _components(graph: Digraph, claim: Claim, final_state: Any) -> None:
     """Check the final state of every weak component, which repeats the final state where that is no side vector."""
     for nodes, state in claim.components:
-        if len(claim.components) > MANY_COMPONENTS or beside(said.get("mid")):
+        if len(claim.components) > MANY_COMPONENTS or beside(final_state.get("mid")):
             need(state is None, "the final state of a component")
         else:
-            need(same(state, {graph.labels[v]: said[graph.labels[v]] for v in nodes}), "the final state of a component")
+            need(
+                same(state, {graph.labels[v]: final_state[graph.labels[v]] for v in nodes}),
+                "the final state of a component",
+            )
 
 
 def _worst(
@@ -164,30 +167,30 @@ def _worst(
 
 
 def _left_null_vectors(
-    doc: Document, structure: Structure, said: Any, large: bool, u: Numbers | None
+    doc: Document, structure: Structure, section: Any, large: bool, u: Numbers | None
 ) -> dict[int, list[Interval]]:
     """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1`` for every group: within the radii, which may be 0."""
-    listed, found = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
-    for entry, (k, group, gauge) in zip(entries(said, "components", len(listed)), listed, strict=True):
+    groups, vectors = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
+    for entry, (k, group, gauge) in zip(entries(section, "components", len(groups)), groups, strict=True):
         fields(entry, ("nodes", "left_null_vector"), "a component")
         need(positions(doc, structure.graph, entry["nodes"], "a component") == group, "another component")
-        found[k] = [interval(x) for x in entries(entry["left_null_vector"], "left_null_vector", len(group))]
-        _left_null_vector(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, found[k], strict=True)], u)
-    return found
+        vectors[k] = [interval(x) for x in entries(entry["left_null_vector"], "left_null_vector", len(group))]
+        _left_null_vector(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, vectors[k], strict=True)], u)
+    return vectors
 
 
 def _left_null_vector(graph: Digraph, group: Sequence[int], intervals: Sequence[Interval], u: Numbers | None) -> None:
     """Verify the left null vector of one comparison matrix; all in integers."""
     (eta, radii), scale = integers([[x for x, _ in intervals], [r for _, r in intervals]])
-    left, top = graph.left(group, eta), max(range(len(eta)), key=eta.__getitem__)
+    residuals, top = graph.left_product(group, eta), max(range(len(eta)), key=eta.__getitem__)
     worst, least, each = 0, 1, [0] * len(eta)
     need(eta[top] > 0, "a left null vector is not positive")
-    if any(left):
+    if any(residuals):
         if u is None:
             raise RejectedError("a left null vector is not kept by the motion")
         each = [0 if i == top else x for i, x in enumerate(u.over(group)[0])]
         # |exact / exact[top] - eta / eta[top]| <= worst / (least eta[top]) u, since the rest of M is an M-matrix
-        worst, least = _worst([i for i in range(len(eta)) if i != top], left, graph.left(group, each))
+        worst, least = _worst([i for i in range(len(eta)) if i != top], residuals, graph.left_product(group, each))
     middle, width = least * sum(eta), worst * sum(each)
     need(middle > width, "a left null vector is not enclosed")
     for x, y, radius in zip(eta, each, radii, strict=True):
@@ -199,17 +202,17 @@ def _left_null_vector(graph: Digraph, group: Sequence[int], intervals: Sequence[
 # ---------------------------------------------------------------------- followers
 
 
-def _weights(final: FinalState, said: Any) -> list[list[Interval]]:
+def _weights(final: FinalState, section: Any) -> list[list[Interval]]:
     """Verify the columns ``L_F w = -L_FLk G_k 1``, within the radii; leaders of other components are at 0."""
     structure, graph, F = final.structure, final.structure.graph, final.structure.followers
-    said = ordered([graph.labels[v] for v in F], said, "containment_weights")
-    weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in said.values()]
+    section = ordered([graph.labels[v] for v in F], section, "containment_weights")
+    weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in section.values()]
     rows = {v: graph.row(v) for v in F}
     for column, (_, group, gauge) in enumerate(structure.balanced):
         (middles,), scale = integers([[row[column][0] for row in weights]])
-        known = dict(zip((*F, *group), (*middles, *(g * scale for g in gauge)), strict=True))
-        spend(sum(map(len, rows.values())), graph.bits, longest(known.values()), "followers")
-        worst, least = final.error({v: sum(x * known.get(j, 0) for j, x in row.items()) for v, row in rows.items()})
+        states = dict(zip((*F, *group), (*middles, *(g * scale for g in gauge)), strict=True))
+        spend(sum(map(len, rows.values())), graph.bits, longest(states.values()), "followers")
+        worst, least = final.error({v: sum(x * states.get(j, 0) for j, x in row.items()) for v, row in rows.items()})
         error = Fraction(worst, least * scale)
         within = all(error * x <= row[column][1] for x, row in zip(final.scaled_u, weights, strict=True))
         need(within, "followers are not enclosed")
@@ -219,53 +222,57 @@ def _weights(final: FinalState, said: Any) -> list[list[Interval]]:
 # ---------------------------------------------------------------------- final state
 
 
-def _final(doc: Document, final: FinalState, said: Any, degenerate: Any, begin: Begin) -> Fraction:
+def _final(doc: Document, final: FinalState, section: Any, degenerate: Any, begin: Begin) -> Fraction:
     """Verify where the agents end; return the largest radius that is proved."""
-    structure, moved, known = final.structure, begin.state or Numbers([]), final.left_null_vectors
+    structure, shifted, vectors = final.structure, begin.state or Numbers([]), final.left_null_vectors
     if begin.sigma is not None:
-        moved = Numbers([x - s for x, s in zip(moved, begin.sigma, strict=True)])
-    starts = {k: [(moved[v], Fraction(0)) for v in group] for k, group, _ in structure.balanced}
-    values = {k: combined(known[k], start) if k in known else start[0] for k, start in starts.items()}
+        shifted = Numbers([x - s for x, s in zip(shifted, begin.sigma, strict=True)])
+    initial_states = {k: [(shifted[v], Fraction(0)) for v in group] for k, group, _ in structure.balanced}
+    values = {k: combined(vectors[k], x0) if k in vectors else x0[0] for k, x0 in initial_states.items()}
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
     need(same(degenerate, [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    claimed, spare = _claimed(doc, structure.graph, said), WIDEST * moved.largest()
-    proved: dict[int, Interval] = {}
+    intervals, spare = _intervals(doc, structure.graph, section), WIDEST * shifted.largest()
+    enclosures: dict[int, Interval] = {}
     for k, (group, gauge) in enumerate(zip(structure.closed, structure.gauges, strict=True), start=1):
         x, r = values.get(k, ZERO)
-        proved |= {v: (g * x, r) for v, g in zip(group, gauge or [0] * len(group), strict=True)}
+        enclosures |= {v: (g * x, r) for v, g in zip(group, gauge or [0] * len(group), strict=True)}
     if final.weights is not None:
         rows = zip(structure.followers, final.weights, strict=True)
-        proved |= {v: combined(row, list(values.values())) for v, row in rows}
-    for v, (x, r) in proved.items():
-        mid, radius = claimed[0][v], claimed[1][v]
+        enclosures |= {v: combined(row, list(values.values())) for v, row in rows}
+    for v, (x, r) in enclosures.items():
+        mid, radius = intervals[0][v], intervals[1][v]
         if x != mid or r != radius:
             _narrow(structure.graph.labels[v], abs(x - mid), r, radius, spare)
-    widest = max(r for _, r in proved.values())
-    return widest if final.weights is not None else max(widest, _followers(final, moved, values, claimed, spare))
+    widest = max(r for _, r in enclosures.values())
+    return widest if final.weights is not None else max(widest, _followers(final, shifted, values, intervals, spare))
 
 
-def _narrow(label: str, off: Any, proved: Any, radius: Any, spare: Any) -> None:
+def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
     """Verify that a radius takes in what is proved, off the middle, and is not much wider; all over one scale."""
-    if off + proved > radius:
+    if off + error > radius:
         raise RejectedError(f"agent {shorten(label)} ends elsewhere")
-    if radius > 2 * proved + spare:
+    if radius > 2 * error + spare:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
-def _claimed(doc: Document, graph: Digraph, said: Any) -> tuple[Numbers, Numbers]:
+def _intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
     """Read middles and radii of the final state: two side vectors, or intervals by agent."""
-    if isinstance(said, dict) and beside(said.get("mid")):
-        fields(said, ("mid", "radius"), "final_state")
-        need(beside(said["radius"]), "radius is not a side vector")
-        mid, radius = (doc.files.numbers(said[key], key, graph.n) for key in ("mid", "radius"))
+    if isinstance(section, dict) and beside(section.get("mid")):
+        fields(section, ("mid", "radius"), "final_state")
+        need(beside(section["radius"]), "radius is not a side vector")
+        mid, radius = (doc.files.numbers(section[key], key, graph.n) for key in ("mid", "radius"))
         need(all(r >= 0 for r in radius.values), "a radius is negative")
         return mid, radius
-    intervals = [interval(x) for x in ordered(graph.labels, said, "final_state").values()]
+    intervals = [interval(x) for x in ordered(graph.labels, section, "final_state").values()]
     return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])
 
 
 def _followers(
-    final: FinalState, moved: Numbers, values: Mapping[int, Interval], claimed: tuple[Numbers, Numbers], spare: Fraction
+    final: FinalState,
+    shifted: Numbers,
+    values: Mapping[int, Interval],
+    intervals: tuple[Numbers, Numbers],
+    spare: Fraction,
 ) -> Fraction:
     """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``.
 
@@ -273,29 +280,29 @@ def _followers(
     over another scale. Returns the largest radius that is proved.
     """
     structure, graph, F = final.structure, final.structure.graph, final.structure.followers
-    (mids, scale), (radii, fine) = (numbers.over(F) for numbers in claimed)
+    (mids, scale), (radii, fine) = (numbers.over(F) for numbers in intervals)
     single = [group[0] for k, group, _ in structure.balanced if k not in final.left_null_vectors]
-    own, other = moved.over(single)
+    own, other = shifted.over(single)
     grid = math.lcm(scale, other)
     if any(r or grid % x.denominator for x, r in map(values.__getitem__, final.left_null_vectors)):
         grid <<= GRID_BITS
-    known = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}
-    known |= {v: x * (grid // other) for v, x in zip(single, own, strict=True)}
+    middles = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}
+    middles |= {v: x * (grid // other) for v, x in zip(single, own, strict=True)}
     wide: dict[int, int] = {}
     for k, group, gauge in structure.balanced:
         if k in final.left_null_vectors:
             value, r = values[k]
             middle = math.floor(value * grid)
-            known |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
+            middles |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
             wide |= dict.fromkeys(group, math.ceil(r * grid) + (middle != value * grid))
-    X, R = ([states.get(v, 0) for v in range(graph.n)] for states in (known, wide))
-    blur = graph.heard(R) if any(R) else R
-    worst, least = final.error([abs(x) + y for x, y in zip(graph.moved(X), blur, strict=True)])
+    X, R = ([states.get(v, 0) for v in range(graph.n)] for states in (middles, wide))
+    blur = graph.sums_in(R) if any(R) else R
+    worst, least = final.error([abs(x) + y for x, y in zip(graph.laplacian_product(X), blur, strict=True)])
     # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
     share = least * grid
     room = math.floor(spare * (share * fine))
-    for v, told, weight in zip(F, radii, final.scaled_u, strict=True):
-        _narrow(graph.labels[v], 0, worst * fine * weight, share * told, room)
+    for v, radius, weight in zip(F, radii, final.scaled_u, strict=True):
+        _narrow(graph.labels[v], 0, worst * fine * weight, share * radius, room)
     return Fraction(worst * max(final.scaled_u, default=0), share)
 
 

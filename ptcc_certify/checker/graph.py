@@ -20,19 +20,19 @@ NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 
 def check_graph(doc: Document) -> Digraph:
     """Read nodes and edges; verify their order and their hash."""
-    said = fields(doc.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
-    how = fields(said["read"], ("orientation", "duplicates", "self_loops", "undirected"), "read")
+    section = fields(doc.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
+    how = fields(section["read"], ("orientation", "duplicates", "self_loops", "undirected"), "read")
     need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
     need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
     loops = how["self_loops"]
     need(isinstance(loops, str) and bool(re.fullmatch(r"refused|dropped [0-9]{1,12}", loops)), "read: self_loops")
     need(isinstance(how["undirected"], bool), "read: undirected")
-    labels = entries(said["nodes"], "nodes")
+    labels = entries(section["nodes"], "nodes")
     need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
     index = {label: v for v, label in enumerate(labels)}
     need(len(index) == len(labels), "a node occurs twice")
     _fit(NODE_BYTES * len(labels))
-    columns = _edges(doc, said["edges"], index)
+    columns = _edges(doc, section["edges"], index)
     kind: type[Digraph] = Digraph
     if doc.exact.numpy and len(columns[0]) >= MANY_EDGES:
         from ptcc_certify.checker.array_digraph import ArrayDigraph
@@ -40,7 +40,7 @@ def check_graph(doc: Document) -> Digraph:
         kind = ArrayDigraph
     graph = kind(labels, *columns)
     doc.sha256 = graph.sha256()
-    need(said["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
+    need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
     return graph
 
 
@@ -49,43 +49,43 @@ def _fit(size: int) -> None:
     need(keeps(size), "a graph that may take more memory than is allowed; allow more by --memory")
 
 
-def _edges(doc: Document, said: Any, index: dict[str, int]) -> tuple[Any, Any, Any, int]:
+def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[Any, Any, Any, int]:
     """Return sources, targets, weights and what divides the weights."""
-    if isinstance(said, dict):
-        said = fields(said, ("count", "source", "target", "weight", "scale"), "edges")
-        count, scale = said["count"], exact(said["scale"])
+    if isinstance(section, dict):
+        section = fields(section, ("count", "source", "target", "weight", "scale"), "edges")
+        count, scale = section["count"], exact(section["scale"])
         need(type(count) is int and 0 < count <= len(index) ** 2, "edges: count is no number of edges")
         need(scale > 0 and scale.denominator == 1, "scale is not a positive integer")
         _fit(EDGE_BYTES[0] * count)
-        source, target, weight = (doc.files.column(said[key], count) for key in ("source", "target", "weight"))
+        source, target, weight = (doc.files.column(section[key], count) for key in ("source", "target", "weight"))
         need(source.typecode == target.typecode == "q", "ends of edges are not integers")
         return source, target, weight, int(scale)
-    _fit(EDGE_BYTES[1] * len(entries(said, "edges")))
-    rows = [entries(row, "an edge", 3) for row in said]
+    _fit(EDGE_BYTES[1] * len(entries(section, "edges")))
+    rows = [entries(row, "an edge", 3) for row in section]
     need(all(isinstance(x, str) and x in index for row in rows for x in row[:2]), "an edge of an unknown node")
     return [index[r[0]] for r in rows], [index[r[1]] for r in rows], [exact(r[2]) for r in rows], 1
 
 
-def positions(doc: Document, graph: Digraph, said: Any, what: str, count: int | None = None) -> list[int]:
+def positions(doc: Document, graph: Digraph, entry: Any, what: str, count: int | None = None) -> list[int]:
     """Return the positions of a list of labels, or, where their number is known, of nodes in a side vector."""
-    if count is not None and beside(said):
-        nodes = doc.files.integers(said, what, count)
+    if count is not None and beside(entry):
+        nodes = doc.files.integers(entry, what, count)
         need(all(0 <= v < graph.n for v in nodes), f"{what}: an unknown node")
         return nodes
-    labels = entries(said, what, count)
+    labels = entries(entry, what, count)
     need(all(isinstance(x, str) and x in graph.index for x in labels), f"{what}: an unknown node")
     return [graph.index[label] for label in labels]
 
 
-def ordered(labels: Sequence[str], said: Any, what: str) -> dict[str, Any]:
+def ordered(labels: Sequence[str], entry: Any, what: str) -> dict[str, Any]:
     """Return an object that has these labels as keys, in this order."""
-    need(list(fields(said, labels, what)) == labels, "agents are in another order")
-    return said
+    need(list(fields(entry, labels, what)) == labels, "agents are in another order")
+    return entry
 
 
-def by_agent(doc: Document, graph: Digraph, said: Any, what: str, files: bool = True) -> Numbers:
+def by_agent(doc: Document, graph: Digraph, entry: Any, what: str, files: bool = True) -> Numbers:
     """Read a number for every agent: an object in their order, or a side vector where ``files`` may be named."""
-    if beside(said):
+    if beside(entry):
         need(files, f"{what} in a side file")
-        return doc.files.numbers(said, what, graph.n)
-    return Numbers([exact(x) for x in ordered(graph.labels, said, what).values()])
+        return doc.files.numbers(entry, what, graph.n)
+    return Numbers([exact(x) for x in ordered(graph.labels, entry, what).values()])

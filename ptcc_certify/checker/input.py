@@ -71,71 +71,74 @@ class Verified:
         return [g["mu1"] + push * abs(s) for s in sigma0]
 
 
-def check_input(doc: Document, known: Verified) -> None:
+def check_input(doc: Document, verified: Verified) -> None:
     """Verify the section ``input``."""
-    said = doc.section("input")
-    decays = known.rate is not None or not known.structure.graph.listening
-    need((said is not None) == decays, "the input is spoken of iff the decay is proved")
-    if said is None:
+    section = doc.section("input")
+    decays = verified.rate is not None or not verified.structure.graph.listening
+    need((section is not None) == decays, "the input is spoken of iff the decay is proved")
+    if section is None:
         return
-    fields(said, (*KEYS, *PARTS), "input")
-    need(len(entries(said["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
-    _threshold(doc, known, said)
-    constants = _constants(doc, known, entries(said["constants"], "constants", len(known.functions)))
-    _sliding(doc, known, said["sliding"])
-    initial_set = _starts(doc, known, said["initial_set"])
+    fields(section, (*KEYS, *PARTS), "input")
+    need(len(entries(section["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
+    _threshold(doc, verified, section)
+    constants = _constants(doc, verified, entries(section["constants"], "constants", len(verified.functions)))
+    _sliding(doc, verified, section["sliding"])
+    initial_set = _initial_set(doc, verified, section["initial_set"])
     if initial_set is None:
         for key in PARTS:
-            empty = said[key] is None or (key == "residual" and not said[key])
+            empty = section[key] is None or (key == "residual" and not section[key])
             need(empty, f"{key} without an initial state, or of too large a graph")
         return
     try:
-        bounds = _bounds(doc, known, initial_set, constants)
+        bounds = _bounds(doc, verified, initial_set, constants)
         for key, verify in PARTS.items():
             doc.at = f"input.{key}"
-            if said[key] is not None:
-                verify(doc, known, said, bounds)
+            if section[key] is not None:
+                verify(doc, verified, section, bounds)
     except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
 
 
-def _each(doc: Document, known: Verified, said: Any, what: str) -> Numbers:
+def _each(doc: Document, verified: Verified, entry: Any, what: str) -> Numbers:
     """Read numbers by agent, which are in no side file here."""
-    return by_agent(doc, known.structure.graph, said, what, files=False)
+    return by_agent(doc, verified.structure.graph, entry, what, files=False)
 
 
-def _above(doc: Document, known: Verified, said: Any, what: str, least: Sequence[Fraction]) -> Numbers:
+def _above(doc: Document, verified: Verified, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
     """Read bounds by agent, none of which is below what is proved."""
-    told, labels = _each(doc, known, said, what), known.structure.graph.labels
-    low = next((label for label, x, y in zip(labels, told, least, strict=True) if x < y), None)
+    values, labels = _each(doc, verified, entry, what), verified.structure.graph.labels
+    low = next((label for label, x, y in zip(labels, values, least, strict=True) if x < y), None)
     need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
-    return told
+    return values
 
 
 # ---------------------------------------------------------------------- bounded or not
 
 
-def _threshold(doc: Document, known: Verified, said: Mapping[str, Any]) -> None:
+def _threshold(doc: Document, verified: Verified, section: Mapping[str, Any]) -> None:
     """Verify whether the input stays bounded for every initial state, and the bounds of the threshold."""
-    ends, k = fields(said["threshold"], ("lower", "upper"), "threshold"), known.gain.k
-    for key, rate in (("lower", known.rate), ("upper", known.limit)):
+    ends, k = fields(section["threshold"], ("lower", "upper"), "threshold"), verified.gain.k
+    for key, rate in (("lower", verified.rate), ("upper", verified.limit)):
         value = None if rate is None else k * rate / 2
         need((None if ends[key] is None else exact(ends[key])) == value, f"the {key} end is not the proved one")
-    bounded = said["bounded"]
+    bounded = section["bounded"]
     if bounded is None:
         return
     need(isinstance(bounded, bool), "bounded is no truth value")
     by = doc.open("input-threshold", "input", witness=True)["witness"]
     if by == "rate":
-        holds = not known.structure.graph.listening or (known.rate is not None and known.rate * k >= 2)
+        holds = not verified.structure.graph.listening or (verified.rate is not None and verified.rate * k >= 2)
         need(bounded and holds, "no rate proves that the input stays bounded")
     elif by == "upper_bound":
-        need(not bounded and known.limit is not None and known.limit * k < 2, "no limit proves that the input grows")
+        need(
+            not bounded and verified.limit is not None and verified.limit * k < 2,
+            "no limit proves that the input grows",
+        )
     else:
         need(by == "spectrum", "another proof")
-        place = _spectrum(doc, known.structure, 1 / k)
+        place = _spectrum(doc, verified.structure, 1 / k)
         need(bounded == (place in ("beyond", "on")), f"the spectrum is {place} the line")
-    doc.done("the input stays bounded" if bounded else "the input of some start grows without limit")
+    doc.done("the input stays bounded" if bounded else "the input of some initial state grows without limit")
 
 
 def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
@@ -148,74 +151,74 @@ def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
     return nonzero_spectrum_beyond(rows, graph.unit, line, parts, doc.exact.characteristic)
 
 
-# ---------------------------------------------------------------------- constants, sliding part, starts
+# ---------------------------------------------------------------------- constants, sliding part, initial states
 
 
-def _constants(doc: Document, known: Verified, said: Sequence[Any]) -> list[list[Fraction] | None]:
+def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> list[list[Fraction] | None]:
     """Verify ``e_k^2 <= c_k V`` for full matrices; for diagonal ones the constants follow."""
-    found: list[list[Fraction] | None] = [None] * len(said)
-    for k, (given, function) in enumerate(zip(said, known.functions, strict=True)):
+    results: list[list[Fraction] | None] = [None] * len(section)
+    for k, (entry, function) in enumerate(zip(section, verified.functions, strict=True)):
         doc.at = f"input.constants[{k}]"
-        if given is None:
+        if entry is None:
             continue
         form = function.form
         if form is None or form.matrix is None:
             raise RejectedError("constants that follow from a diagonal")
         doc.open("input-constants", f"lyapunov.functions[{k}]")
-        constants, (P, scale), forms = list(_each(doc, known, given, "constants")), form.entries, []
+        constants, (P, scale), forms = list(_each(doc, verified, entry, "constants")), form.entries, []
         for v, c in enumerate(constants):
             p, q = (c / scale).as_integer_ratio()
             sized(v + 1, longest((q, q * p)), "constants")
             forms.append(([q * (own == v) for own in form.nodes], q * p))
         failed = doc.exact.bounded(P, forms)
-        label = known.structure.graph.labels[failed or 0]
+        label = verified.structure.graph.labels[failed or 0]
         need(failed is None, f"the constant of agent {shorten(label)} is not proved")
         doc.done(f"at most {up(max(constants))}")
-        found[k] = constants
-    return found
+        results[k] = constants
+    return results
 
 
-def _sliding(doc: Document, known: Verified, said: Any) -> None:
+def _sliding(doc: Document, verified: Verified, section: Any) -> None:
     """Verify the sliding part of the input."""
     doc.at = "input.sliding"
-    need((said is not None) == known.protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
-    if said is None:
+    need((section is not None) == verified.protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
+    if section is None:
         return
-    fields(said, ("bounded", "agents"), "sliding")
-    need(said["bounded"] is known.sliding_bounded, "bounded for every initial state iff mu3 kappa >= 1")
-    if said["agents"] is not None:
+    fields(section, ("bounded", "agents"), "sliding")
+    need(section["bounded"] is verified.sliding_bounded, "bounded for every initial state iff mu3 kappa >= 1")
+    if section["agents"] is not None:
         doc.open("input-sliding", "input")
-        _above(doc, known, said["agents"], "the sliding part", known.sliding_part())
+        _above(doc, verified, section["agents"], "the sliding part", verified.sliding_part())
         doc.done("for every disturbance within delta")
 
 
-def _starts(doc: Document, known: Verified, said: Any) -> formulas.InitialSet | None:
+def _initial_set(doc: Document, verified: Verified, section: Any) -> formulas.InitialSet | None:
     """Read the set of initial states; None if there is none, or the graph is too large."""
     doc.at = "input.initial_set"
-    small = known.structure.graph.n <= INPUT_NODES and bool(known.structure.graph.listening)
-    if said is None:
-        return formulas.InitialSet(list(known.begin.state)) if known.begin.state is not None and small else None
+    small = verified.structure.graph.n <= INPUT_NODES and bool(verified.structure.graph.listening)
+    if section is None:
+        return formulas.InitialSet(list(verified.begin.state)) if verified.begin.state is not None and small else None
     need(small, "initial states of too large a graph, or of one that does not move")
-    shape = "axes" if isinstance(said, dict) and "axes" in said else "radius"
-    center = list(_each(doc, known, fields(said, ("center", shape), "initial_set")["center"], "center"))
+    shape = "axes" if isinstance(section, dict) and "axes" in section else "radius"
+    center = list(_each(doc, verified, fields(section, ("center", shape), "initial_set")["center"], "center"))
     if shape == "axes":
-        axes = entries(said["axes"], "axes")
+        axes = entries(section["axes"], "axes")
         need(len(axes) <= INPUT_NODES, "too many axes")
-        return formulas.InitialSet(center, axes=[list(_each(doc, known, x, "an axis")) for x in axes])
-    radius = list(_each(doc, known, said["radius"], "radius"))
+        return formulas.InitialSet(center, axes=[list(_each(doc, verified, x, "an axis")) for x in axes])
+    radius = list(_each(doc, verified, section["radius"], "radius"))
     need(all(r >= 0 for r in radius), "a radius is negative")
     return formulas.InitialSet(center, radius)
 
 
 def _bounds(
-    doc: Document, known: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
+    doc: Document, verified: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
 ) -> formulas.InputBounds:
-    """Return what bounds the input over the starts."""
-    graph, g, sigma0 = known.structure.graph, known.protocol.gains, list(known.begin.sigma or ())
+    """Return what bounds the input over the initial states."""
+    graph, g, sigma0 = verified.structure.graph, verified.protocol.gains, list(verified.begin.sigma or ())
     whole, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
     own, each = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(whole))
     sized(graph.n_edges + graph.n, own, "the rows of L")
-    spend(len(whole) * (graph.n_edges + graph.n), own + each, own + each, "the starts")
+    spend(len(whole) * (graph.n_edges + graph.n), own + each, own + each, "the initial states")
     rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
     reaching = None
     if any(sigma0):
@@ -223,52 +226,54 @@ def _bounds(
         last = None if None in times else max(map(exact, times))
         push = g["mu1"] + g["delta"]
         reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
-    return formulas.InputBounds(rows, known.gain, [f.form for f in known.functions], constants, initial_set, reaching)
+    return formulas.InputBounds(
+        rows, verified.gain, [f.form for f in verified.functions], constants, initial_set, reaching
+    )
 
 
 # ---------------------------------------------------------------------- peak, energy, length
 
 
-def _peak(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+def _peak(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
-    said = fields(said["peak"], ("agents", "largest", "norm"), "peak")
-    step = doc.open("input-peak", "input", ["z"], witness=True)
-    witness = fields(step["witness"], ("agents", "norm"), "the witness")
-    ways = ordered(known.structure.graph.labels, witness["agents"], "agents").values()
-    own = known.sliding_part() if known.protocol.sliding else [Fraction(0)] * len(bounds.rows)
+    section = fields(section["peak"], ("agents", "largest", "norm"), "peak")
+    obligation = doc.open("input-peak", "input", ["z"], witness=True)
+    witness = fields(obligation["witness"], ("agents", "norm"), "the witness")
+    ways = ordered(verified.structure.graph.labels, witness["agents"], "agents").values()
+    own = verified.sliding_part() if verified.protocol.sliding else [Fraction(0)] * len(bounds.rows)
     least = []
     for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in ways):
         least.append(bounds.bound(formulas.peak_above, v, k, exact(z)) + own[v])
-    peaks = _above(doc, known, said["agents"], "the peak", least)
-    need(exact(said["largest"]) == max(peaks), "the largest peak is another")
-    norm = bounds.bound(formulas.peak_above, None, witness["norm"], step["z"])
+    peaks = _above(doc, verified, section["agents"], "the peak", least)
+    need(exact(section["largest"]) == max(peaks), "the largest peak is another")
+    norm = bounds.bound(formulas.peak_above, None, witness["norm"], obligation["z"])
     norm += formulas.root_above(sum((x * x for x in own), Fraction(0)))
-    need(exact(said["norm"]) >= norm, "the peak of the norm is not proved")
-    doc.done(f"at most {up(max(peaks))}, norm {up(exact(said['norm']))}")
+    need(exact(section["norm"]) >= norm, "the peak of the norm is not proved")
+    doc.done(f"at most {up(max(peaks))}, norm {up(exact(section['norm']))}")
 
 
-def _energy(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+def _energy(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify the energy, by one function or by two matrices."""
     if not isinstance(doc.following.get("witness"), dict):
-        _by_function(doc, said["energy"], "input-energy", formulas.energy_above, bounds)
+        _by_function(doc, section["energy"], "input-energy", formulas.energy_above, bounds)
         return
-    step = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
-    matrices = fields(step["witness"], ("W0", "W1"), "the witness")
+    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
+    matrices = fields(obligation["witness"], ("W0", "W1"), "the witness")
     need(bounds.reaching is None, "sliding variables move")
-    even = _remainder(doc, known, matrices["W0"], Fraction(0), step["m0"], bounds)
-    grown = _remainder(doc, known, matrices["W1"], 1 / known.gain.k, step["m1"], bounds)
-    _at_most(doc, said["energy"], formulas.integral_above(known.gain, even, grown, step["p"]))
+    even = _remainder(doc, verified, matrices["W0"], Fraction(0), obligation["m0"], bounds)
+    grown = _remainder(doc, verified, matrices["W1"], 1 / verified.gain.k, obligation["m1"], bounds)
+    _at_most(doc, section["energy"], formulas.integral_above(verified.gain, even, grown, obligation["p"]))
 
 
-def _path_length(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+def _path_length(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify the length of the path."""
-    _by_function(doc, said["path_length"], "input-length", formulas.length_above, bounds)
+    _by_function(doc, section["path_length"], "input-length", formulas.length_above, bounds)
 
 
 def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
     """Verify a bound for the norm that follows from one function and an instant."""
-    step = doc.open(kind, "input", ["z"], witness=True)
-    _at_most(doc, bound, bounds.bound(of, None, step["witness"], step["z"]))
+    obligation = doc.open(kind, "input", ["z"], witness=True)
+    _at_most(doc, bound, bounds.bound(of, None, obligation["witness"], obligation["z"]))
 
 
 def _at_most(doc: Document, bound: Any, least: Fraction) -> None:
@@ -277,86 +282,88 @@ def _at_most(doc: Document, bound: Any, least: Fraction) -> None:
 
 
 def _remainder(
-    doc: Document, known: Verified, said: Any, c: Fraction, m: Fraction, bounds: formulas.InputBounds
+    doc: Document, verified: Verified, entry: Any, c: Fraction, m: Fraction, bounds: formulas.InputBounds
 ) -> Fraction:
     """Verify ``W L + L'W - c W > m I`` on the range of ``L``, and ``W > 0`` besides unless ``c = 0``.
 
     Returns a bound of the integral of ``e^(c s) ||E||^2``.
     """
-    graph, nodes = known.structure.graph, known.structure.graph.listening
+    graph, nodes = verified.structure.graph, verified.structure.graph.listening
     need_rows(graph.n)
-    rows = triangle(said, len(nodes))
+    rows = triangle(entry, len(nodes))
     W, scale = integers(rows)
     S, more = decrease(doc.exact, W, block(graph, nodes), c, graph.unit)
     for T in [less(S, m * scale * more), *([W] if c else [])]:  # W > 0 need not be known for c = 0: E tends to 0
-        proved = m > 0 and doc.exact.definite(_on_range(doc, known.structure, T))
-        need(proved, f"the inequality of {'W1' if c else 'W0'} is not proved")
+        definite = m > 0 and doc.exact.definite(_on_range(doc, verified.structure, T))
+        need(definite, f"the inequality of {'W1' if c else 'W0'} is not proved")
     return bounds.largest_form(rows) / m
 
 
 def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
-    """Return a form of ``E``, on the nodes that listen, where ``E`` lives: ``L'S L`` on ``kept``, times a scale.
+    """Return a form of ``E``, on the nodes that listen, where ``E`` lives: ``L'S L`` on ``free_nodes``, times a scale.
 
     Where only single nodes are balanced closed components, ``E`` may be anything on the nodes that listen.
     """
     if all(len(group) == 1 for _, group, _ in structure.balanced):
         return S
     rows = [structure.graph.row(v) for v in structure.graph.listening]
-    return only(congruence(doc.exact, S, rows, structure.graph.n), structure.kept)
+    return only(congruence(doc.exact, S, rows, structure.graph.n), structure.free_nodes)
 
 
 # ---------------------------------------------------------------------- limits of actuators
 
 
-def _residual(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+def _residual(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify what is left under each of the limits."""
-    for k, entry in enumerate(said["residual"]):
-        _limited(doc, known, f"input.residual[{k}]", entry, said["peak"], bounds)
+    for k, entry in enumerate(section["residual"]):
+        _under_limits(doc, verified, f"input.residual[{k}]", entry, section["peak"], bounds)
 
 
-def _limited(doc: Document, known: Verified, of: str, said: Any, peak: Any, bounds: formulas.InputBounds) -> None:
+def _under_limits(
+    doc: Document, verified: Verified, of: str, entry: Any, peak: Any, bounds: formulas.InputBounds
+) -> None:
     """Verify what is left at the deadline under limits of the gain, and the largest input."""
     doc.at = of
-    fields(said, LIMIT_KEYS, of)
-    need(not known.protocol.sliding, "limits are for the nominal protocol")
-    cap, stop, period = (None if said[key] is None else exact(said[key]) for key in LIMIT_KEYS[:3])
+    fields(entry, LIMIT_KEYS, of)
+    need(not verified.protocol.sliding, "limits are for the nominal protocol")
+    cap, stop, period = (None if entry[key] is None else exact(entry[key]) for key in LIMIT_KEYS[:3])
     need(all(x is None or x > 0 for x in (cap, stop, period)), "a limit is not positive")
-    need(stop is None or stop < known.gain.T, "a stop beyond the deadline")
-    need(period is None or period <= known.gain.T, "a period beyond the deadline")
-    limits, clock = formulas.Limits(cap, stop, period), exact(said["clock"])
-    top = limits.largest_gain(known.gain)
-    step = doc.open("limited-gain", of, ["growth"], witness=True)
-    chosen = [step["witness"]] if said["noise"] is None else entries(step["witness"], "the witness", 2)
+    need(stop is None or stop < verified.gain.T, "a stop beyond the deadline")
+    need(period is None or period <= verified.gain.T, "a period beyond the deadline")
+    limits, clock = formulas.Limits(cap, stop, period), exact(entry["clock"])
+    top = limits.largest_gain(verified.gain)
+    obligation = doc.open("limited-gain", of, ["growth"], witness=True)
+    chosen = [obligation["witness"]] if entry["noise"] is None else entries(obligation["witness"], "the witness", 2)
     k = chosen[0]
     form = bounds.form(k)
-    need(period is not None or step["growth"] == 0, "growth belongs to a held gain")
+    need(period is not None or obligation["growth"] == 0, "growth belongs to a held gain")
     if period is not None:
-        _growth(doc, known.structure, form, step["growth"])
-    need(0 <= clock <= limits.clock_below(known.gain), "the clock does not come so far")
-    left = bounds.share(k, limits, clock, step["growth"]) * bounds.start(k)
-    norm = bounds.root_constant(k, None) * left
-    need(exact(said["norm"]) >= norm, "what is left is not proved")
-    if said["agents"] is not None:
+        _growth(doc, verified.structure, form, obligation["growth"])
+    need(0 <= clock <= limits.clock_below(verified.gain), "the clock does not come so far")
+    root = bounds.share(k, limits, clock, obligation["growth"]) * bounds.initial_root(k)
+    norm = bounds.root_constant(k, None) * root
+    need(exact(entry["norm"]) >= norm, "what is left is not proved")
+    if entry["agents"] is not None:
         deviation = doc.data["lyapunov"]["functions"][k]["deviation"]
         need(deviation is not None, "deviations without constants")
-        least = [formulas.root_above(c) * left for c in _each(doc, known, deviation["agents"], "agents")]
+        least = [formulas.root_above(c) * root for c in _each(doc, verified, deviation["agents"], "agents")]
         if period is None:
-            most = _largest_deviation(known.final, bounds.initial_set)
+            most = _largest_deviation(verified.final, bounds.initial_set)
             least = [min(x, most) for x in least]
-        _above(doc, known, said["agents"], "what is left", least)
-    need((said["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
-    if said["largest"] is not None:
-        ends = [top * max(bounds.held)] + ([exact(peak["largest"])] if peak is not None else [])
-        need(exact(said["largest"]) >= min(ends), "the largest input is not proved")
-    if said["noise"] is not None:
+        _above(doc, verified, entry["agents"], "what is left", least)
+    need((entry["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
+    if entry["largest"] is not None:
+        ends = [top * max(bounds.error_bounds)] + ([exact(peak["largest"])] if peak is not None else [])
+        need(exact(entry["largest"]) >= min(ends), "the largest input is not proved")
+    if entry["noise"] is not None:
         need(period is None, "noise of a held gain")
-        noise = {key: exact(x) for key, x in fields(said["noise"], ("bound", "norm", "largest"), "noise").items()}
+        noise = {key: exact(x) for key, x in fields(entry["noise"], ("bound", "norm", "largest"), "noise").items()}
         need(noise["bound"] > 0, "noise of no size")
         whole, each = bounds.noisy(chosen[1], noise["bound"])
         need(noise["norm"] >= norm + whole, "what is left by noise is not proved")
-        largest = exact(said["largest"]) + top * max(each)
+        largest = exact(entry["largest"]) + top * max(each)
         need(noise["largest"] >= largest, "the largest input under noise is not proved")
-    doc.done(f"||E|| at most {up(exact(said['norm']))} at the deadline")
+    doc.done(f"||E|| at most {up(exact(entry['norm']))} at the deadline")
 
 
 def _largest_deviation(final: FinalState, initial_set: formulas.InitialSet) -> Fraction:
@@ -368,7 +375,7 @@ def _largest_deviation(final: FinalState, initial_set: formulas.InitialSet) -> F
 
 
 def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fraction) -> None:
-    """Verify ``m F - L'F L > 0`` on ``kept`` for the form ``F = L'P L`` of the state."""
+    """Verify ``m F - L'F L > 0`` on ``free_nodes`` for the form ``F = L'P L`` of the state."""
     graph = structure.graph
     need(form.coordinates == "E", "deviations say nothing of a step")
     F = congruence(doc.exact, form.entries[0], [graph.row(v) for v in form.nodes], graph.n)
@@ -376,27 +383,35 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
     p, q = (growth * graph.unit**2).as_integer_ratio()
     bits, ratio = longest(chain.from_iterable([*F, *step])), longest((p, q))
     sized(graph.n**2, bits + ratio, "L'F L")
-    spend(2 * len(structure.kept) ** 2, bits, ratio, "L'F L")
-    S = [[p * F[i][j] - q * step[i][j] for j in structure.kept] for i in structure.kept]
+    spend(2 * len(structure.free_nodes) ** 2, bits, ratio, "L'F L")
+    S = [[p * F[i][j] - q * step[i][j] for j in structure.free_nodes] for i in structure.free_nodes]
     need(doc.exact.definite(S), "the growth of a step is not proved")
 
 
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
-def _disturbed(doc: Document, known: Verified, said: Any, bounds: formulas.InputBounds) -> None:
+def _disturbance(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
-    need(not known.protocol.sliding, "the sliding-mode protocol has its own claims")
-    said = fields(said["disturbed"], ("delta", "inputs", "drift"), "disturbed")
-    step = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
-    delta = exact(said["delta"])
-    need(delta == step["delta"] and delta > 0, "another delta")
-    _above(doc, known, said["inputs"], "the input", bounds.disturbed(step["witness"], delta))
-    if said["drift"] is not None:
-        drift = [delta * known.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in known.final.projection]
-        _above(doc, known, said["drift"], "the drift", drift)
+    need(not verified.protocol.sliding, "the sliding-mode protocol has its own claims")
+    section = fields(section["disturbed"], ("delta", "inputs", "drift"), "disturbed")
+    obligation = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
+    delta = exact(section["delta"])
+    need(delta == obligation["delta"] and delta > 0, "another delta")
+    _above(doc, verified, section["inputs"], "the input", bounds.disturbed(obligation["witness"], delta))
+    if section["drift"] is not None:
+        drift = [
+            delta * verified.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in verified.final.projection
+        ]
+        _above(doc, verified, section["drift"], "the drift", drift)
     doc.done(f"for every disturbance within {down(delta)}")
 
 
 #: What is verified of initial states, by key, in the order of the proof.
-PARTS = {"peak": _peak, "energy": _energy, "path_length": _path_length, "residual": _residual, "disturbed": _disturbed}
+PARTS = {
+    "peak": _peak,
+    "energy": _energy,
+    "path_length": _path_length,
+    "residual": _residual,
+    "disturbed": _disturbance,
+}

@@ -1,10 +1,11 @@
 """Proved bounds of the input of the nominal protocol, ``u = gain(t) E``, with the standard library alone.
 
 With ``k = rho2 kappa`` and ``z = ln(T/(T - t))`` the gain is ``rho1 + (k/T) e^z`` and the stretched clock
-``s = rho1 T (1 - e^-z) + k z``. What is known of an agent is ``|e_k| <= min(held, start e^(-rate s / 2))``: ``held``
-for all times, ``start`` from a Lyapunov function of that rate. The bounds below use ``held`` up to an instant ``z`` and
-``start`` from there on; every ``z`` gives a valid one. The energy follows besides from two Lyapunov equations. All
-arguments are rationals, every rounding is upwards (or downwards where a name says ``below``).
+``s = rho1 T (1 - e^-z) + k z``. What is known of an agent is ``|e_k| <= min(error_bound, amplitude e^(-rate s / 2))``:
+``error_bound`` for all times, ``amplitude`` from a Lyapunov function of that rate. The bounds below use ``error_bound``
+up to an instant ``z`` and ``amplitude`` from there on; every ``z`` gives a valid one. The energy follows besides from
+two Lyapunov equations. All arguments are rationals, every rounding is upwards (or downwards where a name says
+``below``).
 """
 
 from __future__ import annotations
@@ -100,7 +101,9 @@ class PrescribedGain:
         return self.rho1**2 * self.T * (1 - q) + 2 * self.rho1 * self.k * z + self.k**2 / self.T * (1 / q - 1)
 
 
-def peak_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
+def peak_above(
+    gain: PrescribedGain, error_bound: Fraction, amplitude: Fraction, rate: Fraction, z: Fraction
+) -> Fraction:
     """Bound ``sup_t gain(t) |e_k(t)|`` for ``rate k >= 2``.
 
     Up to ``z`` the gain grows to its value there; from there on ``gain e^(-rate s / 2)`` no longer grows, since
@@ -123,15 +126,17 @@ def peak_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Frac
         raise ValueError("the input is not bounded by this rate")
     low, high = exp(-z, BITS)
     top = gain.value(low)
-    late = start * decay_above(rate / 2 * gain.clock(z, high)) * top
-    return rounded(late if z == 0 else max(held * top, late), BITS, up=True)
+    late = amplitude * decay_above(rate / 2 * gain.clock(z, high)) * top
+    return rounded(late if z == 0 else max(error_bound * top, late), BITS, up=True)
 
 
-def energy_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
+def energy_above(
+    gain: PrescribedGain, error_bound: Fraction, amplitude: Fraction, rate: Fraction, z: Fraction
+) -> Fraction:
     """Bound ``int_0^T (gain |e|)^2 dt`` for ``rate k > 1``.
 
-    Up to ``z`` it is ``held^2 int_0^t gain^2 dt``, and from there on, integrated by parts,
-    ``start^2 e^(-rate s) (gain + (k/T) e^z / (rate k - 1)) / rate`` at most.
+    Up to ``z`` it is ``error_bound^2 int_0^t gain^2 dt``, and from there on, integrated by parts,
+    ``amplitude^2 e^(-rate s) (gain + (k/T) e^z / (rate k - 1)) / rate`` at most.
 
     Raises
     ------
@@ -147,13 +152,15 @@ def energy_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fr
     if rate * gain.k <= 1:
         raise ValueError("the energy is not bounded by this rate")
     low, high = exp(-z, BITS)
-    late = start**2 * decay_above(rate * gain.clock(z, high)) / rate
+    late = amplitude**2 * decay_above(rate * gain.clock(z, high)) / rate
     late *= gain.value(low) + gain.k / (gain.T * low) / (rate * gain.k - 1)
-    return rounded((held**2 * gain.square(z, low) if z else 0) + late, BITS, up=True)
+    return rounded((error_bound**2 * gain.square(z, low) if z else 0) + late, BITS, up=True)
 
 
-def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction, z: Fraction) -> Fraction:
-    """Bound ``int_0^T gain |e| dt = int |e| ds`` by ``held s(z) + (2/rate) start e^(-rate s(z) / 2)``.
+def length_above(
+    gain: PrescribedGain, error_bound: Fraction, amplitude: Fraction, rate: Fraction, z: Fraction
+) -> Fraction:
+    """Bound ``int_0^T gain |e| dt = int |e| ds`` by ``error_bound s(z) + (2/rate) amplitude e^(-rate s(z) / 2)``.
 
     Examples
     --------
@@ -162,8 +169,8 @@ def length_above(gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fr
     3.0
     """
     low, high = exp(-z, BITS)
-    late = 2 / rate * start * decay_above(rate / 2 * gain.clock(z, high))
-    return rounded((held * gain.clock(z, low) if z else 0) + late, BITS, up=True)
+    late = 2 / rate * amplitude * decay_above(rate / 2 * gain.clock(z, high))
+    return rounded((error_bound * gain.clock(z, low) if z else 0) + late, BITS, up=True)
 
 
 def integral_above(gain: PrescribedGain, even: Fraction, grown: Fraction, p: Fraction) -> Fraction:
@@ -227,22 +234,29 @@ class Limits:
         """
         latest = self.end(gain) if self.sample_period is None else self.sample_period * (self.periods(gain) - 1)
         if latest < gain.T:
-            return self.acting(gain, latest)
+            return self.gain_at(gain, latest)
         if self.gain_cap is None:
             raise ValueError("nothing limits the gain")
         return self.gain_cap
 
-    def acting(self, gain: PrescribedGain, t: Fraction) -> Fraction:
-        """Return what the cap leaves of ``gain`` at an instant before the deadline."""
+    def gain_at(self, gain: PrescribedGain, t: Fraction) -> Fraction:
+        """Return ``min(gain(t), gain_cap)``, what the cap leaves of ``gain`` at an instant ``t`` before the deadline.
+
+        Parameters
+        ----------
+        gain : PrescribedGain
+        t : Fraction
+            In ``[0, T)``, in units of time.
+        """
         value = gain.value(1 - t / gain.T)
         return value if self.gain_cap is None else min(value, self.gain_cap)
 
     def end(self, gain: PrescribedGain) -> Fraction:
-        """Return the instant from which on the gain is 0, or the deadline."""
+        """Return the instant from which on ``gain`` is 0, or the deadline."""
         return gain.T - (self.stop_before or 0)
 
     def periods(self, gain: PrescribedGain) -> int:
-        """Return the number of periods that begin before the end.
+        """Return the number of sampling periods that begin before ``gain`` ends.
 
         Raises
         ------
@@ -264,7 +278,7 @@ class Limits:
         ValueError
             Nothing limits the gain: the integral is infinite.
         """
-        lost = (self.sample_period or 0) * (self.largest_gain(gain) - self.acting(gain, Fraction(0)))
+        lost = (self.sample_period or 0) * (self.largest_gain(gain) - self.gain_at(gain, Fraction(0)))
         return rounded(max(self.integrals(gain)[0] - lost, Fraction(0)), BITS)
 
     def integrals(self, gain: PrescribedGain) -> Interval:
@@ -312,10 +326,10 @@ def sampled_above(gain: PrescribedGain, limits: Limits, rate: Fraction, growth: 
     spend(300 * (count - first), bits, bits, "held gains")
     if first:
         clock, square = Limits(limits.gain_cap, gain.T - h * first).integrals(gain)
-        lost = h * (limits.acting(gain, h * first) - limits.acting(gain, Fraction(0)))
+        lost = h * (limits.gain_at(gain, h * first) - limits.gain_at(gain, Fraction(0)))
         factor = decay_above(rate * max(clock - lost, Fraction(0)) - growth * h * square)
     for j in range(first, count):
-        eta = limits.acting(gain, h * j) * min(h, end - h * j)
+        eta = limits.gain_at(gain, h * j) * min(h, end - h * j)
         factor = rounded(factor * max(1 - eta * rate + eta**2 * growth, Fraction(0)), BITS, up=True)
     return factor
 
@@ -399,8 +413,8 @@ class Reaching:
     @cached_property
     def quiet(self) -> Fraction:
         """``z = ln(T/(T - t))``, ``T = T_r + T_s``, from above, of an instant from which on all are 0."""
-        left = self.T_s + (0 if self.z is None else self.T_r * exp(-self.z, BITS)[0])
-        return log((self.T_r + self.T_s) / left, BITS)[1]
+        remaining = self.T_s + (0 if self.z is None else self.T_r * exp(-self.z, BITS)[0])
+        return log((self.T_r + self.T_s) / remaining, BITS)[1]
 
     def decay(self, remaining: Interval) -> Interval:
         """Enclose ``psi`` where ``1 - t/T`` is within an interval."""
@@ -465,7 +479,7 @@ class InputBounds:
     constants: Sequence[Sequence[Fraction] | None]
     initial_set: InitialSet
     reaching: Reaching | None = None
-    _kept: dict[Any, Any] = field(default_factory=dict)
+    _cache: dict[Any, Any] = field(default_factory=dict)
 
     def form(self, k: int) -> Form:
         """Return the Lyapunov function ``k``.
@@ -488,26 +502,26 @@ class InputBounds:
         return Fraction(0) if self.reaching is None else self.reaching.quiet
 
     @cached_property
-    def held(self) -> list[Fraction]:
+    def error_bounds(self) -> list[Fraction]:
         """What no ``|e_k|`` ever exceeds: ``e^(-L s)`` expands neither ``max |x_k|`` nor ``max |e_k|``."""
         largest = max(map(self.initial_set.largest, self.rows))
         states = max(self.initial_set.largest({v: Fraction(1)}) for v in range(len(self.rows)))
         if self.reaching is not None:
-            moved, T_r = [self.reaching.pushes(row) for row in self.rows], self.reaching.T_r
-            largest += max(a for a, _ in moved) + T_r * max(b for _, b in moved)
+            pushes, T_r = [self.reaching.pushes(row) for row in self.rows], self.reaching.T_r
+            largest += max(a for a, _ in pushes) + T_r * max(b for _, b in pushes)
             states += max(map(abs, self.reaching.sigma0)) + T_r * self.reaching.push
         return [min(largest, 2 * row.get(v, Fraction(0)) * states) for v, row in enumerate(self.rows)]
 
     @cached_property
-    def held_norm(self) -> Fraction:
+    def error_norm(self) -> Fraction:
         """What ``||E||`` never exceeds."""
-        return root_above(sum((x * x for x in self.held), Fraction(0)))
+        return root_above(sum((x * x for x in self.error_bounds), Fraction(0)))
 
-    def start(self, k: int) -> Fraction:
+    def initial_root(self, k: int) -> Fraction:
         """Bound ``sqrt(V(0))`` of the set; ``sqrt(V) <= e^(-rate s / 2) v`` while no sliding variable moves."""
-        if k not in self._kept:
-            self._kept[k] = rounded(self._largest_root(self.form(k)), BITS, up=True)
-        return self._kept[k]
+        if k not in self._cache:
+            self._cache[k] = rounded(self._largest_root(self.form(k)), BITS, up=True)
+        return self._cache[k]
 
     def _coordinates(self, form: Form) -> list[Linear]:
         """Return the rows of the coordinates of a form: of ``L``, or of ``X - (p'G X / p'1) G 1``."""
@@ -535,15 +549,15 @@ class InputBounds:
         middle = root_above(value(initial_set.center))
         if initial_set.point:
             return middle
-        spread = (
+        excess = (
             _spread(form, rows, initial_set.radius)
             if initial_set.radius
             else sum(map(value, initial_set.axes), Fraction(0))
         )
         entries = root_above(form.value([initial_set.largest(row) for row in rows], sizes=True))
-        return min(entries, middle + root_above(spread))
+        return min(entries, middle + root_above(excess))
 
-    def _reached(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
+    def _pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
         """Bound ``sqrt(V)`` in pieces of the time up to ``z``, while sliding variables move.
 
         From ``z`` on ``sqrt(V)`` is at most the number that is returned besides, times ``e^(-rate s / 2)``.
@@ -551,10 +565,10 @@ class InputBounds:
         In a piece from ``a`` to ``b`` of the time ``sqrt(V)`` gains at most ``w (psi(a) - psi(b)) + f (b - a)``, ``w``
         and ``f`` being the norms of what bounds ``L sigma``, ``|sigma_k| <= |sigma_k(0)|``, and ``L f``.
         """
-        if (k, z) in self._kept:
-            return self._kept[k, z]
+        if (k, z) in self._cache:
+            return self._cache[k, z]
         assert self.reaching is not None
-        gain, form, v, pieces = self.gain, self.form(k), self.start(k), list[Piece]()
+        gain, form, v, pieces = self.gain, self.form(k), self.initial_root(k), list[Piece]()
         bits = length((gain.T, gain.rho1, gain.k, z, self.reaching.T_r, self.reaching.mu2))
         spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
         pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
@@ -569,8 +583,8 @@ class InputBounds:
             passed = max(gain.clock(b, nearest) - gain.clock(a, low), Fraction(0))
             v = rounded(v * decay_above(form.rate / 2 * passed) + added, BITS, up=True)
         begin = rounded(v * exp(form.rate / 2 * gain.clock(z, instants[-1][1][0]), BITS)[1], BITS, up=True)
-        self._kept[k, z] = pieces, begin
-        return self._kept[k, z]
+        self._cache[k, z] = pieces, begin
+        return self._cache[k, z]
 
     def share(self, k: int, limits: Limits, clock: Fraction, growth: Fraction) -> Fraction:
         """Bound ``sqrt(V)`` at the deadline over ``sqrt(V(0))`` under limits of the gain that leave this clock."""
@@ -586,9 +600,9 @@ class InputBounds:
         ValueError
             Those of a full matrix are not known.
         """
-        form, known = self.form(k), self.constants[k]
-        if known is not None:
-            return known
+        form, constants = self.form(k), self.constants[k]
+        if constants is not None:
+            return constants
         if form.diagonal is None:
             raise ValueError("a full matrix without constants")
         weight = dict(zip(form.nodes, form.diagonal, strict=True))
@@ -615,22 +629,22 @@ class InputBounds:
             raise ValueError("an instant at which sliding variables still move, or one too late")
         bits = length((self.gain.T, self.gain.rho1, self.gain.k, self.form(k).rate, z))
         spend(50, bits, bits, "bounds of the input")
-        held = self.held_norm if v is None else self.held[v]
+        error_bound = self.error_norm if v is None else self.error_bounds[v]
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
-            return of(self.gain, held, c * self.start(k), rate, z)
-        pieces, begin = self._reached(k, z)
+            return of(self.gain, error_bound, c * self.initial_root(k), rate, z)
+        pieces, begin = self._pieces(k, z)
         late = of(self.gain, Fraction(0), c * begin, rate, z)
         if of is peak_above:  # gain e^(-rate s / 2) does not grow
             most = max(p.first * p.root + p.last * p.added for p in pieces)
-            return rounded(max(late, min(c * most, held * pieces[-1].last)), BITS, up=True)
+            return rounded(max(late, min(c * most, error_bound * pieces[-1].last)), BITS, up=True)
         for p in pieces:
-            size = min(c * (p.root + p.added), held)
+            size = min(c * (p.root + p.added), error_bound)
             late += p.square * size**2 if of is energy_above else p.clock * size
         return rounded(late, BITS, up=True)
 
     def largest_form(self, W: Rows) -> Fraction:
-        """Bound ``E(0)'W E(0)`` over the starts, ``E`` on the nodes that listen, in order."""
+        """Bound ``E(0)'W E(0)`` over the initial states, ``E`` on the nodes that listen, in order."""
         nodes, one = [v for v, row in enumerate(self.rows) if row], Fraction(1)
         return self._largest_root(Form(one, "E", nodes, None, W, one)) ** 2
 

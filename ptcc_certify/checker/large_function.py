@@ -37,14 +37,14 @@ def check_dominance(
     weights: Numbers,
     rate: Fraction,
     of: str,
-    proved: Proved,
+    proofs: Proved,
 ) -> None:
     """Verify ``S_ii d_i > sum_j |S_ij| d_j`` for all rows, after each leader group by itself."""
     graph, number = structure.graph, structure.number
-    step = doc.open("dominance", of, ["b"], witness=True)
-    need(step["b"] == rate, "b is not the rate")
-    said = fields(step["witness"], ("vector", "groups"), "the witness")
-    vector = doc.files.numbers(said["vector"], "vector", len(nodes))
+    obligation = doc.open("dominance", of, ["b"], witness=True)
+    need(obligation["b"] == rate, "b is not the rate")
+    witness = fields(obligation["witness"], ("vector", "groups"), "the witness")
+    vector = doc.files.numbers(witness["vector"], "vector", len(nodes))
     need(vector.positive(), "the vector is not positive")
     (own, scale), (each, _) = (numbers.over(range(len(nodes))) for numbers in (weights, vector))
     W, D = [0] * graph.n, [0] * graph.n
@@ -52,74 +52,74 @@ def check_dominance(
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
     spare = {}  # of leader groups, by which g_k exceeds the rate
-    for k, entry in zip(groups, entries(said["groups"], "groups", len(groups)), strict=True):
-        g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proved)
+    for k, entry in zip(groups, entries(witness["groups"], "groups", len(groups)), strict=True):
+        g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proofs)
         spare[k] = ((g - rate) * graph.unit).as_integer_ratio()
     # w_i d_i times rate, less what the others push, times q and unit
     p, q = (rate * graph.unit).as_integer_ratio()
     bits = longest((p, q, *chain.from_iterable(spare.values()))) + graph.bits
     spend(5 * len(nodes), bits, longest(W) + longest(D), "rows")
-    heard, diagonal = graph.heard(D), graph.diagonal
+    row_sums, diagonal = graph.sums_in(D), graph.diagonal
     pushes = [0 if k >= 0 else w * d for k, w, d in zip(number, W, D, strict=True)]
-    pushed = graph.hearing(pushes)
+    column_sums = graph.sums_out(pushes)
     for v in nodes:
         if number[v] < 0:
-            left = (2 * q * diagonal[v] - p) * pushes[v] - q * (W[v] * heard[v] + pushed[v])
+            margin = (2 * q * diagonal[v] - p) * pushes[v] - q * (W[v] * row_sums[v] + column_sums[v])
         else:
             top, bottom = spare[number[v]]
-            left = top * W[v] * D[v] - bottom * pushed[v]
-        need(left > 0, "a row is not dominated by its diagonal")
+            margin = top * W[v] * D[v] - bottom * column_sums[v]
+        need(margin > 0, "a row is not dominated by its diagonal")
     doc.done(f"b = {down(rate)}, {len(nodes)} rows")
 
 
 def _group(
-    doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, said: Any, proved: Proved
+    doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, entry: Any, proofs: Proved
 ) -> Fraction:
     """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
-    has_factor = isinstance(said, dict)
+    has_factor = isinstance(entry, dict)
     if has_factor:
-        fields(said, ("rate", "factor"), "a leader group")
-    g, common = exact(said["rate"] if has_factor else said), math.gcd(*weights)
+        fields(entry, ("rate", "factor"), "a leader group")
+    g, common = exact(entry["rate"] if has_factor else entry), math.gcd(*weights)
     key = k, g, tuple(w // common for w in weights)
-    if key in proved:
+    if key in proofs:
         need(not has_factor, "a factor of a leader group that is proved already")
     elif has_factor:
-        _factor(doc, structure, k, Fraction(common, scale), key[2], g, said["factor"])
+        _factor(doc, structure, k, Fraction(common, scale), key[2], g, entry["factor"])
     else:
         need(group_decrease(doc, structure, k, key[2], g), "a leader group is not proved")
-    proved.add(key)
+    proofs.add(key)
     return g
 
 
 def _factor(
-    doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, said: Any
+    doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, section: Any
 ) -> None:
     """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
     keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
-    said, read, arithmetic = fields(said, keys, "factor"), doc.files.integers, doc.exact
+    section, read, arithmetic = fields(section, keys, "factor"), doc.files.integers, doc.exact
     group, gauge = structure.closed[k], structure.gauges[k]
     n = len(group) - (gauge is not None)
     order, exponents, indptr = (
-        read(said[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
+        read(section[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
     )
-    vector = None if said["weights"] is None else read(said["weights"], "weights", n)
+    vector = None if section["weights"] is None else read(section["weights"], "weights", n)
     few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
     need(few, "the factor has too many entries")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
-    indices, data = (read(said[key], key, indptr[-1]) for key in ("indices", "data"))
+    indices, data = (read(section[key], key, indptr[-1]) for key in ("indices", "data"))
     A, basis, unit = block(structure.graph, group), None, structure.graph.unit
-    if said["parents"] is not None:
+    if section["parents"] is not None:
         need(gauge is not None, "parents of a group that is not balanced")
-        basis = _differences(A, ratios, gauge or (), read(said["parents"], "parents", len(group)))
+        basis = _differences(A, ratios, gauge or (), read(section["parents"], "parents", len(group)))
     elif gauge is not None:
         basis = [{j - 1: x for j, x in row.items() if j} for row in A]
     lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
-    if gauge is not None and said["parents"] is None:
+    if gauge is not None and section["parents"] is None:
         scale *= unit**2
-    factor = SparseFactor(order, indptr, indices, data, exponents, said["bits"], vector)
-    proved = arithmetic.residual_definite(n, lower, factor, said["power"], scale * times.denominator)
-    need(proved, "a leader group is not proved by its factor")
+    factor = SparseFactor(order, indptr, indices, data, exponents, section["bits"], vector)
+    definite = arithmetic.residual_definite(n, lower, factor, section["power"], scale * times.denominator)
+    need(definite, "a leader group is not proved by its factor")
 
 
 def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:

@@ -48,37 +48,37 @@ class Function:
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
     """Verify every Lyapunov function."""
-    said, of_paper = doc.section("lyapunov"), paper is not None and paper.rate is not None
-    listed = entries(fields(said, ("functions",), "lyapunov")["functions"], "functions")
-    need(len(listed) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
-    need(not of_paper or bool(listed), "the paper's certificate is not among the Lyapunov functions")
-    need(bool(structure.graph.listening) or not listed, "a Lyapunov function where nothing moves")
+    section, of_paper = doc.section("lyapunov"), paper is not None and paper.rate is not None
+    items = entries(fields(section, ("functions",), "lyapunov")["functions"], "functions")
+    need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
+    need(not of_paper or bool(items), "the paper's certificate is not among the Lyapunov functions")
+    need(bool(structure.graph.listening) or not items, "a Lyapunov function where nothing moves")
     functions: list[Function] = []
-    scaled: tuple[Matrix, Fraction] | None
-    proved: Proved = set()
-    for k, given in enumerate(listed):
+    form: tuple[Matrix, Fraction] | None
+    proofs: Proved = set()
+    for k, entry in enumerate(items):
         doc.at = of = f"lyapunov.functions[{k}]"
-        fields(given, ("class", *KEYS, "deviation"), "a Lyapunov function")
+        fields(entry, ("class", *KEYS, "deviation"), "a Lyapunov function")
         if k == 0 and paper is not None and of_paper:
-            function, scaled = _of_paper(doc, paper, given)
-        elif given["class"] in ("perron", "lmi") and doc.following.get("kind") == "dominance":
-            function, scaled = _by_rows(doc, structure, given, of, proved), None
+            function, form = _of_paper(doc, paper, entry)
+        elif entry["class"] in ("perron", "lmi") and doc.following.get("kind") == "dominance":
+            function, form = _by_rows(doc, structure, entry, of, proofs), None
         else:
-            function, scaled = _searched(doc, structure, given, of)
+            function, form = _searched(doc, structure, entry, of)
         functions.append(function)
-        if given["deviation"] is not None:
-            if scaled is None:
+        if entry["deviation"] is not None:
+            if form is None:
                 raise RejectedError("a deviation without a form")
-            _deviation(doc, final, given["deviation"], scaled, of)
+            _deviation(doc, final, entry["deviation"], form, of)
     return functions
 
 
 def _of_paper(doc: Document, paper: Paper, function: Any) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Return the paper's function, which was verified before, with its form of the state."""
-    said, form = doc.data["paper"], paper.form
-    equal = function["class"] == "paper" and all(same(function[key], said[key]) for key in KEYS)
+    section, form = doc.data["paper"], paper.form
+    equal = function["class"] == "paper" and all(same(function[key], section[key]) for key in KEYS)
     need(equal, "the first Lyapunov function is not the paper's certificate")
-    function = Function("paper", form.rate, exact(said["overshoot"]), form)
+    function = Function("paper", form.rate, exact(section["overshoot"]), form)
     return function, form.of_state(doc.exact, paper.structure.graph)
 
 
@@ -86,21 +86,21 @@ def _block(doc: Document, structure: Structure, function: Any, shape: str) -> tu
     """Return the nodes of the one block of a function, and its entries as they are written."""
     need(function["class"] in ("perron", "lmi", "full"), "an unknown class")
     need(function["coordinates"] == "E" and function["rho"] is None, "other coordinates, or a rho")
-    (said,) = entries(function["blocks"], "blocks", 1)
-    fields(said, ("name", "nodes", shape, "times_rho"), "a block")
-    need(said["name"] == "P" and said["times_rho"] is False, "another block")
+    (entry,) = entries(function["blocks"], "blocks", 1)
+    fields(entry, ("name", "nodes", shape, "times_rho"), "a block")
+    need(entry["name"] == "P" and entry["times_rho"] is False, "another block")
     listening = structure.graph.listening
-    nodes = positions(doc, structure.graph, said["nodes"], "nodes of a block", len(listening))
+    nodes = positions(doc, structure.graph, entry["nodes"], "nodes of a block", len(listening))
     need(sorted(nodes) == listening, "nodes of a block")
-    return nodes, said[shape]
+    return nodes, entry[shape]
 
 
-def _by_rows(doc: Document, structure: Structure, function: Any, of: str, proved: Proved) -> Function:
+def _by_rows(doc: Document, structure: Structure, function: Any, of: str, proofs: Proved) -> Function:
     """Verify a diagonal function of a large graph row by row."""
-    nodes, said = _block(doc, structure, function, "diagonal")
-    weights, rate = doc.files.numbers(said, "diagonal", len(nodes)), exact(function["rate"])
+    nodes, entry = _block(doc, structure, function, "diagonal")
+    weights, rate = doc.files.numbers(entry, "diagonal", len(nodes)), exact(function["rate"])
     need(weights.positive(), "a weight is not positive")
-    check_dominance(doc, structure, nodes, weights, rate, of, proved)
+    check_dominance(doc, structure, nodes, weights, rate, of, proofs)
     overshoot = Fraction(max(weights.values)) / Fraction(min(weights.values))
     need(exact(function["overshoot"]) == overshoot, "the overshoot constant is another")
     return Function(function["class"], rate, overshoot, None)
@@ -109,21 +109,21 @@ def _by_rows(doc: Document, structure: Structure, function: Any, of: str, proved
 def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Verify rate and overshoot constant of a diagonal or a full matrix; return its form of the state besides."""
     full, graph = function["class"] == "full", structure.graph
-    nodes, said = _block(doc, structure, function, "lower_triangle" if full else "diagonal")
+    nodes, entry = _block(doc, structure, function, "lower_triangle" if full else "diagonal")
     need_rows(graph.n)
     rate = exact(function["rate"])
     if full:
-        form = Form(rate, "E", nodes, None, triangle(said, len(nodes)), Fraction(0))
+        form = Form(rate, "E", nodes, None, triangle(entry, len(nodes)), Fraction(0))
     else:
-        need(not beside(said), "a side vector where it has no place")
-        weights = list(doc.files.numbers(said, "diagonal", len(nodes)))
+        need(not beside(entry), "a side vector where it has no place")
+        weights = list(doc.files.numbers(entry, "diagonal", len(nodes)))
         low, high = min(weights), max(weights)
         need(low > 0, "a weight is not positive")
         form = Form(rate, "E", nodes, weights, None, low)
     need(doc.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
     F, times = form.of_state(doc.exact, graph)
-    proved = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.kept)
-    need(proved, "not proved definite")
+    definite = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.free_nodes)
+    need(definite, "not proved definite")
     doc.done(f"b = {down(rate)}, class {function['class']}")
     if form.matrix:
         low, high = _ends(doc, form.matrix, of)
@@ -142,13 +142,13 @@ def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[F
     return low, high
 
 
-def _deviation(doc: Document, final: FinalState, said: Any, scaled: tuple[Matrix, Fraction], of: str) -> None:
-    """Verify ``(x_k - (Q x)_k)^2 <= c_k V`` and ``||x - Q x||^2 <= c V``, in the coordinates ``kept``."""
+def _deviation(doc: Document, final: FinalState, section: Any, scaled_form: tuple[Matrix, Fraction], of: str) -> None:
+    """Verify ``(x_k - (Q x)_k)^2 <= c_k V`` and ``||x - Q x||^2 <= c V``, in the coordinates ``free_nodes``."""
     doc.open("deviation", of)
-    structure, (form, scale) = final.structure, scaled
+    structure, (form, scale) = final.structure, scaled_form
     labels = structure.graph.labels
-    agents = ordered(labels, fields(said, ("agents", "norm"), "deviation")["agents"], "agents")
-    (D, common, gram), S = final.deviations, only(form, structure.kept)
+    agents = ordered(labels, fields(section, ("agents", "norm"), "deviation")["agents"], "agents")
+    (D, common, gram), S = final.deviations, only(form, structure.free_nodes)
     forms: list[tuple[list[int], int]] = []
     for row, text in zip(D, agents.values(), strict=True):
         p, q = (exact(text) * common**2 / scale).as_integer_ratio()
@@ -157,7 +157,7 @@ def _deviation(doc: Document, final: FinalState, said: Any, scaled: tuple[Matrix
         forms.append(([q * x for x in row], q * p))
     failed = doc.exact.bounded(S, forms)  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
-    p, q = (exact(said["norm"]) * common**2 / scale).as_integer_ratio()
+    p, q = (exact(section["norm"]) * common**2 / scale).as_integer_ratio()
     N = combined("the deviation of the norm", (p, S), (-q, gram))
     need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
-    doc.done(f"norm at most {up(exact(said['norm']))}")
+    doc.done(f"norm at most {up(exact(section['norm']))}")

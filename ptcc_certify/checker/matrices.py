@@ -57,8 +57,8 @@ def times(exact: Arithmetic, A: Matrix, B: Sparse, width: int) -> Matrix:
 
 def congruence(exact: Arithmetic, P: Matrix, A: Sparse, width: int) -> Matrix:
     """Return ``A'P A`` for a symmetric ``P``; ``A`` has so many columns."""
-    left = transposed(times(exact, P, A, width)) if P else [[] for _ in range(width)]
-    return times(exact, left, A, width)
+    product = transposed(times(exact, P, A, width)) if P else [[] for _ in range(width)]
+    return times(exact, product, A, width)
 
 
 def combined(what: str, *terms: tuple[int, Matrix]) -> Matrix:
@@ -84,9 +84,9 @@ def decrease(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int) ->
     return combined("F A + A'F - b F", (q, FA), (q, transposed(FA)), (-p, F)), q * unit
 
 
-def decays(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int, kept: Sequence[int]) -> bool:
+def decays(exact: Arithmetic, F: Matrix, A: Sparse, b: Fraction, unit: int, columns: Sequence[int]) -> bool:
     """Tell whether ``F A + A'F - b F > 0`` is proved on some coordinates; see :func:`decrease`."""
-    return exact.definite(only(decrease(exact, F, A, b, unit)[0], kept))
+    return exact.definite(only(decrease(exact, F, A, b, unit)[0], columns))
 
 
 def diagonal(values: Sequence[int]) -> Matrix:
@@ -101,6 +101,6 @@ def less(S: Matrix, m: Fraction) -> Matrix:
     return combined("S - m I", (q, S), (-p, diagonal([1] * len(S))))
 
 
-def only(S: Matrix, kept: Sequence[int]) -> Matrix:
+def only(S: Matrix, rows: Sequence[int]) -> Matrix:
     """Return some rows and columns."""
-    return [[S[i][j] for j in kept] for i in kept]
+    return [[S[i][j] for j in rows] for i in rows]

@@ -13,7 +13,7 @@ OBLIGATIONS: dict[str, tuple[str, str]] = {kind: (text, lemma) for kind, (text, 
 
 
 @dataclass(frozen=True)
-class Statement:
+class ProofObligation:
     """What an obligation states: its kind, and the part of the certificate that it is about."""
 
     kind: str
@@ -31,7 +31,7 @@ class Statement:
 
 
 @dataclass(frozen=True)
-class Step(Statement):
+class VerifiedObligation(ProofObligation):
     """One obligation that was verified, and what was verified."""
 
     detail: str
@@ -47,7 +47,7 @@ class CheckReport:
         Every claim outside ``unverified`` was verified.
     verdict : str
         Of the certificate: ``certified`` or ``undecided``.
-    steps : tuple of Step
+    obligations : tuple of VerifiedObligation
         The obligations that were verified, in order.
     rejected : str or None
         The obligation, or the part of the document, that was not.
@@ -71,7 +71,7 @@ class CheckReport:
 
     accepted: bool
     verdict: str
-    steps: tuple[Step, ...]
+    obligations: tuple[VerifiedObligation, ...]
     rejected: str | None
     reason: str | None
     arithmetic: str
@@ -80,11 +80,11 @@ class CheckReport:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as JSON-ready data."""
-        steps = [{"kind": s.kind, "of": s.of, "verified": s.detail, "lemma": s.lemma} for s in self.steps]
+        obligations = [{"kind": o.kind, "of": o.of, "verified": o.detail, "lemma": o.lemma} for o in self.obligations]
         return {
             "accepted": self.accepted,
             "verdict": self.verdict,
-            "obligations": steps,
+            "obligations": obligations,
             "rejected": self.rejected,
             "reason": self.reason,
             "arithmetic": self.arithmetic,
@@ -93,7 +93,7 @@ class CheckReport:
 
     def lines(self) -> list[str]:
         """Return the report as text, one line for each obligation."""
-        lines = [f"verified   {step.kind} of {step.of}: {step.detail} ({step.lemma})" for step in self.steps]
+        lines = [f"verified   {o.kind} of {o.of}: {o.detail} ({o.lemma})" for o in self.obligations]
         if self.accepted:
-            return [*lines, f"accepted   {self.verdict}; {len(self.steps)} obligation(s) by {self.arithmetic}"]
+            return [*lines, f"accepted   {self.verdict}; {len(self.obligations)} obligation(s) by {self.arithmetic}"]
         return [*lines, f"rejected   {self.rejected}: {self.reason}"]

@@ -42,23 +42,23 @@ class Begin:
 
 def check_protocol(doc: Document) -> Protocol:
     """Read the parameters, which are positive; mu1 is above delta."""
-    said = doc.section("protocol")
-    sliding = isinstance(said, dict) and said.get("kind") == "sliding-mode"
+    section = doc.section("protocol")
+    sliding = isinstance(section, dict) and section.get("kind") == "sliding-mode"
     names = SLIDING if sliding else NOMINAL
-    said = fields(said, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
-    need(sliding or said["kind"] == "nominal", "an unknown kind of protocol")
-    gains = {name: exact(said[name]) for name in names}
+    section = fields(section, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
+    need(sliding or section["kind"] == "nominal", "an unknown kind of protocol")
+    gains = {name: exact(section[name]) for name in names}
     need(all(value > 0 for name, value in gains.items() if name != "delta"), "a parameter is not positive")
     if sliding:
         need(0 <= gains["delta"] < gains["mu1"], "mu1 is not above delta")
-        need(said["disturbance"] is None or isinstance(said["disturbance"], str), "disturbance is not a text")
+        need(section["disturbance"] is None or isinstance(section["disturbance"], str), "disturbance is not a text")
     return Protocol(sliding, gains)
 
 
 def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
     """Read ``X(0)`` and ``sigma(0)``."""
     state, sigma = (
-        None if (said := doc.section(key)) is None else by_agent(doc, graph, said, key)
+        None if (section := doc.section(key)) is None else by_agent(doc, graph, section, key)
         for key in ("initial_state", "sliding_variable")
     )
     need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
@@ -67,27 +67,27 @@ def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
 
 def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
-    said, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
+    section, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
     if sigma0 is None:
-        need(said is None, "reaching times without sliding variables")
+        need(section is None, "reaching times without sliding variables")
         return
-    fields(said, ("bound", "clock", "z"), "reaching_time")
-    need(said["bound"] == SLIDING_BOUND and said["clock"] == SLIDING_CLOCK, "another bound or clock")
-    told = ordered(graph.labels, said["z"], "z").values()
+    fields(section, ("bound", "clock", "z"), "reaching_time")
+    need(section["bound"] == SLIDING_BOUND and section["clock"] == SLIDING_CLOCK, "another bound or clock")
+    texts = ordered(graph.labels, section["z"], "z").values()
     doc.open("sliding-bound", "protocol")
     doc.done("for every disturbance within delta")
-    z = [None if x is None else exact(x) for x in told]
+    z = [None if x is None else exact(x) for x in texts]
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
         need(not any(z), "a reaching time of a variable that is 0 at time 0")
         return
     doc.open("reaching-time", "reaching_time")
     need(all(end is None or end >= 0 for end in z), "a reaching time before time 0")
-    asked = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
-    spend(len(asked) * EACH_INSTANT, what="the reaching times of many agents")
-    known = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], asked, REACHING_BITS)
+    instants = {end for end, s in zip(z, sigma0, strict=True) if s and end is not None}
+    spend(len(instants) * EACH_INSTANT, what="the reaching times of many agents")
+    integrals = decay_integrals_below(g["T_r"], g["mu2"], g["mu3"] * g["kappa"], instants, REACHING_BITS)
     for label, size, end in zip(graph.labels, map(abs, sigma0), z, strict=True):
         if size and end is not None:
-            need(size <= (g["mu1"] - g["delta"]) * known[end], f"agent {shorten(label)} need not be there by then")
+            need(size <= (g["mu1"] - g["delta"]) * integrals[end], f"agent {shorten(label)} need not be there by then")
         else:
             need(not end, f"agent {shorten(label)} starts at 0")
     doc.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")

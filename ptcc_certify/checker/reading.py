@@ -66,8 +66,8 @@ def read(path: str | Path) -> dict[str, Any]:
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(text, object_pairs_hook=unique, parse_constant=number, parse_float=number, parse_int=integer)
     except (OSError, ValueError, RecursionError) as error:
-        said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise UnreadableError(f"{name}: not a readable certificate ({shorten(said, 160)})") from None
+        detail = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise UnreadableError(f"{name}: not a readable certificate ({shorten(detail, 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         raise UnreadableError(f'{name}: not a certificate of schema "{SCHEMA}"')
     return data
@@ -126,9 +126,9 @@ def fields(value: Any, keys: Sequence[str], what: str) -> dict[str, Any]:
     """Return an object that has exactly these keys."""
     if not isinstance(value, dict):
         raise RejectedError(f"{what} is not an object")
-    known = set(keys)
-    for key in [*(k for k in keys if k not in value), *(k for k in value if k not in known)]:
-        raise RejectedError(f'the key "{shorten(str(key))}" is {"missing" if key in known else "not known"}')
+    names = set(keys)
+    for key in [*(k for k in keys if k not in value), *(k for k in value if k not in names)]:
+        raise RejectedError(f'the key "{shorten(str(key))}" is {"missing" if key in names else "not known"}')
     return value
 
 
@@ -150,19 +150,19 @@ def entries(value: Any, what: str, length: int | None = None) -> list[Any]:
     return value
 
 
-def triangle(said: Any, n: int) -> list[list[Fraction]]:
+def triangle(entry: Any, n: int) -> list[list[Fraction]]:
     """Return a symmetric matrix from its lower triangle."""
-    rows = enumerate(entries(said, "lower_triangle", n), start=1)
+    rows = enumerate(entries(entry, "lower_triangle", n), start=1)
     lower = [[exact(x) for x in entries(row, "a row", count)] for count, row in rows]
     return [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
 
 
-def interval(said: Any) -> Interval:
+def interval(entry: Any) -> Interval:
     """Read an exact number, or a middle with a radius."""
-    if not isinstance(said, dict):
-        return exact(said), Fraction(0)
-    fields(said, ("mid", "radius"), "a number")
-    mid, radius = exact(said["mid"]), exact(said["radius"])
+    if not isinstance(entry, dict):
+        return exact(entry), Fraction(0)
+    fields(entry, ("mid", "radius"), "a number")
+    mid, radius = exact(entry["mid"]), exact(entry["radius"])
     need(radius > 0, "a radius is not positive")
     return mid, radius
 

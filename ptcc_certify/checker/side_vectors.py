@@ -47,8 +47,8 @@ class Numbers:
         chosen: list[Any] = [self.values[k] for k in which]
         if self.scale is not None:
             return chosen, self.scale
-        (scaled,), scale = integers([chosen])
-        return scaled, scale
+        (values,), scale = integers([chosen])
+        return values, scale
 
     def largest(self) -> Fraction:
         """Return the largest size."""
@@ -59,9 +59,9 @@ class Numbers:
         return all(x > 0 for x in self.values)
 
 
-def beside(said: Any) -> bool:
+def beside(entry: Any) -> bool:
     """Tell whether a value stands for a side vector: numbers and labels by agent are never JSON integers."""
-    return isinstance(said, dict) and type(said.get("count")) is int
+    return isinstance(entry, dict) and type(entry.get("count")) is int
 
 
 class SideFiles:
@@ -77,14 +77,14 @@ class SideFiles:
     def __init__(self, folder: Path, files: Mapping[str, bytes] | None):
         self.folder, self.files = folder, files
 
-    def column(self, said: Any, count: int) -> array[Any]:
+    def column(self, entry: Any, count: int) -> array[Any]:
         """Read ``{"file", "sha256"}``: a .npy vector of 64-bit integers or finite floats, little-endian."""
-        said = fields(said, ("file", "sha256"), "a side file")
-        name = said["file"]
+        entry = fields(entry, ("file", "sha256"), "a side file")
+        name = entry["file"]
         plain = isinstance(name, str) and re.fullmatch(r"[A-Za-z0-9_.-]{1,200}", name)
         need(bool(plain), "a side file's name is odd")
         content = self._content(name, 8 * count + 1024)
-        need(hashlib.sha256(content).hexdigest() == said["sha256"], f"side file {name} is not what its hash says")
+        need(hashlib.sha256(content).hexdigest() == entry["sha256"], f"side file {name} is not what its hash says")
         match, start = NPY.match(content), 10 + int.from_bytes(content[8:10], "little")
         if match is None or int(match[2]) != count or not match.end() == start == len(content) - 8 * count:
             raise RejectedError(f"side file {name} is not a vector of {count} numbers")
@@ -107,32 +107,32 @@ class SideFiles:
         need(len(content) <= largest, f"side file {name} is not a vector of so few numbers")
         return content
 
-    def _vector(self, said: dict[str, Any], what: str, count: int) -> array[Any]:
-        need(said["count"] == count, f"{what} has not {count} entries")
-        return self.column({key: value for key, value in said.items() if key not in ("count", "scale")}, count)
+    def _vector(self, entry: dict[str, Any], what: str, count: int) -> array[Any]:
+        need(entry["count"] == count, f"{what} has not {count} entries")
+        return self.column({key: value for key, value in entry.items() if key not in ("count", "scale")}, count)
 
-    def integers(self, said: Any, what: str, count: int) -> list[int]:
+    def integers(self, entry: Any, what: str, count: int) -> list[int]:
         """Return a list of JSON integers, or a side vector of integers."""
-        if not beside(said):
-            need(all(type(x) is int for x in entries(said, what, count)), f"{what}: not integers")
-            return said
-        need("scale" not in said, f"{what}: integers have no scale")
-        values = self._vector(said, what, count)
+        if not beside(entry):
+            need(all(type(x) is int for x in entries(entry, what, count)), f"{what}: not integers")
+            return entry
+        need("scale" not in entry, f"{what}: integers have no scale")
+        values = self._vector(entry, what, count)
         need(values.typecode == "q", f"{what}: not integers")
         return values.tolist()
 
-    def numbers(self, said: Any, what: str, count: int) -> Numbers:
+    def numbers(self, entry: Any, what: str, count: int) -> Numbers:
         """Return the exact numbers of a list of texts, or of a side vector: floats, or integers over a scale."""
-        if not beside(said):
-            return Numbers([exact(x) for x in entries(said, what, count)])
-        values = self._vector(said, what, count)
+        if not beside(entry):
+            return Numbers([exact(x) for x in entries(entry, what, count)])
+        values = self._vector(entry, what, count)
         if values.typecode == "d":
-            need("scale" not in said, f"{what}: only integers have a scale")
+            need("scale" not in entry, f"{what}: only integers have a scale")
             ratios = [x.as_integer_ratio() for x in values]
             common = max((q for _, q in ratios), default=1)  # they are powers of two
             sized(count, common.bit_length() + longest(int(end(values)) for end in (min, max) if count), what)
             return Numbers([p * (common // q) for p, q in ratios], common)
-        scale = exact(said.get("scale", "1"))
+        scale = exact(entry.get("scale", "1"))
         need(scale > 0, f"{what}: the scale is not positive")
         factor = scale.denominator
         sized(count, 64 + factor.bit_length(), what)

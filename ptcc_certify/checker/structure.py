@@ -54,7 +54,7 @@ class Structure:
         return [(k, nodes, gauge) for k, (nodes, gauge) in pairs if gauge is not None]
 
     @cached_property
-    def kept(self) -> list[int]:
+    def free_nodes(self) -> list[int]:
         """All nodes but the first one of each balanced closed component."""
         first = {nodes[0] for _, nodes, _ in self.balanced}
         return [v for v in range(self.graph.n) if v not in first]
@@ -87,8 +87,8 @@ def check_structure(doc: Document, graph: Digraph) -> Structure:
     keys = ("connectivity", "closed_components", "leaders", "followers", "balanced", "sign_symmetric")
     closed: list[list[int]] = []
     gauges: list[list[int] | None] = []
-    said = fields(doc.data["structure"], keys, "structure")
-    for entry in entries(said["closed_components"], "closed_components"):
+    section = fields(doc.data["structure"], keys, "structure")
+    for entry in entries(section["closed_components"], "closed_components"):
         balanced = isinstance(entry, dict) and entry.get("balanced") is True
         fields(entry, ("nodes", "balanced", "gauge" if balanced else "negative_cycle"), "a closed component")
         need(type(entry["balanced"]) is bool, "balance of a closed component")
@@ -106,9 +106,9 @@ def check_structure(doc: Document, graph: Digraph) -> Structure:
     signs = {v: g for _, nodes, gauge in structure.balanced for v, g in zip(nodes, gauge, strict=True)}
     need(graph.fits([signs.get(v, 0) for v in range(graph.n)]), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):
-        need(positions(doc, graph, said[key], key, len(expected)) == expected, f"other {key}")
-    need(said["balanced"] is (not graph.pieces[1]), "balance of the graph")
-    need(said["sign_symmetric"] is graph.mutual[0], "sign symmetry")
+        need(positions(doc, graph, section[key], key, len(expected)) == expected, f"other {key}")
+    need(section["balanced"] is (not graph.pieces[1]), "balance of the graph")
+    need(section["sign_symmetric"] is graph.mutual[0], "sign symmetry")
     doc.done(f"{graph.n} nodes, {graph.n_edges} edges, {len(closed)} closed component(s)")
     return structure
 
@@ -134,9 +134,9 @@ def _closed_components(graph: Digraph, closed: Sequence[Sequence[int]]) -> list[
     return number
 
 
-def _negative_cycle(doc: Document, graph: Digraph, said: Any, group: set[int]) -> None:
+def _negative_cycle(doc: Document, graph: Digraph, entry: Any, group: set[int]) -> None:
     """Check a closed walk of the undirected graph inside a component whose signs multiply to -1."""
-    steps = [positions(doc, graph, entries(x, "a step", 2), "a step") for x in entries(said, "negative_cycle")]
+    steps = [positions(doc, graph, entries(x, "a step", 2), "a step") for x in entries(entry, "negative_cycle")]
     inside = all(s in group and t in group and graph.sign(s, t) for s, t in steps)
     need(bool(steps) and inside, "not a walk along edges of the component")
     need(math.prod(graph.sign(s, t) for s, t in steps) == -1, "the cycle is not negative")
@@ -153,15 +153,15 @@ def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     """Verify theorem, behaviour and corollaries of every weak component."""
     doc.open("claim", "graph")
     data, expected = doc.data, _expected(structure, sliding)
-    said, connectivity = data["claim"], data["structure"]["connectivity"]
+    section, connectivity = data["claim"], data["structure"]["connectivity"]
     if len(expected) == 1:
         ((_, kind, claim),) = expected
         need("components" not in data, "components of a connected graph")
         need(connectivity == kind, f"the graph is {kind}")
-        need(same(said, claim), f"the claim is Theorem {claim['theorem']}")
+        need(same(section, claim), f"the claim is Theorem {claim['theorem']}")
         verified = Claim(claim["theorem"], [])
     else:
-        need(connectivity == "disconnected" and said is None, "the graph is disconnected")
+        need(connectivity == "disconnected" and section is None, "the graph is disconnected")
         theorem = f"{6 if sliding else 3}.{1 if structure.balanced else 2}"
         verified = Claim(theorem, _components(doc, structure.graph, expected))
     doc.done(f"{len(expected)} components" if verified.components else f"Theorem {verified.theorem}")
@@ -174,13 +174,13 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
     pieces: dict[int, list[int]] = {}
     for v, root in enumerate(piece):
         pieces.setdefault(root, []).append(v)
-    held: dict[int, list[int]] = {root: [] for root in pieces}
+    groups: dict[int, list[int]] = {root: [] for root in pieces}
     for k, group in enumerate(structure.closed):
-        held[piece[group[0]]].append(k)
+        groups[piece[group[0]]].append(k)
     expected = []
     for root, nodes in pieces.items():
-        row = 2 if len(held[root]) > 1 else int(len(structure.closed[held[root][0]]) < len(nodes))
-        some = any(structure.gauges[k] is not None for k in held[root])
+        row = 2 if len(groups[root]) > 1 else int(len(structure.closed[groups[root][0]]) < len(nodes))
+        some = any(structure.gauges[k] is not None for k in groups[root])
         holds = {
             "1.1": row == 0 and some and root not in odd,
             "1.2": row == 0 and not some and root not in odd,
@@ -200,24 +200,24 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
 
 def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[tuple[list[int], Any]]:
     """Check what is said of each weak component; return its nodes and the final state that is claimed."""
-    said, groups = doc.data.get("components"), [nodes for nodes, _, _ in expected]
+    section, groups = doc.data.get("components"), [nodes for nodes, _, _ in expected]
     labels = [[graph.labels[v] for v in nodes] for nodes in groups]
     states: list[Any] = [None] * len(groups)
-    wanted: Any
+    reference: Any
     if len(groups) <= MANY_COMPONENTS:
-        listed = entries(said, "components", len(groups))
-        states = [entry.get("final_state") if isinstance(entry, dict) else None for entry in listed]
-        wanted = [
+        items = entries(section, "components", len(groups))
+        states = [entry.get("final_state") if isinstance(entry, dict) else None for entry in items]
+        reference = [
             {"nodes": nodes, "connectivity": kind, "claim": claim, "final_state": state}
             for nodes, (_, kind, claim), state in zip(labels, expected, states, strict=True)
         ]
     else:
-        wanted = {"nodes": labels, "connectivity": [kind for _, kind, _ in expected]}
-        wanted |= {key: [claim[key] for _, _, claim in expected] for key in ("theorem", "behaviour", "corollaries")}
-        if isinstance(said, dict) and beside(said.get("nodes")):
+        reference = {"nodes": labels, "connectivity": [kind for _, kind, _ in expected]}
+        reference |= {key: [claim[key] for _, _, claim in expected] for key in ("theorem", "behaviour", "corollaries")}
+        if isinstance(section, dict) and beside(section.get("nodes")):
             number = {v: k for k, nodes in enumerate(groups) for v in nodes}
-            listed = doc.files.integers(said["nodes"], "nodes", graph.n)
-            need(listed == [number[v] for v in range(graph.n)], "other components")
-            wanted["nodes"] = said["nodes"]
-    need(same(said, wanted), "other components, or another claim of one")
+            items = doc.files.integers(section["nodes"], "nodes", graph.n)
+            need(items == [number[v] for v in range(graph.n)], "other components")
+            reference["nodes"] = section["nodes"]
+    need(same(section, reference), "other components, or another claim of one")
     return list(zip(groups, states, strict=True))

@@ -55,36 +55,38 @@ class Paper:
 
 def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | None:
     """Verify the certificate of the theorem's row; None if there is none."""
-    said, graph = doc.section("paper"), structure.graph
-    if said is None:
+    section, graph = doc.section("paper"), structure.graph
+    if section is None:
         return None
     keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "overshoot")
     need_rows(graph.n)
-    fields(said, keys, "paper")
+    fields(section, keys, "paper")
     objective, coordinates, expected = _row(structure, claim.theorem)
-    need(said["theorem"] == claim.theorem and said["objective"] == objective, "another theorem or objective")
-    need(said["coordinates"] == coordinates, "other coordinates")
+    need(section["theorem"] == claim.theorem and section["objective"] == objective, "another theorem or objective")
+    need(section["coordinates"] == coordinates, "other coordinates")
     blocks = []
-    for entry, (name, nodes, times_rho) in zip(entries(said["blocks"], "blocks", len(expected)), expected, strict=True):
+    for entry, (name, nodes, times_rho) in zip(
+        entries(section["blocks"], "blocks", len(expected)), expected, strict=True
+    ):
         fields(entry, ("name", "nodes", "diagonal", "times_rho"), "a block")
         need(entry["name"] == name and entry["times_rho"] is times_rho, "another block")
         need(positions(doc, graph, entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
         weights = [exact(w) for w in entries(entry["diagonal"], "diagonal", len(nodes))]
         need(all(w > 0 for w in weights), "a weight is not positive")
         blocks.append(Block(name, nodes, weights, times_rho))
-    need((said["rho"] is not None) == any(b.times_rho for b in blocks), "rho belongs to a block times rho")
-    rho = Fraction(1) if said["rho"] is None else exact(said["rho"])
+    need((section["rho"] is not None) == any(b.times_rho for b in blocks), "rho belongs to a block times rho")
+    rho = Fraction(1) if section["rho"] is None else exact(section["rho"])
     need(rho > 0, "rho is not positive")
-    rate = None if said["rate"] is None else exact(said["rate"])
+    rate = None if section["rate"] is None else exact(section["rate"])
     need(rate is None or rate > 0, "the rate is not positive")
     paper = Paper(structure, coordinates, blocks, rho, rate)
     if not blocks:
-        need(rate is None and said["overshoot"] is None, "a rate where nothing moves")
+        need(rate is None and section["overshoot"] is None, "a rate where nothing moves")
     else:
         weights = list(paper.weights(rho).values())
-        need(exact(said["overshoot"]) == max(weights) / min(weights), "overshoot")
+        need(exact(section["overshoot"]) == max(weights) / min(weights), "overshoot")
     if rate is None or coordinates == "eps":
-        need(said["rho_interval"] is None, "an interval without a proof, or without rho")
+        need(section["rho_interval"] is None, "an interval without a proof, or without rho")
     if rate is not None and coordinates == "eps":
         _deviation_decrease(doc, paper, rate)
     elif rate is not None:
@@ -117,11 +119,11 @@ def _row(structure: Structure, theorem: str) -> tuple[str, str, list[tuple[str, 
 
 def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fraction]) -> list[int]:
     """Verify ``p' M(L_k) = 0`` up to a part in 10^9 of each diagonal term; return a multiple of ``p`` in integers."""
-    (scaled,), _ = integers([list(p)])
-    left, graph = structure.graph.left(nodes, scaled), structure.graph
-    near = all(abs(x) * NEAR <= w * graph.row(v)[v] for x, w, v in zip(left, scaled, nodes, strict=True))
+    (multiple,), _ = integers([list(p)])
+    residuals, graph = structure.graph.left_product(nodes, multiple), structure.graph
+    near = all(abs(x) * NEAR <= w * graph.row(v)[v] for x, w, v in zip(residuals, multiple, nodes, strict=True))
     need(near, "the weights are not the left null vector of the comparison matrix")
-    return scaled
+    return multiple
 
 
 def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
@@ -131,15 +133,18 @@ def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
     need(b == rate, "b is not the rate")
     _near_null_vector(paper.structure, one.nodes, one.weights)
     Z, _ = paper.form.of_state(doc.exact, graph)
-    need(decays(doc.exact, Z, block(graph, range(graph.n)), b, graph.unit, paper.structure.kept), "not proved definite")
+    need(
+        decays(doc.exact, Z, block(graph, range(graph.n)), b, graph.unit, paper.structure.free_nodes),
+        "not proved definite",
+    )
     doc.done(f"b = {down(b)}")
 
 
 def group_decrease(doc: Document, structure: Structure, k: int, weights: Sequence[int], b: Fraction) -> bool:
     """Tell whether ``F L_k + L_k'F - b F > 0``, ``F = L_k'W L_k``, is proved, modulo ``G_k 1`` if that is balanced."""
     A = block(structure.graph, structure.closed[k])
-    F, kept = congruence(doc.exact, diagonal(weights), A, len(A)), range(structure.gauges[k] is not None, len(A))
-    return decays(doc.exact, F, A, b, structure.graph.unit, kept)
+    F, columns = congruence(doc.exact, diagonal(weights), A, len(A)), range(structure.gauges[k] is not None, len(A))
+    return decays(doc.exact, F, A, b, structure.graph.unit, columns)
 
 
 def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
@@ -159,8 +164,8 @@ def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
             doc.done(f"m = {down(m)}")
         else:
             b = doc.open("leader-decrease", f"paper.{name}", ["b"])["b"]
-            scaled = _near_null_vector(structure, nodes, weights)
-            need(b > 0 and group_decrease(doc, structure, k, scaled, b), "not proved definite")
+            multiple = _near_null_vector(structure, nodes, weights)
+            need(b > 0 and group_decrease(doc, structure, k, multiple, b), "not proved definite")
             least = min(weights)
             gamma |= {v: b * (w if theorem in ("2.1", "5.1") else least) for v, w in zip(nodes, weights, strict=True)}
             doc.done(f"b = {down(b)}")
@@ -194,12 +199,12 @@ def _exceeds(
 
 def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> None:
     """Verify that both ends of the interval of ``rho`` are admissible."""
-    said, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
+    section, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
     doc.at = "rho-interval of paper"
     if rho is None:
-        need(said is None, "an interval without rho")
+        need(section is None, "an interval without rho")
         return
-    ends = {key: exact(x) for key, x in fields(said, ("printed", "exact"), "rho_interval").items() if x is not None}
+    ends = {key: exact(x) for key, x in fields(section, ("printed", "exact"), "rho_interval").items() if x is not None}
     need(len(ends) != 1, "one end without the other")
     if not ends:
         leading = {v for b in paper.blocks if not b.times_rho for v in b.nodes}

@@ -65,7 +65,7 @@ def _same_graph(
     if signed.sha256 == report.sha256:
         return report, how
     reason = f"another graph than {graph}: {difference(certificate_graph(document, Path(certificate).parent), signed)}"
-    return replace(report, accepted=False, steps=(), rejected="graph", reason=reason), how
+    return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how
 
 
 @click.command()

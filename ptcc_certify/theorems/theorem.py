@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.checker import Statement
+from ptcc_certify.checker import ProofObligation
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 
@@ -35,7 +35,7 @@ class ExactInterval:
 
 
 @dataclass(frozen=True)
-class Obligation(Statement):
+class Obligation(ProofObligation):
     """One statement that was proved, and that the independent check verifies again.
 
     Attributes

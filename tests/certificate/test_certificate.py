@@ -91,7 +91,7 @@ def test_the_examples_behave_as_the_paper_reports(name: str):
     assert cert.theorem.number == dict(zip(GRAPHS, ("1.2", "1.1", "2.1", "2.2", "3.1", "3.2"), strict=True))[name]
     assert cert.verdict == "certified"
     assert cert.checked is not None and cert.checked.accepted and cert.checked.rejected is cert.checked.reason is None
-    assert [(s.kind, s.of) for s in cert.checked.steps] == [(o.kind, o.of) for o in cert.obligations]
+    assert [(s.kind, s.of) for s in cert.checked.obligations] == [(o.kind, o.of) for o in cert.obligations]
     assert cert.checked.sha256 == cert.graph.sha256
     assert cert.notes == ()
     assert 0 < cert.comparison.worst_ratio <= 1 + 1e-6
@@ -672,7 +672,7 @@ def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_an_upper_bound(
     assert [step["kind"] for step in data["proof"]] == ["structure", "claim", "final-state", "rate-mean"]
     assert cert.checked is None
     report = check(data)
-    assert report.accepted and report.verdict == "undecided" and len(report.steps) == 4
+    assert report.accepted and report.verdict == "undecided" and len(report.obligations) == 4
     said = data["unverified"]
     assert set(said["residual"].values()) == {None}  # nothing proved, nothing bounded
     assert cert.envelope.residual(0.5) == cert.envelope.bound(1.0, np.arange(n)) == np.inf

@@ -78,7 +78,7 @@ def accepted(data: Json) -> None:
         report = check(data, stdlib=stdlib)
         assert report.accepted, (report.rejected, report.reason)
         assert report.verdict == data["verdict"]
-        assert len(report.steps) == len(data["proof"])
+        assert len(report.obligations) == len(data["proof"])
 
 
 def rejected(data: Json, where: str) -> None:

@@ -91,10 +91,10 @@ def test_both_are_what_the_definitions_say(seed: int):
             signed[t] += int(w) * x[s]
             hearing[s] += int(abs(w)) * x[t]
         diagonal = [sum(int(abs(w)) for (_, t), w in exact.items() if t == v) for v in range(n)]
-        assert g.moved(x) == [d * y - h for d, y, h in zip(diagonal, x, signed, strict=True)]
-        assert g.moved(x, signed=False) == [d * y - h for d, y, h in zip(diagonal, x, heard, strict=True)]
-        assert g.left(range(n), x) == [d * y - h for d, y, h in zip(diagonal, x, hearing, strict=True)]
-        assert g.heard(x) == heard and g.heard(x, signed=True) == signed and g.hearing(x) == hearing
+        assert g.laplacian_product(x) == [d * y - h for d, y, h in zip(diagonal, x, signed, strict=True)]
+        assert g.laplacian_product(x, signed=False) == [d * y - h for d, y, h in zip(diagonal, x, heard, strict=True)]
+        assert g.left_product(range(n), x) == [d * y - h for d, y, h in zip(diagonal, x, hearing, strict=True)]
+        assert g.sums_in(x) == heard and g.sums_in(x, signed=True) == signed and g.sums_out(x) == hearing
         for v in range(n):
             row = {s: -int(w) for (s, t), w in exact.items() if t == v}
             assert g.row(v) == ({v: sum(map(abs, row.values())), **row} if row else {})
@@ -140,7 +140,7 @@ def test_long_integers_are_summed_exactly(kind: type[Digraph]):
             sums = [0, 0, 0]
             for (s, t), value in values.items():
                 sums[t] += value * x[s]
-            assert g.heard(x, signed=True) == sums
+            assert g.sums_in(x, signed=True) == sums
 
 
 def test_products_of_long_integers_take_no_more_memory_than_their_sums():
@@ -148,7 +148,7 @@ def test_products_of_long_integers_take_no_more_memory_than_their_sums():
     ends = [(s, t) for t in range(n) for s in range(n) if s != t]
     g = ArrayDigraph(range(n), [s for s, _ in ends], [t for _, t in ends], [1] * len(ends), 1)
     tracemalloc.start()
-    assert g.heard([1 << bits] * n) == [(n - 1) << bits] * n
+    assert g.sums_in([1 << bits] * n) == [(n - 1) << bits] * n
     assert tracemalloc.get_traced_memory()[1] < 8 * n * bits / 8
     tracemalloc.stop()
 

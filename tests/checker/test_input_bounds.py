@@ -48,11 +48,11 @@ def random_gain(rng: np.random.Generator) -> PrescribedGain:
 
 
 class Decay:
-    """``min(held, start e^(-rate s / 2))`` in floating point, all functions of ``z = ln(T/(T - t))``."""
+    """``min(error_bound, amplitude e^(-rate s / 2))`` in floating point, all functions of ``z = ln(T/(T - t))``."""
 
-    def __init__(self, gain: PrescribedGain, held: Fraction, start: Fraction, rate: Fraction):
+    def __init__(self, gain: PrescribedGain, error_bound: Fraction, amplitude: Fraction, rate: Fraction):
         self.T, self.rho1, self.k = float(gain.T), float(gain.rho1), float(gain.k)
-        self.held, self.start, self.rate = float(held), float(start), float(rate)
+        self.error_bound, self.amplitude, self.rate = float(error_bound), float(amplitude), float(rate)
 
     def gain(self, z: float) -> float:
         return self.rho1 + self.k / self.T * math.exp(z)
@@ -61,18 +61,18 @@ class Decay:
         return -self.rho1 * self.T * math.expm1(-z) + self.k * z
 
     def size(self, z: float) -> float:
-        return min(self.held, self.start * math.exp(-self.rate / 2 * self.clock(z)))
+        return min(self.error_bound, self.amplitude * math.exp(-self.rate / 2 * self.clock(z)))
 
     @property
     def crossing(self) -> float:
-        if self.start <= self.held:
+        if self.amplitude <= self.error_bound:
             return 0.0
-        low, high = 0.0, 2 * math.log(self.start / self.held) / self.rate / self.k
+        low, high = 0.0, 2 * math.log(self.amplitude / self.error_bound) / self.rate / self.k
         for _ in range(200):
             middle = (low + high) / 2
             low, high = (
                 (middle, high)
-                if self.start * math.exp(-self.rate / 2 * self.clock(middle)) > self.held
+                if self.amplitude * math.exp(-self.rate / 2 * self.clock(middle)) > self.error_bound
                 else (
                     low,
                     middle,
@@ -440,9 +440,9 @@ def test_no_start_of_a_set_has_a_larger_form_than_its_bound(seed: int):
             P = np.diag(floats(weights)) if form.diagonal is not None else floats(matrix)
             z = points @ A[k].T
             top = math.sqrt(np.einsum("ij,jk,ik->i", z, P, z).max())
-            assert top <= float(bounds.start(k)) * (1 + 1e-12)
+            assert top <= float(bounds.initial_root(k)) * (1 + 1e-12)
             if initial_set.point:
-                assert top == pytest.approx(float(bounds.start(k)), rel=1e-9)
+                assert top == pytest.approx(float(bounds.initial_root(k)), rel=1e-9)
 
 
 # ---------------------------------------------------------------------- all together, on a pair and on a chain
@@ -455,9 +455,9 @@ def test_the_pair_whose_input_is_known():
     form = Form(F(4), "E", [0, 1], [F(1), F(1)], None, F(1))
     deviation = Form(F(4), "eps", [0, 1], [F(1), F(1)], None, F(1), [1, -1])
     bounds = InputBounds(rows, gain, [form, deviation, None], [None] * 3, InitialSet([F(3), F(1)]))
-    assert bounds.held == [4, 4] and float(bounds.held_norm) == pytest.approx(math.sqrt(32))
-    assert float(bounds.start(0)) == pytest.approx(math.sqrt(32))
-    assert float(bounds.start(1)) == pytest.approx(math.sqrt(8))  # deviations 2, -2 ... of x from the common one
+    assert bounds.error_bounds == [4, 4] and float(bounds.error_norm) == pytest.approx(math.sqrt(32))
+    assert float(bounds.initial_root(0)) == pytest.approx(math.sqrt(32))
+    assert float(bounds.initial_root(1)) == pytest.approx(math.sqrt(8))  # deviations 2, -2 ... of x from the common one
     assert bounds.constant(0) == [1, 1] and bounds.constant(1) == [2, 2]
     assert float(bounds.root_constant(1, None)) == pytest.approx(2)
     for k in (0, 1):
@@ -468,7 +468,7 @@ def test_the_pair_whose_input_is_known():
     with pytest.raises(ValueError, match="single agents"):
         bounds.bound(peak_above, 0, 2, F(0))
     within = InputBounds(rows, gain, [form], [None], InitialSet([F(0), F(0)], [F(3), F(3)]))
-    assert within.held == [6, 6]
+    assert within.error_bounds == [6, 6]
     assert [float(x) for x in bounds.disturbed(0, F(1))] == pytest.approx([math.sqrt(8)] * 2, rel=1e-9)
     with pytest.raises(ValueError, match="without limit"):
         bounds.disturbed(1, F(1))
@@ -483,10 +483,10 @@ def test_sliding_variables_move_until_the_instant_is_quiet():
     moving = Reaching([F(0), F(3)], F(1), F(1), F(1, 2), F(1), F(2))
     moved = InputBounds(rows, gain, [form], [None], initial_set, moving)
     assert still.quiet == 0 and float(moved.quiet) == pytest.approx(math.log(2))
-    assert still.held == [0, 8]
+    assert still.error_bounds == [0, 8]
     # |e| grows by 2 |sigma(0)| = 6 and 2 (mu1 + delta) T_r = 4 at most, |x| by 3 and 2
-    assert moved.held == [0, 18]
-    assert moved.start(0) == still.start(0) == pytest.approx(8)
+    assert moved.error_bounds == [0, 18]
+    assert moved.initial_root(0) == still.initial_root(0) == pytest.approx(8)
     with pytest.raises(ValueError, match="still move"):
         moved.bound(peak_above, None, 0, F(0))
     early = Reaching([F(0), F(3)], F(1), F(1), F(1, 2), F(1), F(2), F(1))
@@ -517,7 +517,7 @@ def test_no_sliding_variable_moves_the_error_further(seed: int):
     bounds = InputBounds(graph.exact_rows(range(n)), gain, [form], [constants], InitialSet(x0), reaching)
     z = bounds.quiet
     peak, energy, length = (float(bounds.bound(of, None, 0, z)) for of in (peak_above, energy_above, length_above))
-    agents, held = [float(bounds.bound(peak_above, v, 0, z)) for v in range(n)], floats(bounds.held)
+    agents, held = [float(bounds.bound(peak_above, v, 0, z)) for v in range(n)], floats(bounds.error_bounds)
     true, T_r = Decay(gain, F(1), F(1), rate), float(2 - T_s)
     instants = np.linspace(0, float(z), 2001)
     for _ in range(3):

@@ -135,7 +135,7 @@ def test_pieces_are_joined_without_wrapping():
             for signs in np.ndindex(3, 3, 3, 3):
                 limbs = [np.array([(s - 1) * size]) for s in signs]
                 truth = sum(int(limb[0]) << (width * k) for k, limb in enumerate(limbs))
-                assert fast._joined(limbs, width).tolist() == [truth]
+                assert fast._join(limbs, width).tolist() == [truth]
 
 
 @FEW

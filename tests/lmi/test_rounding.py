@@ -151,7 +151,7 @@ def test_the_check_rounds_to_the_safe_side(k: int, stdlib: bool):
     report = check(data, stdlib=stdlib)
     assert report.accepted
     functions, effort, rates = data["lyapunov"]["functions"], data["input"], data["rates"]
-    for step, told in zip(report.steps, data["proof"], strict=True):
+    for step, told in zip(report.obligations, data["proof"], strict=True):
         said, numbers = step.detail, {key: Fraction(x) for key, x in told["numbers"].items()}
         which = re.search(r"functions\[(\d+)\]", step.of)
         function = functions[int(which[1])] if which else None
@@ -212,7 +212,7 @@ def test_the_rate_of_the_readme_is_not_rounded_up():
     """13.9985999972 is proved, where 13.9986 was printed."""
     cert = certify(load_graph("fig3a"), NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1), simulation=False)
     assert cert.rate is not None and cert.checked is not None and cert.rate < Fraction("13.9986")
-    best = [step.detail for step in cert.checked.steps if step.detail.startswith("b = 13.9")]
+    best = [step.detail for step in cert.checked.obligations if step.detail.startswith("b = 13.9")]
     assert best and all(detail.startswith("b = 13.9985") for detail in best)
 
 

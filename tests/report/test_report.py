@@ -277,8 +277,8 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     report = made.checked
     assert report is not None
     said = rows(source, "Verified by the independent check")
-    assert [row[4] for row in said] == [s.detail for s in report.steps]
-    assert [row[2] for row in said] == [s.statement for s in report.steps]
+    assert [row[4] for row in said] == [s.detail for s in report.obligations]
+    assert [row[2] for row in said] == [s.statement for s in report.obligations]
     figures = {a["id"] for a in page.named("figure")}
     assert ("figure-decay" in figures) == (name not in ("no start", "single"))
     assert ("figure-input" in figures) == (name not in ("no start", "single"))

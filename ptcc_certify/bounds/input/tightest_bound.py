@@ -57,14 +57,14 @@ def usable_functions(bounds: InputBounds) -> list[int]:
     for k in range(len(bounds.forms)):
         with suppress(ValueError, ArithmeticError):
             bounds.constant(k)
-            bounds.start(k)
+            bounds.initial_root(k)
             functions.append(k)
     return functions
 
 
 def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
     """Return what ``|e_agent|``, or ``||E||``, is at most at first by a Lyapunov function, and decays."""
-    return bounds.root_constant(k, agent) * bounds.start(k)
+    return bounds.root_constant(k, agent) * bounds.initial_root(k)
 
 
 def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequence[int]) -> Witness | None:
@@ -93,7 +93,7 @@ def _crossing(bounds: InputBounds, agent: int | None, k: int) -> float:
     """Return ``z`` where the constant bound meets the decaying one, the best instant for the bounds; 0 while driven."""
     if bounds.reaching is not None:
         return 0.0
-    constant = bounds.held_norm if agent is None else bounds.held[agent]
+    constant = bounds.error_norm if agent is None else bounds.error_bounds[agent]
     first = decaying(bounds, k, agent)
     if not constant or not first:
         return 0.0

@@ -77,7 +77,7 @@ class LimitedBounds:
         growth = step_growth(bounds, k) if hold else Fraction(0)
         if growth is None:
             return None
-        residual = bounds.share(k, limits, clock, growth) * bounds.start(k)
+        residual = bounds.share(k, limits, clock, growth) * bounds.initial_root(k)
         norm = round_up(bounds.root_constant(k, None) * residual)
         if hold and norm > self.first:
             return None
@@ -86,7 +86,7 @@ class LimitedBounds:
         if self.cap is not None and not hold:
             sizes = [min(x, self.cap) for x in sizes]
         peak = [] if self.peak is None else [self.peak.largest]
-        largest = None if hold else round_up(min([top * max(bounds.held), *peak]))
+        largest = None if hold else round_up(min([top * max(bounds.error_bounds), *peak]))
         return Limited(
             limits, clock, k, growth, norm, None if constants is None else tuple(map(round_up, sizes)), largest
         )
