@@ -10,11 +10,11 @@ from typing import Any
 _MODULES = {
     "errors": "LMIError MatrixError NoCertificate NotAnHMatrix NotAnMMatrix OutOfTime",
     "search_time": "time_limit",
-    "diagonal_certificate": "DiagonalCertificate diagonal_margin diagonal_rate",
+    "diagonal_solution": "DiagonalCertificate diagonal_margin diagonal_rate",
     "matrix_classes": "comparison_matrix irreducible_blocks is_h_matrix is_m_matrix is_z_matrix m_matrix_witness",
     "closed_form": "h_matrix_certificate h_matrix_frontier h_matrix_diagonal "
     "m_matrix_certificate perron_certificate perron_vectors",
-    "leader_follower": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
+    "joint_block_search": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
     "diagonal": "diagonal_lyapunov diagonal_rate_limit h_matrix_lyapunov rate_frontier refute_diagonal_lyapunov",
     "full": "FullCertificate full_frontier",
     "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import ArpackError, eigsh
 
-from lmi.diagonal_certificate import DiagonalCertificate
+from lmi.diagonal_solution import DiagonalCertificate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
 from lmi.matrix_classes import block_depths, m_matrix_witness, sparse_square
 from lmi.search_time import checkpoint
@@ -277,7 +277,7 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     Returns
     -------
     DiagonalCertificate
-        ``rate`` is the tight rate of this ``Omega`` (see :func:`lmi.diagonal_certificate.diagonal_rate`), lowered by
+        ``rate`` is the tight rate of this ``Omega`` (see :func:`lmi.diagonal_solution.diagonal_rate`), lowered by
         its rounding up to 1,500 rows and by its residual above; ``upper`` is infinite, ``witness`` is ``(log u, log
         v)``.
 

@@ -19,7 +19,7 @@ import numpy as np
 from lmi import child_process
 from lmi.closed_form import h_matrix_diagonal, perron_vectors
 from lmi.definiteness_proofs import no_diagonal_rate_above
-from lmi.diagonal_certificate import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
+from lmi.diagonal_solution import DiagonalCertificate, diagonal_margin, diagonal_rate, scaled
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, MatrixError, NoCertificate
 from lmi.interior_point import maximise_margin

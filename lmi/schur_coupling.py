@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
 
-from lmi.diagonal_certificate import scaled
+from lmi.diagonal_solution import scaled
 from lmi.errors import MatrixError, NoCertificate
 from lmi.matrix_classes import block_columns
 

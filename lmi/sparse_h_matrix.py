@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, bicgstab, splu
 
-from lmi.diagonal_certificate import DiagonalCertificate
+from lmi.diagonal_solution import DiagonalCertificate
 from lmi.errors import NoCertificate
 
 #: Inverse iterations at most; they end when the bound of the smallest eigenvalue gains less than this, relatively.

@@ -45,7 +45,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lmi.exact.directed_rounding import down, float_up, up
+from lmi.exact.decimal_rounding import down, float_up, up
 from lmi.exact.elementary_enclosures import rounded, sqrt
 from ptcc_certify.bounds.input import InitialSet, WorstInitialState, initial_set_within, worst_initial_state
 from ptcc_certify.bounds.input.initial_set import ways

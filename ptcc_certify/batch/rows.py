@@ -56,7 +56,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from lmi.exact.directed_rounding import float_down, float_up
+from lmi.exact.decimal_rounding import float_down, float_up
 from ptcc_certify.batch.settings import InitialState, Settings
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lmi.exact.directed_rounding import float_up
+from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.bounds.final_state import Influence, exact_initial_state, influence
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten

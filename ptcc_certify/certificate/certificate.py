@@ -11,11 +11,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from lmi.exact.directed_rounding import down
+from lmi.exact.decimal_rounding import down
+from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.checking import check, read_and_check
-from ptcc_certify.certificate.content import Content, Source
 from ptcc_certify.certificate.format import certificate_document, read_document
-from ptcc_certify.certificate.vectors import Writer
+from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError

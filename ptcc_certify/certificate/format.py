@@ -18,11 +18,10 @@ import numpy as np
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input import EnergyIntegral, Peak
-from ptcc_certify.certificate.content import Content, Observations, Source
+from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
-from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.certificate.vectors import (
+from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
     exact_or_ball,
@@ -33,10 +32,11 @@ from ptcc_certify.certificate.vectors import (
     text,
     weighted_sum,
 )
+from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
-from ptcc_certify.checker.side_vectors import beside
+from ptcc_certify.checker.side_files import beside
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction

@@ -19,7 +19,7 @@ from ptcc_certify.bounds.input import (
     Witness,
     first_input,
 )
-from ptcc_certify.certificate.vectors import Reader, Writer, number, text
+from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.nominal import Protocol

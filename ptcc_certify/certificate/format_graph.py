@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.certificate.vectors import Writer
+from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.reading import exact
-from ptcc_certify.checker.side_vectors import SideFiles
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.claims import Claim

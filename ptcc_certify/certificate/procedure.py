@@ -32,7 +32,7 @@ from ptcc_certify.bounds.final_state import (
 )
 from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.content import Observations
+from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,

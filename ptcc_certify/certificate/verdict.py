@@ -20,9 +20,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from lmi.exact.directed_rounding import down, near, up
+from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.certificate.content import Content
+from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode

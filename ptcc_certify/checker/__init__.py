@@ -38,7 +38,7 @@ from ptcc_certify.checker.protocol import (
 )
 from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, entries, fields, need, read
-from ptcc_certify.checker.side_vectors import SideFiles
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
 

@@ -10,16 +10,16 @@ from functools import cached_property
 from operator import mul
 from typing import Any
 
-from lmi.exact.directed_rounding import up
+from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import by_agent, ordered, positions
-from ptcc_certify.checker.matrices import Matrix, need_rows
+from ptcc_certify.checker.matrix_products import Matrix, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, entries, fields, interval, length, need, same
-from ptcc_certify.checker.side_vectors import Numbers, beside
+from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 
 #: An interval may be wider than twice what is proved by this share of the largest entry of the initial state.

@@ -10,7 +10,7 @@ from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
-from ptcc_certify.checker.side_vectors import Numbers, beside
+from ptcc_certify.checker.side_files import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.
 MANY_EDGES = 10_000

@@ -9,19 +9,19 @@ from functools import cached_property
 from itertools import chain
 from typing import Any
 
-from lmi.exact.directed_rounding import down, up
+from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
-from lmi.exact.spectrum import nonzero_spectrum_beyond, tractable
+from lmi.exact.routh_test import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import Matrix, block, congruence, decrease, less, need_rows, only
+from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
-from ptcc_certify.checker.side_vectors import Numbers
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 
 KEYS = ("bounded", "threshold", "initial_set", "constants", "sliding")

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
-from lmi.exact.directed_rounding import down, up
+from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.dominance import Proved, check_dominance
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered, positions
-from ptcc_certify.checker.large_function import Proved, check_dominance
-from ptcc_certify.checker.lyapunov_form import Form
-from ptcc_certify.checker.matrices import Matrix, block, combined, decays, less, need_rows, only
+from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
-from ptcc_certify.checker.side_vectors import beside
+from ptcc_certify.checker.side_files import beside
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import Paper
 

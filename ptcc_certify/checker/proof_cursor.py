@@ -8,7 +8,7 @@ from typing import Any
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
 from ptcc_certify.checker.reading import exact, fields, need
-from ptcc_certify.checker.side_vectors import SideFiles
+from ptcc_certify.checker.side_files import SideFiles
 
 
 class Document:

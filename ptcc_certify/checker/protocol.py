@@ -12,7 +12,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import exact, fields, need
-from ptcc_certify.checker.side_vectors import Numbers
+from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
 SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"

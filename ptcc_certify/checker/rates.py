@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from lmi.exact.directed_rounding import up
+from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.lyapunov import Function
-from ptcc_certify.checker.matrices import block, congruence, decays, need_rows
+from ptcc_certify.checker.matrix_products import block, congruence, decays, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
 from ptcc_certify.checker.structure import Structure

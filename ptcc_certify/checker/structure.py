@@ -13,7 +13,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, fields, need, same
-from ptcc_certify.checker.side_vectors import beside
+from ptcc_certify.checker.side_files import beside
 
 #: Above this many weak components they are listed in arrays.
 MANY_COMPONENTS = 100

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from lmi.exact.directed_rounding import down
+from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.graph import positions
-from ptcc_certify.checker.lyapunov_form import Form
-from ptcc_certify.checker.matrices import block, congruence, decays, decrease, diagonal, less, need_rows
+from ptcc_certify.checker.matrix_products import block, congruence, decays, decrease, diagonal, less, need_rows
 from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.structure import Claim, Structure
 

@@ -84,7 +84,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     certificate the page tells the reason and no claim.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
-    from ptcc_certify.report.document import write_report
+    from ptcc_certify.report.report_file import write_report
 
     try:
         with progress(("independent check", "simulation", "report")) as begin:

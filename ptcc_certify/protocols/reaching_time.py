@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.directed_rounding import down, float_down, near, up
+from lmi.exact.decimal_rounding import down, float_down, near, up
 from lmi.exact.elementary_enclosures import decay_integrals_below
 from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import SimulationError

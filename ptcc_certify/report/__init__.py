@@ -5,8 +5,8 @@ proved is told apart from what is numerical: a simulated run, repeated for the f
 one file that loads nothing and runs no script; every text that stands in the certificate is shown as text, whatever
 it holds.
 
-:mod:`~ptcc_certify.report.document` checks the file and writes either. :mod:`~ptcc_certify.report.page` fills the
+:mod:`~ptcc_certify.report.report_file` checks the file and writes either. :mod:`~ptcc_certify.report.page` fills the
 templates of the page; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both take numbers and words from
-:mod:`~ptcc_certify.report.texts`, which rounds what was proved to the safe side, and figures from
+:mod:`~ptcc_certify.report.notation`, which rounds what was proved to the safe side, and figures from
 :mod:`~ptcc_certify.report.figures`. This package itself loads none of them: the screen needs no template.
 """

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from lmi.exact.directed_rounding import down, float_down, near, up
+from lmi.exact.decimal_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations

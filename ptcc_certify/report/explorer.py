@@ -24,7 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from lmi.exact.directed_rounding import down
+from lmi.exact.decimal_rounding import down
 from ptcc_certify.bounds.final_state import exact_initial_state, final_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify

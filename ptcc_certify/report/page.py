@@ -22,10 +22,10 @@ from ptcc_certify.certificate.certificate import Certificate, RejectedCertificat
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES
-from ptcc_certify.report import texts
+from ptcc_certify.report import notation as texts
 from ptcc_certify.report.figures import draw, inline_figure
+from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.screen import camps, remarks_on
-from ptcc_certify.report.texts import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.theorems.table import THEOREMS
 
 #: Rows of agents, and of leader groups, that are written out.

@@ -9,7 +9,7 @@ from fractions import Fraction
 from itertools import chain, repeat
 from typing import TYPE_CHECKING
 
-from lmi.exact.directed_rounding import down, near, up
+from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.claims import Claim

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.protocols.casadi_latex import symbol_latex
-from ptcc_certify.report import texts
+from ptcc_certify.report import notation as texts
 
 _CAPTIONS = {
     "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from ptcc_certify.batch import certify_many
-from ptcc_certify.bounds.definitions import (
+from ptcc_certify.bounds.behaviours import (
     is_bipartite_consensus,
     is_bipartite_containment,
     is_interval_bipartite_consensus,

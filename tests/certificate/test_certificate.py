@@ -22,14 +22,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recheck import Recheck, number
 
-from lmi.exact.directed_rounding import float_up
+from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.batch import certify_many
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.format_graph import structure_document
+from ptcc_certify.certificate.format_vectors import exact_or_ball
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.vectors import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select

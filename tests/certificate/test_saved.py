@@ -16,11 +16,11 @@ from generators import all_classes, random_graph, sparse_digraph
 
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
-from ptcc_certify.certificate import vectors
+from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.certificate.format_effort import effort_section
 from ptcc_certify.certificate.format_graph import structure_document
-from ptcc_certify.certificate.vectors import Writer
+from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph

@@ -35,14 +35,15 @@ from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input import box, ellipsoid
-from ptcc_certify.certificate import procedure, vectors
+from ptcc_certify.certificate import format_vectors as vectors
+from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format import certificate_document
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import UnreadableError, check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.checker.digraph import numbered
-from ptcc_certify.checker.large_function import _differences
+from ptcc_certify.checker.dominance import _differences
 from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
@@ -892,7 +893,7 @@ def test_the_work_of_a_factor_is_bounded(monkeypatch: pytest.MonkeyPatch):
     assert report.rejected == "dominance of lyapunov.functions[0]" and "products; standard library takes 3" in (
         report.reason or ""
     )
-    monkeypatch.setattr("ptcc_certify.checker.large_function.LARGEST_PRODUCT", 3)
+    monkeypatch.setattr("ptcc_certify.checker.dominance.LARGEST_PRODUCT", 3)
     report = check(with_factors(large("1.1", 5)))
     assert "too many edges" in (report.reason or "")
 

@@ -22,7 +22,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError
-from ptcc_certify.checker.side_vectors import SideFiles
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.nominal import NominalProtocol
 

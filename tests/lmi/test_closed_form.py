@@ -15,7 +15,7 @@ from test_lmi import random_h_matrix, random_m_matrix
 from lmi import closed_form
 from lmi.closed_form import h_matrix_certificate, m_matrix_certificate, perron_certificate
 from lmi.definiteness_proofs import prove_positive_definite
-from lmi.diagonal_certificate import DiagonalCertificate, diagonal_rate
+from lmi.diagonal_solution import DiagonalCertificate, diagonal_rate
 from lmi.errors import MatrixError, NoCertificate, NotAnHMatrix, NotAnMMatrix
 from lmi.matrix_classes import comparison_matrix
 

@@ -14,7 +14,7 @@ import lmi.exact
 
 KERNEL = Path(lmi.exact.__file__).parent
 #: The array twins, and what converts floats to rationals and shows numbers, without computing in floats.
-FAST, SHOWS = "fast.py", {"directed_rounding.py"}
+FAST, SHOWS = "fast.py", {"decimal_rounding.py"}
 PLAIN = sorted(path for path in KERNEL.glob("*.py") if path.name != FAST)
 #: What of `math` is exact on integers.
 EXACT = {"gcd", "isqrt", "lcm"}
@@ -70,9 +70,9 @@ sys.path.insert(0, {str(tmp_path)!r})
 from fractions import Fraction
 from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
-from lmi.exact import numbers, polynomials, spectrum, work
+from lmi.exact import numbers, polynomials, routh_test as spectrum, work
 from lmi.exact import elementary_enclosures as enclosure
-from lmi.exact import directed_rounding as rounding
+from lmi.exact import decimal_rounding as rounding
 judge = arithmetic()
 assert judge.name == "standard library" and not judge.numpy
 assert judge.definite([[2, 1], [1, 1]]) and not judge.definite([[1, 1], [1, 1]])

@@ -80,7 +80,7 @@ def test_the_best_diagonal_rate_of_a_thousand_m_matrices():
 def test_the_optimum_lies_between_a_matrix_and_its_dual_bound(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)
     found = lmi.diagonal_lyapunov(A, objective="rate")
-    S = lmi.diagonal_certificate.scaled(A, found.log_omega)
+    S = lmi.diagonal_solution.scaled(A, found.log_omega)
     assert np.linalg.eigvalsh(S + S.T)[0] == pytest.approx(found.rate, rel=1e-9, abs=1e-12 * np.abs(S).max())
     assert found.rate >= lmi.perron_certificate(A).rate * (1 - 1e-9)
     assert found.gap <= 1e-4
@@ -131,7 +131,7 @@ def test_a_chain_of_two_thousand_followers_has_a_certificate():
     assert closed.rate == pytest.approx(2, rel=1e-5)
     assert np.isfinite(closed.log_condition) and closed.condition == np.inf  # beyond float64, known by its logarithm
     # D^-1 A D of a bidiagonal matrix: B + B' > b I by dominance, row by row
-    B = lmi.diagonal_certificate.scaled(A, closed.log_omega)
+    B = lmi.diagonal_solution.scaled(A, closed.log_omega)
     off = np.abs(B.diagonal(-1))
     assert (2 - closed.rate - np.append(0, off) - np.append(off, 0) >= 0).all()
     capped = lmi.m_matrix_certificate(A, max_condition=1e6)

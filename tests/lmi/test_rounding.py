@@ -15,7 +15,7 @@ from generators import all_classes, random_graph
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lmi.exact.directed_rounding import down, float_down, float_up, near, up
+from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
 from ptcc_certify import Actuator, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph

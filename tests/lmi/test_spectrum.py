@@ -13,9 +13,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from lmi.exact import polynomials, spectrum
+from lmi.exact import polynomials
+from lmi.exact import routh_test as spectrum
 from lmi.exact.polynomials import characteristic, rank
-from lmi.exact.spectrum import nonzero_spectrum_beyond
+from lmi.exact.routh_test import nonzero_spectrum_beyond
 
 #: Weights of the edges from j to i, by (j, i).
 Edges = dict[tuple[int, int], Fraction]

@@ -34,10 +34,10 @@ from ptcc_certify.checker import digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.report.document import write_report
+from ptcc_certify.report.notation import LISTED, printable
 from ptcc_certify.report.page import ROWS, _environment, report_html
+from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import _tex, report_latex
-from ptcc_certify.report.texts import LISTED, printable
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)

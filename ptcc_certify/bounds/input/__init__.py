@@ -17,7 +17,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact import arithmetic
-from lmi.exact.spectrum import LARGEST, nonzero_spectrum_beyond, tractable
+from lmi.exact.routh_test import LARGEST, nonzero_spectrum_beyond, tractable
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.effort import (
     Disturbed,
@@ -30,8 +30,8 @@ from ptcc_certify.bounds.input.effort import (
 )
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid, initial_set_within, largest_deviation
+from ptcc_certify.bounds.input.residual_under_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
-from ptcc_certify.bounds.input.under_gain_limits import LimitedBounds, bound_disturbed
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import (

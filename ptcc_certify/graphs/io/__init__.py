@@ -6,7 +6,7 @@ rows and builds the graph; so a rule of the reader holds for all formats, and a 
 
 from ptcc_certify.graphs.io.files import write_atomically
 from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
-from ptcc_certify.graphs.io.state import by_label, in_node_order, random_states, read_state
+from ptcc_certify.graphs.io.initial_state import by_label, in_node_order, random_states, read_state
 
 __all__ = [
     "by_label",

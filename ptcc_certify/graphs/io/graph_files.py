@@ -11,9 +11,9 @@ from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, write_atomically
-from ptcc_certify.graphs.io.graph_formats import read_gml, read_graphml, read_pajek
 from ptcc_certify.graphs.io.graph_from_rows import graph_of
-from ptcc_certify.graphs.io.matrices import read_mat, read_mtx, read_npy, read_npz
+from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
+from ptcc_certify.graphs.io.networkx_formats import read_gml, read_graphml, read_pajek
 from ptcc_certify.graphs.rationals import shorten
 
 _MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}

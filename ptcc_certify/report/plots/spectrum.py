@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
-from lmi.exact.directed_rounding import float_up
+from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols import Protocol

@@ -16,7 +16,7 @@ import jinja2
 from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
-from lmi.exact.directed_rounding import down, up
+from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.bounds.input import InitialSet
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format import producer

@@ -10,15 +10,15 @@ from itertools import chain, pairwise
 from operator import mul
 from typing import Any
 
+from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
-from lmi.exact.directed_rounding import down
 from lmi.exact.numbers import longest
 from lmi.exact.polynomials import row_sum
 from lmi.exact.work import fits, spend
-from ptcc_certify.checker.matrices import Sparse, block
+from ptcc_certify.checker.matrix_products import Sparse, block
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
-from ptcc_certify.checker.side_vectors import Numbers
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import group_decrease
 

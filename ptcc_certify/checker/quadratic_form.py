@@ -12,7 +12,7 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.matrices import Matrix, congruence, diagonal
+from ptcc_certify.checker.matrix_products import Matrix, congruence, diagonal
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from ptcc_certify.bounds.deviation import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, influence
+from ptcc_certify.bounds.final_state_deviation import DeviationGeometry
 from ptcc_certify.bounds.input import (
     Effort,
     InitialSet,
@@ -28,10 +28,10 @@ from ptcc_certify.bounds.input import (
     worst_initial_state,
 )
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.certificate.vectors import final_state_witness
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.checker.lyapunov_form import Form
+from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES

@@ -14,7 +14,7 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.reading import exact
-from ptcc_certify.checker.side_vectors import SideFiles, beside
+from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.graphs.rationals import format_exact, writable
 from ptcc_certify.graphs.structure import Structure
 
