@@ -47,13 +47,13 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, up
 from lmi.exact.elementary_enclosures import rounded, sqrt
-from ptcc_certify.bounds.input import InitialSet, WorstInitialState, initial_set_within, worst_initial_state
-from ptcc_certify.bounds.input.initial_set import ways
+from ptcc_certify.bounds.input.initial_set import initial_set_within, ways
 from ptcc_certify.bounds.input.tightest_bound import decaying, log, usable_functions
+from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import INPUT_NODES
-from ptcc_certify.checker.input_formulas import BITS, InputBounds, Limits, Linear
+from ptcc_certify.checker.input_formulas import BITS, InitialSet, InputBounds, Limits, Linear
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact, shorten

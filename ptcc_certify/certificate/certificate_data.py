@@ -18,19 +18,14 @@ import numpy as np
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, influence
 from ptcc_certify.bounds.final_state_deviation import DeviationGeometry
-from ptcc_certify.bounds.input import (
-    Effort,
-    InitialSet,
-    InputRequest,
-    Limits,
-    WorstInitialState,
-    bound_effort,
-    worst_initial_state,
-)
+from ptcc_certify.bounds.input.effort import Effort
+from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
+from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph

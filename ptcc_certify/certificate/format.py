@@ -17,7 +17,7 @@ import numpy as np
 
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState, rounding_radius
-from ptcc_certify.bounds.input import EnergyIntegral, Peak
+from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section

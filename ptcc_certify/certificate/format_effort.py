@@ -7,19 +7,10 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from ptcc_certify.bounds.input import (
-    Disturbed,
-    Effort,
-    EnergyIntegral,
-    InitialSet,
-    Limited,
-    Limits,
-    Peak,
-    SlidingPart,
-    Witness,
-    first_input,
-)
+from ptcc_certify.bounds.input.effort import Disturbed, Effort, EnergyIntegral, Limited, Peak, SlidingPart, Witness
+from ptcc_certify.bounds.input.effort_bounds import first_input
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.nominal import Protocol

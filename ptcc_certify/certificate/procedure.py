@@ -30,7 +30,6 @@ from ptcc_certify.bounds.final_state import (
     final_state,
     influence,
 )
-from ptcc_certify.bounds.input import Limits
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.request import (
@@ -42,6 +41,7 @@ from ptcc_certify.certificate.request import (
     refuse,
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
+from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES

@@ -12,7 +12,8 @@ import numpy as np
 
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.final_state import exact_initial_state
-from ptcc_certify.bounds.input import InitialSet, Limits, initial_set_within
+from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable

@@ -17,9 +17,9 @@ from latex2mathml.converter import convert
 from markupsafe import Markup, escape
 
 from lmi.exact.decimal_rounding import down, up
-from ptcc_certify.bounds.input import InitialSet
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format import producer
+from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.screen import structure_text

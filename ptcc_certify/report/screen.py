@@ -15,7 +15,7 @@ from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
-    from ptcc_certify.bounds.input import Effort
+    from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
 
 _ORIENTATION = {

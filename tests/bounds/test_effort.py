@@ -15,20 +15,14 @@ from mutations import at, changed, resealed
 from scipy.linalg import expm
 
 from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.bounds.input import (
-    Effort,
-    EnergyIntegral,
-    InitialSet,
-    InputRequest,
-    Limits,
-    bound_effort,
-    ellipsoid,
-    initial_set_within,
-    worst_initial_state,
-)
+from ptcc_certify.bounds.input.effort import Effort, EnergyIntegral
+from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
+from ptcc_certify.bounds.input.initial_set import ellipsoid, initial_set_within
+from ptcc_certify.bounds.input.worst_initial_state import worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

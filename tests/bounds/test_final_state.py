@@ -21,7 +21,7 @@ from ptcc_certify.bounds.behaviours import (
     is_stability,
 )
 from ptcc_certify.bounds.final_state import final_state, influence
-from ptcc_certify.bounds.input import box, ellipsoid
+from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph

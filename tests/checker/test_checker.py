@@ -34,7 +34,7 @@ from lmi.exact.definite import SparseFactor
 from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.bounds.input import box, ellipsoid
+from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate

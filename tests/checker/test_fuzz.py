@@ -34,7 +34,7 @@ from side_files import with_factors, with_side_files
 
 import ptcc_certify
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.bounds.input import box, ellipsoid
+from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check

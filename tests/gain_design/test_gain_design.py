@@ -12,9 +12,10 @@ from scipy.linalg import expm
 
 from ptcc_certify import gain_design
 from ptcc_certify.bounds.final_state import influence
-from ptcc_certify.bounds.input import InitialSet, box, ellipsoid
+from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.bounds.input.tightest_bound import usable_functions
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bounds, design, least_peak, peak_factor

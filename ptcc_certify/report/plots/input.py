@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from ptcc_certify.bounds.input import Effort
+from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled

@@ -1,0 +1,204 @@
+"""Control effort: how large the input gets, whether it stays finite at the deadline, what limits of the gain leave.
+
+The gain is infinite at the deadline; the input ``u = gain E`` stays bounded for every initial state iff
+``rho2 kappa Re lambda >= 1`` for all nonzero eigenvalues of ``L``, those on that line being semisimple. Bounds are
+formed in exact arithmetic (:mod:`ptcc_certify.checker.input_formulas`) from the proved Lyapunov functions; here their
+free parameters are chosen, in floating point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.exact import arithmetic
+from lmi.exact.routh_test import LARGEST, nonzero_spectrum_beyond, tractable
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.input.effort import (
+    Effort,
+    Peak,
+    SlidingPart,
+)
+from ptcc_certify.bounds.input.energy import energy_integral
+from ptcc_certify.bounds.input.initial_set import largest_deviation
+from ptcc_certify.bounds.input.residual_under_limits import LimitedBounds, bound_disturbed
+from ptcc_certify.bounds.input.tightest_bound import best_bound, least_bound, round_up, usable_functions
+from ptcc_certify.checker import INPUT_NODES
+from ptcc_certify.checker.input_formulas import (
+    Form,
+    InitialSet,
+    InputBounds,
+    Limits,
+    Reaching,
+    energy_above,
+    length_above,
+    peak_above,
+    root_above,
+)
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols import Protocol
+
+#: By how much constants of full matrices are raised, so that they are quick to prove.
+RAISE = Fraction(1, 2**30)
+
+
+@dataclass(frozen=True)
+class InputRequest:
+    """What the input is to be bounded for, and from what is proved already.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : Protocol
+    forms : sequence of Form or None
+        The Lyapunov functions of the envelope; None for those of large graphs.
+    rate, limit : Fraction or None
+        The largest proved rate, and the proved upper bound on the decay rate.
+    initial_state, initial_set
+        ``X(0)``, or a set of initial states instead.
+    sigma0 : sequence of Fraction or None
+    reaching : sequence of (Fraction or None), optional
+        Proved reaching times ``ln(T_r/(T_r - t))`` of the agents; without them, and for None, ``T_r``.
+    influence : Influence, optional
+        ``Q``, for the drift under disturbances.
+    deviations : sequence
+        Of every Lyapunov function, the constants from ``V`` to the deviations of agents to their final states, or None.
+    limits : sequence of Limits
+        Nominal protocol: limits of the gain to be judged.
+    delta : Fraction, optional
+        Nominal protocol: bound of the disturbances to be judged.
+    noise : Fraction, optional
+        Nominal protocol: bound of the measurement noise to be judged under each of the limits but sampling.
+    """
+
+    structure: Structure
+    protocol: Protocol
+    forms: Sequence[Form | None]
+    rate: Fraction | None
+    limit: Fraction | None
+    initial_state: Sequence[Fraction] | None = None
+    initial_set: InitialSet | None = None
+    sigma0: Sequence[Fraction] | None = None
+    reaching: Sequence[Fraction | None] | None = None
+    influence: Influence | None = None
+    deviations: Sequence[Sequence[Fraction] | None] = ()
+    limits: Sequence[Limits] = ()
+    delta: Fraction | None = None
+    noise: Fraction | None = None
+
+
+def bound_effort(request: InputRequest) -> Effort:
+    """Bound the input."""
+    structure, gain, influence = request.structure, request.protocol.gain, request.influence
+    still, n = structure.graph.n_edges == 0, structure.graph.n_nodes
+    bounded, by = _decide_boundedness(structure, gain.pole, request.rate, request.limit, still)
+    lower, upper = (None if r is None else gain.pole * r / 2 for r in (request.rate, request.limit))
+    sliding = _sliding_part(request)
+    effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
+    if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
+        return effort
+    constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in request.forms)
+    region = request.initial_set or InitialSet(tuple(request.initial_state or ()))
+    rows = structure.graph.exact_rows(range(n))
+    bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching_phase(request))
+    usable = usable_functions(bounds)
+    own = [Fraction(0)] * n if sliding is None else sliding.agents
+    peak = None if own is None else _peak(bounds, usable, own)
+    cap = (
+        None if influence is None or not influence.exact or not request.limits else largest_deviation(region, influence)
+    )
+    energies = (energy_integral(structure, bounds), least_bound(bounds, energy_above, usable))
+    limited = LimitedBounds(bounds, usable, request.deviations, cap, peak, request.noise)
+    entries = [limited.bound_residual(entry) for entry in request.limits]
+    return replace(
+        effort,
+        initial_set=request.initial_set,
+        constants=constants,
+        peak=peak,
+        energy=min((e for e in energies if e is not None), key=lambda e: e.value, default=None),
+        path_length=least_bound(bounds, length_above, usable),
+        residual=tuple(entry for entry in entries if entry is not None),
+        longest_period=limited.longest_period(request.limits, entries, gain),
+        disturbed=None if request.delta is None else bound_disturbed(bounds, usable, request.delta, influence),
+        first=first_input(structure, request.protocol, region),
+    )
+
+
+def first_input(structure: Structure, protocol: Protocol, region: InitialSet) -> Fraction | None:
+    """Return ``sup max_k |u_k(0)|``, exactly; None in sliding mode, for an ellipsoid, for a large graph."""
+    n = structure.graph.n_nodes
+    if protocol.reaching or region.axes or n > INPUT_NODES or not structure.graph.n_edges:
+        return None
+    return protocol.gain.first * max(map(region.largest, structure.graph.exact_rows(range(n))))
+
+
+def _decide_boundedness(
+    structure: Structure, k: Fraction, rate: Fraction | None, limit: Fraction | None, still: bool
+) -> tuple[bool | None, str | None]:
+    """Decide whether the input stays bounded for every initial state, and by what."""
+    if still or (rate is not None and rate * k >= 2):
+        return True, "rate"
+    if limit is not None and limit * k < 2:
+        return False, "upper_bound"
+    graph = structure.graph
+    if graph.n_nodes > LARGEST:
+        return None, None
+    unit = math.lcm(*{graph.exact_weight(i).denominator for i in range(graph.n_edges)})
+    rows = [{j: int(x * unit) for j, x in row.items()} for row in graph.exact_rows(range(graph.n_nodes))]
+    if not tractable(rows, unit, 1 / k):
+        return None, None
+    labels = structure.strong_component
+    parts = [np.flatnonzero(labels == c).tolist() for c in range(int(labels.max()) + 1)]
+    place = nonzero_spectrum_beyond(rows, unit, 1 / k, parts, arithmetic().characteristic)
+    return place in ("beyond", "on"), "spectrum"
+
+
+def _sliding_part(request: InputRequest) -> SlidingPart | None:
+    """Bound the sliding part of every input; None where there is none."""
+    protocol, sigma0 = request.protocol.reaching, request.sigma0
+    if protocol is None or sigma0 is None:
+        return None
+    drive = protocol.reaching_gain
+    if drive.pole < 1 and any(sigma0):
+        return SlidingPart(False, None)
+    return SlidingPart(drive.pole >= 1, tuple(protocol.mu1 + drive.first * abs(s) for s in sigma0))
+
+
+def _reaching_phase(request: InputRequest) -> Reaching | None:
+    """Return how the sliding variables move; None if they do not."""
+    protocol, sigma0, times = request.protocol.reaching, request.sigma0, request.reaching
+    if protocol is None or sigma0 is None or not any(sigma0):
+        return None
+    last = [None] if times is None else [z for z, s in zip(times, sigma0, strict=True) if s]
+    drive, push = protocol.reaching_gain, protocol.mu1 + protocol.delta
+    quiet = None if None in last else max(z for z in last if z is not None)
+    return Reaching(sigma0, protocol.T_r, protocol.T_s, drive.rho1, drive.pole, push, quiet)
+
+
+def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
+    """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
+    P, scale = form.entries
+    above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])
+    with suppress(OverflowError):
+        if above is not None:
+            by_node = {v: round_up(x * scale * (1 + RAISE)) for v, x in zip(form.nodes, above, strict=True)}
+            return tuple(by_node.get(v, Fraction(0)) for v in range(n))
+    return None
+
+
+def _peak(bounds: InputBounds, functions: Sequence[int], own: Sequence[Fraction]) -> Peak | None:
+    """Bound the peak of every agent's input, and of the norm; ``own`` is that of the sliding parts."""
+    agents = [best_bound(bounds, peak_above, v, functions) for v in range(len(bounds.rows))]
+    norm = best_bound(bounds, peak_above, None, functions)
+    how = tuple(a for a in agents if a is not None)
+    if norm is None or len(how) < len(agents):
+        return None
+    with suppress(OverflowError):
+        whole = round_up(norm.value + root_above(sum((x * x for x in own), Fraction(0))))
+        return Peak(tuple(round_up(a.value + x) for a, x in zip(how, own, strict=True)), how, whole, norm)
+    return None
