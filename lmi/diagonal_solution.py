@@ -39,7 +39,6 @@ class DiagonalCertificate:
 
     Examples
     --------
-    >>> from lmi import m_matrix_certificate
     >>> certificate = m_matrix_certificate([[2.0, -1.0], [-4.0, 5.0]])
     >>> round(certificate.rate, 9), round(certificate.condition, 9), abs(certificate.gap) < 1e-9
     (2.0, 4.0, True)

@@ -6,7 +6,6 @@ class LMIError(Exception):
 
     Examples
     --------
-    >>> import lmi
     >>> try:
     ...     lmi.diagonal_lyapunov([[-1.0]])
     ... except lmi.LMIError as error:
@@ -20,7 +19,6 @@ class MatrixError(LMIError, ValueError):
 
     Examples
     --------
-    >>> import lmi
     >>> lmi.is_m_matrix([[1.0, 2.0]])
     Traceback (most recent call last):
     lmi.errors.MatrixError: A has shape (1, 2), not (n, n)
@@ -32,7 +30,6 @@ class NoCertificate(LMIError, RuntimeError):
 
     Examples
     --------
-    >>> import lmi
     >>> lmi.diagonal_lyapunov([[-1.0]])
     Traceback (most recent call last):
     lmi.errors.NoCertificate: the best margin found is -2, which is not positive
@@ -44,8 +41,6 @@ class OutOfTime(LMIError, RuntimeError):
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import lmi
     >>> with lmi.time_limit(0):
     ...     lmi.diagonal_lyapunov(np.eye(50))
     Traceback (most recent call last):
@@ -58,7 +53,6 @@ class NotAnHMatrix(LMIError, ValueError):
 
     Examples
     --------
-    >>> import lmi
     >>> lmi.h_matrix_diagonal([[-1.0]])
     Traceback (most recent call last):
     lmi.errors.NotAnHMatrix: diagonal entry 0 is -1, not positive
@@ -70,7 +64,6 @@ class NotAnMMatrix(LMIError, ValueError):
 
     Examples
     --------
-    >>> import lmi
     >>> lmi.m_matrix_certificate([[1.0, 2.0], [0.0, 1.0]])
     Traceback (most recent call last):
     lmi.errors.NotAnMMatrix: entry (0, 1) is 2, positive off the diagonal

@@ -89,7 +89,6 @@ class CoupledCertificate:
     --------
     >>> certificate = coupled_lyapunov([FreeLeader(np.array([[1.0]]))], [[-1.0]], [[1.0]])
     >>> A, omega = np.array([[1.0, 0.0], [-1.0, 1.0]]), np.concatenate([*certificate.leaders, certificate.followers])
-    >>> from lmi import diagonal_margin
     >>> diagonal_margin(A, omega) > 0
     True
     """

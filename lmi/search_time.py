@@ -35,8 +35,6 @@ def time_limit(seconds: float) -> Iterator[None]:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import lmi
     >>> try:
     ...     with time_limit(0):
     ...         lmi.diagonal_lyapunov(np.eye(50))

@@ -39,7 +39,6 @@ class PTCCError(Exception):
 
     Examples
     --------
-    >>> import ptcc_certify as ptcc
     >>> try:
     ...     ptcc.NominalProtocol(T=0, rho1=1, rho2=1, kappa=1)
     ... except ptcc.PTCCError as error:
@@ -65,7 +64,6 @@ class GraphError(PTCCError, ValueError):
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph
     >>> SignedDigraph.from_edges([("a", "b", 0)])
     Traceback (most recent call last):
     ptcc_certify.errors.GraphError: weight 0 of edge a -> b: an unknown sign is not an edge; remove it or give a weight
@@ -77,8 +75,6 @@ class FormatError(GraphError):
 
     Examples
     --------
-    >>> from io import StringIO
-    >>> from ptcc_certify import read_graph
     >>> read_graph(StringIO("a,a,1"))
     Traceback (most recent call last):
     ptcc_certify.errors.FormatError: input, line 1: self-loop at node a; remove it, or drop all with --drop-self-loops
@@ -90,7 +86,6 @@ class ParameterError(PTCCError, ValueError):
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol
     >>> NominalProtocol(T=-1, rho1=1, rho2=1, kappa=1)
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: T = -1 is outside its domain; T must be > 0
@@ -102,7 +97,6 @@ class HypothesisError(PTCCError, ValueError):
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, unbalanced_lyapunov
     >>> unbalanced_lyapunov(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]))
     Traceback (most recent call last):
     ptcc_certify.errors.HypothesisError: Lemma 3.2 asks for a structurally unbalanced graph; this one is balanced
@@ -114,7 +108,6 @@ class SimulationError(PTCCError, RuntimeError):
 
     Examples
     --------
-    >>> from ptcc_certify import Actuator, NominalProtocol, SignedDigraph, simulate
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> held = Actuator(sample_period="0.001", gain_cap=2_000_000)  # far too long for such a gain
     >>> simulate(foes, NominalProtocol(T=1, rho1=1_000_000, rho2=1, kappa=1), [3, 1], actuator=held)

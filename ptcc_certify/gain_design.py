@@ -155,7 +155,6 @@ class Design(Shown):
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> answer = design(pair, max_input=10, initial_bound=1, deadline=1)
     >>> answer.verdict, bool(answer.shortest_possible <= answer.shortest_certified <= 1)
@@ -257,7 +256,6 @@ class Design(Shown):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
         >>> design(pair, max_input=10, initial_bound=1).trade_off([1, 2]).lower.round(6)
         array([1.5 , 0.75])
@@ -398,7 +396,6 @@ def design(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> trio = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     >>> design(trio, max_input=20, initial_bound=3, deadline=1)
     Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18857, 1.18857 times the \
@@ -587,7 +584,6 @@ def least_peak(clocks: np.ndarray, sizes: np.ndarray) -> tuple[float, float]:
 
     Examples
     --------
-    >>> import numpy as np
     >>> a, peak = least_peak(np.array([1.0]), np.array([1.0]))  # with a = 0 it is e
     >>> round(a, 3), round(peak, 3)
     (0.403, 2.588)
@@ -611,7 +607,6 @@ def peak_factor(a: float, clocks: np.ndarray, sizes: np.ndarray) -> float:
 
     Examples
     --------
-    >>> import numpy as np
     >>> round(peak_factor(0.0, np.array([1.0]), np.array([1.0])), 6)
     2.718282
     """

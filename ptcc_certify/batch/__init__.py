@@ -101,7 +101,6 @@ def certify_many(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
     >>> rows = certify_many(["fig1a", "fig1b"], NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), method="perron")
     >>> [(row["graph"], row["behaviour"], row["verdict"]) for row in rows]
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
@@ -169,8 +168,6 @@ def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool 
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import Ensemble
     >>> with TemporaryDirectory() as folder:
     ...     write_graphs(Ensemble(count=2, nodes=5), folder), sorted(path.name for path in Path(folder).iterdir())
     (2, ['ensemble-0.csv', 'ensemble-1.csv'])

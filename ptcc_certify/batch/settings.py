@@ -86,7 +86,6 @@ class Settings:
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
     >>> Settings.of(NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), seed=3, undirected=True).reading.undirected
     True
     """

@@ -45,7 +45,6 @@ def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1])
     >>> is_prescribed_time_stable(run)
@@ -79,9 +78,6 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.final_state import final_state
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]))
     >>> is_stability(final_state(st, [3, 4]), st)
     True
@@ -111,9 +107,6 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.final_state import final_state
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
     >>> is_bipartite_consensus(final_state(st, [3, 4]), st), is_bipartite_consensus(final_state(st, [3, 3]), st)
     (True, False)
@@ -143,9 +136,6 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.final_state import final_state
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 3, 1), (3, 2, 1)]))
     >>> is_interval_bipartite_consensus(final_state(st, [2, 0, 0]), st)
     True
@@ -182,9 +172,6 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.final_state import final_state
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))
     >>> is_bipartite_containment(final_state(st, [1, 0, 2]), st)
     True

@@ -119,7 +119,6 @@ class Comparison:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
 
@@ -179,7 +178,6 @@ class Envelope:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
 

@@ -95,8 +95,6 @@ class Influence:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> who = influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])))
     >>> who.containment_weights, who.apply([Fraction(1), Fraction(0), Fraction(2)])[0][1]  # of a and b on c
     (((Fraction(1, 4), Fraction(-3, 4)),), Fraction(-5, 4))
@@ -133,8 +131,6 @@ class Influence:
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
-        >>> from ptcc_certify.graphs.structure import analyse
         >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
         {0: Fraction(1, 4), 2: Fraction(-3, 4)}
         """
@@ -222,8 +218,6 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> foes = analyse(SignedDigraph.from_edges([(1, 2, -3), (2, 1, -1)]))
     >>> influence(foes).left_null_vectors  # they meet at (3 x_1 - x_2)/4 and its opposite
     ((Fraction(3, 4), Fraction(-1, 4)),)
@@ -283,8 +277,6 @@ class FinalState:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> end = final_state(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
     >>> end
     FinalState(1=1, 2=-1, 3=-1)
@@ -356,8 +348,6 @@ def final_state(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> final_state(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])), [1, 0, 2]).states
     (Fraction(1, 1), Fraction(-5, 4), Fraction(2, 1))
     """
@@ -417,8 +407,6 @@ def enclose(influence: Influence) -> Influence:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
     >>> who, x0 = enclose(influence(st, exact=False)), [Fraction(1), Fraction(0), Fraction(1)]
     >>> final = enclosed_final_state(who, x0)

@@ -66,7 +66,6 @@ class SlidingEnvelope(Envelope):
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> envelope = certify(pair, robust, [3, 1], sigma0=[1, 0], simulation=False).envelope

@@ -40,8 +40,6 @@ class RejectedCertificate(PTCCError, ValueError):
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "c.json")
@@ -103,7 +101,6 @@ class Certificate(Content, Shown):
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
     >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
@@ -244,8 +241,6 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")

@@ -45,7 +45,6 @@ def check(
 
     Examples
     --------
-    >>> from ptcc_certify import check
     >>> check({"schema": "ptcc-certificate/2"}).reason
     'the key "producer" is missing'
     """

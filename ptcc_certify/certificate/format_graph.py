@@ -67,7 +67,6 @@ def certificate_graph(document: Mapping[str, Any], folder: Path) -> SignedDigrap
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, certify
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
     >>> certificate_graph(document, Path()) == foes

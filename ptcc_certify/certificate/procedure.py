@@ -155,7 +155,6 @@ def certify(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
     >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
     >>> cert

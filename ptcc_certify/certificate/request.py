@@ -51,7 +51,6 @@ class Expectations:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))

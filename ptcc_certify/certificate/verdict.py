@@ -84,7 +84,6 @@ class Assessment:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> assessment = certify(pair, protocol, simulation=False).assessment
@@ -190,7 +189,6 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
     >>> print(certify(pair, weak, [3, 1], simulation=False).assessment.text)

@@ -80,7 +80,6 @@ class Ensemble:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> ensemble = Ensemble(count=8, nodes=range(5, 9), seed=1)
     >>> ensemble.kind(2), analyse(ensemble.graph(2)).connectivity
     (('weak', True), 'weak')
@@ -150,7 +149,6 @@ class Ensemble:
 
         Examples
         --------
-        >>> from tempfile import TemporaryDirectory
         >>> with TemporaryDirectory() as folder:
         ...     spec = Path(folder, "spec.toml")
         ...     _ = spec.write_text('count = 2\nnodes = { from = 5, to = 40 }\nconnectivity = "weak"')

@@ -66,8 +66,6 @@ class ClosedComponent:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 1)])).closed_components[0]
     ClosedComponent(nodes=(0, 1), balanced=True, gauge=(1, -1), negative_cycle=None)
     """
@@ -120,8 +118,6 @@ class WeakComponent:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> two = analyse(SignedDigraph.from_edges([(1, 2, 1), (3, 4, 1), (4, 3, -1)]))
     >>> [(c.nodes, c.connectivity, c.claim.behaviour) for c in two.components]
     [((0, 1), 'quasi-strong', 'interval bipartite consensus'), ((2, 3), 'strong', 'stability')]
@@ -175,8 +171,6 @@ class Structure(Shown):
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)]))
     >>> structure.connectivity, structure.leaders.tolist(), structure.followers.tolist()
     ('quasi-strong', [0, 1], [2])

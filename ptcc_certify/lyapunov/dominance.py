@@ -70,7 +70,6 @@ def dominant_functions(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> g = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 2), (2, 3, -1)])
     >>> [round(float(m.rate), 3) for m in dominant_functions(analyse(g))]
     [2.0, 1.99, 1.9, 1.5, 1.1, 1.01, 1.0]

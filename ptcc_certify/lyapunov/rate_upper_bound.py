@@ -74,8 +74,6 @@ def prove_rate_bound(structure: Structure) -> RateBound | None:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> pair = [(1, 2, -1), (2, 1, -3)]
     >>> float(prove_rate_bound(analyse(SignedDigraph.from_edges(pair))).value)  # one nonzero eigenvalue, 4
     8.0
@@ -121,8 +119,6 @@ def mean_bound(structure: Structure) -> RateBound | None:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> mean_bound(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3), (2, 3, "1/7")]))).value
     Fraction(2, 7)
     """

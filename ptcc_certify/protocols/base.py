@@ -97,7 +97,6 @@ class Protocol(Parameters, ABC):
 
         Examples
         --------
-        >>> from ptcc_certify.protocols.nominal import NominalProtocol
         >>> Protocol.from_dict(NominalProtocol(T=1, rho1=1, rho2="1/2", kappa=1).to_dict())
         NominalProtocol(T=1, rho1=1, rho2=0.5, kappa=1)
         """

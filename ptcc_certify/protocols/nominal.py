@@ -77,7 +77,6 @@ class NominalProtocol(Protocol):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> pair = SignedDigraph.from_edges([(1, 2, -3)])
         >>> NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).input(pair)
         SX([0, (-6*(x1+x2))])
@@ -92,7 +91,6 @@ class NominalProtocol(Protocol):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> loop = NominalProtocol(T=1, rho1=2, rho2=0, kappa=1).closed_loop(SignedDigraph.from_edges([(1, 2, 3)]))
         >>> loop["x"], loop["ode"]
         (SX([x1, x2]), SX([0, (6*(x1-x2))]))
@@ -118,7 +116,6 @@ class NominalProtocol(Protocol):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> protocol = NominalProtocol(T=1, rho1=2, rho2=3, kappa=1)
         >>> print(protocol.latex())
         \begin{aligned}

@@ -63,7 +63,6 @@ class ReachingTime:
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3="1/2", delta=1)
     >>> small, large = certified_reaching_times(p, [Fraction(1), Fraction(100)])
     >>> small.time < 1, large.time, large.z is None  # the worst case keeps the large one from 0 until T_r
@@ -120,7 +119,6 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))

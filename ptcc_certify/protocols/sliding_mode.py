@@ -116,7 +116,6 @@ class SlidingModeProtocol(ReachingProtocol):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
         >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
         >>> loop = p.closed_loop(SignedDigraph.from_edges([(1, 2, 3)]))
         >>> loop["x"], loop["p"]

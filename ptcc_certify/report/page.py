@@ -50,8 +50,6 @@ def report_html(saved: Certificate, *, no_run: str = "no run was asked for") -> 
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, read_certificate
     >>> foes = SignedDigraph.from_edges([("<b>", "b", -1), ("b", "<b>", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
@@ -77,9 +75,6 @@ def rejected_html(error: RejectedCertificate) -> str:
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, read_certificate
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder, "c.json")

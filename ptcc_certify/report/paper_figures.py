@@ -34,7 +34,6 @@ def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
 
     Examples
     --------
-    >>> from ptcc_certify import certify
     >>> from ptcc_certify.examples import load_graph, select
     >>> example, name, _ = select("fig1b")[0]
     >>> cert = certify(load_graph(name), example.protocol(), example.x0.split(","))

@@ -61,8 +61,6 @@ def write_report(
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")

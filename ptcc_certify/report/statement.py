@@ -40,8 +40,6 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify, read_certificate
     >>> foes = SignedDigraph.from_edges([("a_1", "b", -1), ("b", "a_1", -1)])
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")

@@ -121,8 +121,6 @@ def simulate(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.protocols import NominalProtocol
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1])
     >>> run.final_state.round(9)
@@ -130,7 +128,6 @@ def simulate(
     >>> run = simulate(foes, run.protocol, [3, 1], actuator=GainLimits(gain_cap=11))  # e^(-2 s_eff(T)) = 0.00018
     >>> run.final_state.round(5)
     array([ 1.00037, -0.99963])
-    >>> from ptcc_certify.protocols import SlidingModeProtocol
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*k*t)")
     >>> run.final_state.round(9), bool((run.reaching_times < 1).all())

@@ -62,7 +62,6 @@ class Trajectory(Shown):
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, simulate
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], times=[0, 0.5, 1, 2])
     >>> run.states.shape, run.deadline_index, run.deadline_resolved
@@ -176,9 +175,6 @@ class Trajectory(Shown):
 
         Examples
         --------
-        >>> from ptcc_certify.graphs.digraph import SignedDigraph
-        >>> from ptcc_certify.protocols import NominalProtocol
-        >>> from ptcc_certify.simulation.run import simulate
         >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
         >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_csv()
         't,remaining,a,b\n0.0,1.0,1.0,0.0\n'
@@ -245,7 +241,6 @@ class SlidingTrajectory(Trajectory):
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, simulate
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*t)", times=[0, 1, 2])

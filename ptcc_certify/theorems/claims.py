@@ -66,8 +66,6 @@ class Claim:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> claim = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])).claim
     >>> claim.theorem, claim.behaviour, claim.special
     ('1.1', 'bipartite consensus', ('signed-average consensus', 'consensus'))
@@ -114,8 +112,6 @@ def claim_of(component: WeakComponent) -> Claim:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> claim_of(analyse(SignedDigraph.from_edges([(1, 2, 1)])).components[0]).corollaries
     ('3', '4')
     """

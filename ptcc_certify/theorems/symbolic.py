@@ -55,7 +55,6 @@ class SymbolicLyapunov:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
     >>> form = symbolic_lyapunov(st, theorem_for(st).lyapunov(st), NominalProtocol(T=1, rho1=1, rho2=0, kappa=1))
     >>> import casadi as ca
@@ -125,7 +124,6 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, 4)]))
     >>> V = theorem_for(st).lyapunov(st)
     >>> form = symbolic_lyapunov(st, V, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2))
@@ -195,7 +193,6 @@ class SymbolicSliding:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
     >>> import casadi as ca
@@ -232,7 +229,6 @@ def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> Sym
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> form = symbolic_sliding(SignedDigraph.from_edges([(1, 2, 4)]), p)
     >>> form.sigma

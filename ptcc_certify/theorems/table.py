@@ -55,8 +55,6 @@ def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> st = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)]))
     >>> theorem_for(st).number, theorem_for(st, "sliding-mode").number
     ('1.1', '4.1')

@@ -135,7 +135,6 @@ class Effort:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> effort = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False).effort
     >>> effort.bounded, [float(bound) >= 1 for bound in effort.threshold], float(effort.first)

@@ -37,8 +37,6 @@ def initial_set_within(structure: Structure, bound: Any) -> InitialSet:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> initial_set_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
     (Fraction(1, 2), Fraction(1, 2))
     """
@@ -79,7 +77,6 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> InitialSet:
     --------
     >>> box([0, 1], [2, 1])
     InitialSet(center=(Fraction(1, 1), Fraction(1, 1)), radius=(Fraction(1, 1), Fraction(0, 1)), axes=())
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
     >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
     >>> box({"b": 1, "a": 0}, {"b": 1, "a": 2}, graph) == box([0, 1], [2, 1])
     True
@@ -162,9 +159,6 @@ def largest_deviation(initial_set: InitialSet, influence: Influence) -> Fraction
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.bounds.final_state import influence
-    >>> from ptcc_certify.graphs.structure import analyse
     >>> pair = influence(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])))
     >>> largest_deviation(InitialSet([Fraction(3), Fraction(1)]), pair)  # they meet at 1 and -1
     Fraction(2, 1)

@@ -34,11 +34,7 @@ class WorstInitialState:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.protocols import NominalProtocol
     >>> follower = analyse(SignedDigraph.from_edges([(1, 2, -2)]))
-    >>> from ptcc_certify.bounds.input.initial_set import box
     >>> worst_initial_state(follower, NominalProtocol(1, 1, 1, 1), box([0, 0], [1, 1]))
     WorstInitialState(x0=array([1., 1.]), agent=1, t=0.0, size=8.0)
     """
@@ -80,10 +76,6 @@ def worst_initial_state(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.digraph import SignedDigraph
-    >>> from ptcc_certify.protocols import NominalProtocol
-    >>> from ptcc_certify.graphs.structure import analyse
-    >>> from ptcc_certify.bounds.input.initial_set import initial_set_within
     >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
     >>> worst = worst_initial_state(pair, NominalProtocol(1, 1, 1, 1), initial_set_within(pair, 3))
     >>> worst.x0, worst.t, worst.size

@@ -121,7 +121,6 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     write_atomically(Path(folder, "a.txt"), "whole")
     ...     [file.name for file in Path(folder).iterdir()]

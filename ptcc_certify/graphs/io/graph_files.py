@@ -77,7 +77,6 @@ def read_graph(
 
     Examples
     --------
-    >>> from io import StringIO
     >>> graph = read_graph(StringIO("a,b,1\nb,c,-0.1\n"))
     >>> graph.edges
     (('a', 'b', Fraction(1, 1)), ('b', 'c', Fraction(-1, 10)))
@@ -118,7 +117,6 @@ def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> Sign
 
     Examples
     --------
-    >>> from io import StringIO
     >>> graph = read_graph(StringIO("a,b,1"), orientation="listens")
     >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
     True
@@ -147,7 +145,6 @@ def reading_flags(read: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> from io import StringIO
     >>> reading_flags(read_graph(StringIO("a,b,1"), orientation="listens", duplicates="sum").read)
     '--edges listens --duplicates sum'
     """
@@ -183,7 +180,6 @@ def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
 
     Examples
     --------
-    >>> from tempfile import TemporaryDirectory
     >>> graph = SignedDigraph.from_edges([("a, b", "c", "0.1")], nodes=["lonely"])
     >>> with TemporaryDirectory() as folder:
     ...     write_graph(graph, f"{folder}/graph.csv")

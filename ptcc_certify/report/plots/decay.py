@@ -44,7 +44,6 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]

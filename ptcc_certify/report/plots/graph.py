@@ -46,7 +46,6 @@ def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, analyse
     >>> ax = plot_graph(analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])))
     >>> len(ax.patches), [text.get_text() for text in ax.texts]
     (3, ['a', 'b', 'c'])

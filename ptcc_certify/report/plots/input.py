@@ -50,7 +50,6 @@ def plot_input(
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(run, analyse(pair))
@@ -101,7 +100,6 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_effort(cert.trajectory, cert)

@@ -42,7 +42,6 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, analyse
     >>> ax = plot_spectrum(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])))
     >>> [(line.get_label(), line.get_xdata().round(6).tolist()) for line in ax.lines]
     [('nonzero eigenvalues', [2.0, 4.0]), ('zero eigenvalues', [0.0])]
@@ -87,7 +86,6 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, certify
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> ax = plot_frontier(certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)))
     >>> [line.get_label() for line in ax.lines]

@@ -59,7 +59,6 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, analyse, plot_graph
     >>> ax = plot_graph(analyse(SignedDigraph.from_edges([(1, 2, -1)])))
     >>> save_figure(ax.figure, "graph.jpg")
     Traceback (most recent call last):

@@ -27,7 +27,6 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, design
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> ax = plot_trade_off(design(pair, max_input=10, initial_bound=1))
     >>> [line.get_label() for line in ax.lines]

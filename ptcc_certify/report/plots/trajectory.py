@@ -45,7 +45,6 @@ def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | Non
 
     Examples
     --------
-    >>> from ptcc_certify import NominalProtocol, SignedDigraph, analyse, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [line.get_label() for line in plot_trajectory(run, analyse(pair)).lines]
@@ -83,7 +82,6 @@ def plot_run(
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, analyse, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> len(plot_run(simulate(pair, p, [3, 5], sigma0=[1, 0]), analyse(pair)).axes)
@@ -119,7 +117,6 @@ def plot_sliding(
 
     Examples
     --------
-    >>> from ptcc_certify import SignedDigraph, SlidingModeProtocol, certified_reaching_times, simulate
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(pair, p, [3, 5], sigma0=[1, -4])
