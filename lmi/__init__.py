@@ -2,6 +2,9 @@
 
 The package knows nothing of graphs and is useful on any matrix: ``Omega A + A' Omega > 0`` with a positive diagonal
 ``Omega`` certifies that ``x' = -A x`` decays.
+
+.. [Zhu] Z.-H. Zhu, H. Wu, Z.-H. Guan, Z.-W. Liu, Y. Chen, X. Zheng: Robust prescribed-time coordination control of
+   cooperative-antagonistic networks with disturbances, manuscript; ``ptcc cite`` prints the BibTeX entry.
 """
 
 from importlib import import_module

@@ -28,8 +28,7 @@ class FixedLeader:
 
     References
     ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Theorem 3 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
@@ -54,8 +53,7 @@ class FreeLeader:
 
     References
     ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Theorem 3 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
@@ -81,8 +79,7 @@ class CoupledCertificate:
 
     References
     ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Theorem 3 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
@@ -137,8 +134,7 @@ def coupled_lyapunov(
 
     References
     ----------
-    Theorem 3 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Theorem 3 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples

@@ -38,8 +38,7 @@ class RhoInterval:
 
     References
     ----------
-    Lemma 5 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Lemma 5 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples
@@ -75,8 +74,7 @@ class Coupling:
 
     References
     ----------
-    Lemma 5 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances.
+    Lemma 5 of [Zhu]_.
     Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994.
 
     Examples

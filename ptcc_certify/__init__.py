@@ -6,6 +6,9 @@ g = ptcc.read_graph("graph.csv")
 p = ptcc.NominalProtocol(T=0.6, rho1=0.1, rho2=0.3, kappa=1)
 cert = ptcc.certify(g, p, x0=[5, 2, -4, 3, -2, 1])
 cert.save("certificate.json")
+
+.. [Zhu] Z.-H. Zhu, H. Wu, Z.-H. Guan, Z.-W. Liu, Y. Chen, X. Zheng: Robust prescribed-time coordination control of
+   cooperative-antagonistic networks with disturbances, manuscript; ``ptcc cite`` prints the BibTeX entry.
 """
 
 from importlib import import_module

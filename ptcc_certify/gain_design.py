@@ -150,8 +150,7 @@ class Design(Shown):
 
     References
     ----------
-    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks
-    with disturbances. With ``rho1 T`` and ``rho2 kappa`` kept, the gain, and with it the input, scales as ``1/T``.
+    The protocol (4) of [Zhu]_. With ``rho1 T`` and ``rho2 kappa`` fixed, gain and input scale as ``1/T``.
 
     Examples
     --------
@@ -391,8 +390,7 @@ def design(
 
     References
     ----------
-    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks
-    with disturbances. With ``rho1 T`` and ``rho2 kappa`` kept, the gain, and with it the input, scales as ``1/T``.
+    The protocol (4) of [Zhu]_. With ``rho1 T`` and ``rho2 kappa`` fixed, gain and input scale as ``1/T``.
 
     Examples
     --------

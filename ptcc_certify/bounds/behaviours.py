@@ -40,8 +40,7 @@ def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -
 
     References
     ----------
-    Definition 1 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Definition 1 and Lemma 6 of [Zhu]_.
 
     Examples
     --------
@@ -73,8 +72,7 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II of [Zhu]_.
 
     Examples
     --------
@@ -102,8 +100,7 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II of [Zhu]_.
 
     Examples
     --------
@@ -131,8 +128,7 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II of [Zhu]_.
 
     Examples
     --------
@@ -167,8 +163,7 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II of [Zhu]_.
 
     Examples
     --------

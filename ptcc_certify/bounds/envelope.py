@@ -114,8 +114,7 @@ class Comparison:
 
     References
     ----------
-    Theorems 1 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 1 to 6 and Proposition 1 of [Zhu]_.
 
     Examples
     --------
@@ -173,8 +172,7 @@ class Envelope:
 
     References
     ----------
-    Theorems 1 to 3 and Lemma 6 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 1 to 3 and Lemma 6 of [Zhu]_.
 
     Examples
     --------

@@ -89,8 +89,7 @@ class Influence:
 
     References
     ----------
-    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Lemmas 2, 8 and 9 of [Zhu]_.
     Altafini, Consensus problems on networks with antagonistic interactions, IEEE Trans. Automat. Control 58 (2013).
 
     Examples
@@ -213,8 +212,7 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
 
     References
     ----------
-    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Lemmas 2, 8 and 9 of [Zhu]_.
 
     Examples
     --------
@@ -272,8 +270,7 @@ class FinalState:
 
     References
     ----------
-    Definitions 2 to 5; Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Definitions 2 to 5; Lemmas 2, 8 and 9 of [Zhu]_.
 
     Examples
     --------
@@ -343,8 +340,7 @@ def final_state(
 
     References
     ----------
-    Lemmas 2, 8 and 9 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Lemmas 2, 8 and 9 of [Zhu]_.
 
     Examples
     --------

@@ -61,8 +61,7 @@ class SlidingEnvelope(Envelope):
 
     References
     ----------
-    Theorems 4 to 6 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 4 to 6 and Proposition 1 of [Zhu]_.
 
     Examples
     --------

@@ -96,8 +96,7 @@ class Certificate(Content, Shown):
 
     References
     ----------
-    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_.
 
     Examples
     --------

@@ -150,8 +150,7 @@ def certify(
 
     References
     ----------
-    Theorems 1 to 6, Corollaries 1 to 10 and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 1 to 6, Corollaries 1 to 10 and Proposition 1 of [Zhu]_.
 
     Examples
     --------

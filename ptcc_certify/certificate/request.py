@@ -46,8 +46,7 @@ class Expectations:
 
     References
     ----------
-    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances, say which behaviour follows.
+    Theorems 1 to 6 of [Zhu]_ say which behaviour follows.
 
     Examples
     --------

@@ -79,8 +79,7 @@ class Assessment:
 
     References
     ----------
-    Theorems 1 to 6 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances, are what is certified.
+    Theorems 1 to 6 of [Zhu]_ are what is certified.
 
     Examples
     --------

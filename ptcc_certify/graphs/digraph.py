@@ -116,8 +116,7 @@ class SignedDigraph(Shown):
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II of [Zhu]_.
     Altafini, Consensus problems on networks with antagonistic interactions, IEEE Trans. Automat. Control 58 (2013).
 
     Examples

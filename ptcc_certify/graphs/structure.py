@@ -61,8 +61,7 @@ class ClosedComponent:
 
     References
     ----------
-    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II and Lemma 1 of [Zhu]_.
 
     Examples
     --------
@@ -113,8 +112,7 @@ class WeakComponent:
 
     References
     ----------
-    Section II and Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II and Theorems 1 to 3 of [Zhu]_.
 
     Examples
     --------
@@ -166,8 +164,7 @@ class Structure(Shown):
 
     References
     ----------
-    Section II and Lemma 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Section II and Lemma 1 of [Zhu]_.
 
     Examples
     --------
@@ -267,8 +264,7 @@ def analyse(graph: SignedDigraph) -> Structure:
 
     References
     ----------
-    Section II of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances (Lemmas 1 and 2, Theorems 1 to 3, Corollaries 1 to 5).
+    Section II of [Zhu]_ (Lemmas 1 and 2, Theorems 1 to 3, Corollaries 1 to 5).
 
     Examples
     --------

@@ -445,8 +445,7 @@ class WorstCaseDisturbance(Disturbance):
 
     References
     ----------
-    Equation (49) of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances: of all ``|d_k| <= delta`` this one makes ``|sigma_k|'`` largest.
+    Equation (49) of [Zhu]_: of all ``|d_k| <= delta`` this one makes ``|sigma_k|'`` largest.
 
     Examples
     --------

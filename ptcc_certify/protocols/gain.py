@@ -52,8 +52,7 @@ class Gain(Parameters):
 
     References
     ----------
-    Lemma 6 and equation (4) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Lemma 6 and equation (4) of [Zhu]_.
 
     Examples
     --------

@@ -53,8 +53,7 @@ class GainLimits(Parameters, Limits):
 
     References
     ----------
-    These limit the gain of the protocol (4) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    These limit the gain of the protocol (4) of [Zhu]_.
 
     Examples
     --------

@@ -58,8 +58,7 @@ class ReachingTime:
 
     References
     ----------
-    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of cooperative-antagonistic networks with
-    disturbances, bounds the norm of all sliding variables; each by itself follows from their equation (49).
+    Proposition 1 of [Zhu]_ bounds the norm of all sliding variables; each by itself follows from equation (49).
 
     Examples
     --------
@@ -114,8 +113,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
 
     References
     ----------
-    Equation (49) and Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Equation (49) and Proposition 1 of [Zhu]_.
 
     Examples
     --------

@@ -116,8 +116,7 @@ def simulate(
 
     References
     ----------
-    The networks (2) and (3) under the protocols (4) and (47)-(48) of Zhu et al., Robust prescribed-time coordination
-    control of cooperative-antagonistic networks with disturbances.
+    The networks (2) and (3) under the protocols (4) and (47)-(48) of [Zhu]_.
 
     Examples
     --------

@@ -57,8 +57,7 @@ class Trajectory(Shown):
 
     References
     ----------
-    The network (3) under the protocol (4) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The network (3) under the protocol (4) of [Zhu]_.
 
     Examples
     --------
@@ -235,8 +234,7 @@ class SlidingTrajectory(Trajectory):
 
     References
     ----------
-    The network (2) under the protocol (47)-(48) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The network (2) under the protocol (47)-(48) of [Zhu]_.
     Filippov, Differential Equations with Discontinuous Righthand Sides, Kluwer 1988.
 
     Examples

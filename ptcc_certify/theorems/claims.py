@@ -61,8 +61,7 @@ class Claim:
 
     References
     ----------
-    Theorems 1 to 6 and Corollaries 1 to 10 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Theorems 1 to 6 and Corollaries 1 to 10 of [Zhu]_.
 
     Examples
     --------

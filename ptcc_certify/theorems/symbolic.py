@@ -50,8 +50,7 @@ class SymbolicLyapunov:
 
     References
     ----------
-    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The proofs of Theorems 1 to 3 of [Zhu]_.
 
     Examples
     --------
@@ -119,8 +118,7 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
 
     References
     ----------
-    The proofs of Theorems 1 to 3 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The proofs of Theorems 1 to 3 of [Zhu]_.
 
     Examples
     --------
@@ -188,8 +186,7 @@ class SymbolicSliding:
 
     References
     ----------
-    Proposition 1 of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    Proposition 1 of [Zhu]_.
 
     Examples
     --------

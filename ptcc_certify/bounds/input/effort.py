@@ -130,8 +130,7 @@ class Effort:
 
     References
     ----------
-    The protocols (4) and (48) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The protocols (4) and (48) of [Zhu]_.
 
     Examples
     --------

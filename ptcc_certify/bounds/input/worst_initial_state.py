@@ -29,8 +29,7 @@ class WorstInitialState:
 
     References
     ----------
-    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The protocol (4) of [Zhu]_.
 
     Examples
     --------
@@ -71,8 +70,7 @@ def worst_initial_state(
 
     References
     ----------
-    The protocol (4) of Zhu et al., Robust prescribed-time coordination control of
-    cooperative-antagonistic networks with disturbances.
+    The protocol (4) of [Zhu]_.
 
     Examples
     --------
