@@ -513,7 +513,7 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
         axis.set_ticks([1, 1e-2, 1e-4, 1e-6, 1e-8])
         axis.set_major_formatter("{x:g}")
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    finished(ax, "time left, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")
+    finished(ax, "remaining time, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")
 
 
 def _refusal(message: str) -> Figure:

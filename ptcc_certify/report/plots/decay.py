@@ -13,7 +13,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 
 #: Horizontal axes of the decay, and their labels.
-_DECAY_AXES = {"left": "time left, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
+_DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
 
 
 @styled
@@ -47,7 +47,7 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]
-    ['time left, $1 - t/T$', 'time, $t/T$', 'stretched clock $s(t)$']
+    ['remaining time, $1 - t/T$', 'time, $t/T$', 'stretched clock $s(t)$']
     """
     if axis not in _DECAY_AXES:
         raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
