@@ -249,8 +249,12 @@ def irreducible_blocks(A: Any) -> list[np.ndarray]:
     --------
     >>> irreducible_blocks([[1, 0, 2], [0, 1, 0], [3, 1, 1]])
     [array([1]), array([0, 2])]
+    >>> irreducible_blocks(np.zeros((0, 0)))
+    []
     """
     label, depth = block_depths(sparse.csr_array(A))
+    if not label.size:
+        return []
     blocks = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1])
     return sorted(blocks, key=lambda rows: (depth[label[rows[0]]], rows[0]))
 

@@ -11,8 +11,9 @@ from fractions import Fraction
 from math import gcd
 from typing import Literal
 
+from lmi.exact.numbers import longest
 from lmi.exact.polynomials import Matrix, Polynomial, characteristic, evaluated, product, quotient, rank, shifted
-from lmi.exact.work import cost
+from lmi.exact.work import cost, spend
 
 #: Largest number of nodes for which the decision is meant to be asked; it takes seconds there.
 LARGEST = 120
@@ -73,6 +74,8 @@ def nonzero_spectrum_beyond(
     ------
     ValueError
         ``unit`` or ``line`` is not positive.
+    WorkError
+        The exact array would take longer than :func:`lmi.exact.work.limited` allows.
 
     Notes
     -----
@@ -88,15 +91,19 @@ def nonzero_spectrum_beyond(
     """
     if unit <= 0 or line <= 0:
         raise ValueError("the unit or the line is not positive")
-    p, place = [1], unit * line
+    on_line, place = [1], unit * line
     for nodes in [range(len(rows))] if parts is None else parts:
         index = {v: i for i, v in enumerate(nodes)}
-        p = product(p, polynomial([{index[j]: x for j, x in rows[v].items() if j in index} for v in nodes]))
-    while not p[-1]:  # an eigenvalue 0
-        p = p[:-1]
-    roots = _roots_on_axis(shifted(p, place))
-    if roots is None:
-        return "below"
+        p = polynomial([{index[j]: x for j, x in rows[v].items() if j in index} for v in nodes])
+        while not p[-1]:  # an eigenvalue 0
+            p = p[:-1]
+        roots = _roots_on_axis(shifted(p, place))
+        if roots is None:
+            return "below"
+        if roots[0]:
+            on_line = product(on_line, p)
+    roots = _roots_on_axis(shifted(on_line, place))
+    assert roots is not None  # those of parts that have none below
     count, simple = roots
     if len(simple) - 1 == count:
         return "on" if count else "beyond"
@@ -169,6 +176,7 @@ def _array(p: Polynomial, bits: int | None) -> tuple[bool | None, Polynomial]:
     level = [(c << shift * k, c << shift * k) for k, c in zip(range(len(p) - 1, -1, -1), p, strict=True)]
     above, row = _cut(level[::2], bits), _cut(level[1::2], bits)
     while row:
+        spend(4 * len(row), longest(v for _, v in row), longest(v for _, v in above), "an array of Routh")
         (low, high), (least, most) = row[0], above[0]
         if high < 0:
             return False, []
@@ -191,6 +199,8 @@ def _array(p: Polynomial, bits: int | None) -> tuple[bool | None, Polynomial]:
 def _cut(row: list[tuple[int, int]], bits: int | None) -> list[tuple[int, int]]:
     """Divide intervals by the power of 2 that leaves so many bits, outwards; None: numbers by their common divisor."""
     if bits is None:
+        size = longest(u for u, _ in row)  # common divisors and quotients are found digit by digit
+        spend(2 * len(row) * (size // 30 + 1), 30, size, "an array of Routh")
         content = gcd(*(u for u, _ in row)) or 1
         return [(u // content, u // content) for u, _ in row]
     cut = max((max(abs(u), abs(v)).bit_length() for u, v in row), default=0) - bits

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, near, up
-from lmi.exact.elementary_enclosures import decay_integrals_below
+from lmi.exact.elementary_enclosures import decay_integrals_below, rounded
 from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.protocols.disturbance import Disturbance, WorstCaseDisturbance
@@ -40,6 +40,10 @@ _BATCH = 200_000
 #: By how much a sum of panels, or a decay, may be off, relative to the initial state.
 SUM_ERROR = 1e-12
 _LARGEST_Z = Fraction(2) ** 1000
+#: Sizes of sliding variables below which floats lose digits.
+_LEAST = 1e-290
+#: Bits of an instant.
+_INSTANT_BITS = 53
 
 
 # ---------------------------------------------------------------------- what is certain
@@ -122,26 +126,35 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
     worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
-    # What is below the range of floats is guessed as 0.
-    guesses = {abs(size): max(z, 1e-305) for size, z in zip(sigma0, worst.z.tolist(), strict=True)}
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
     instants = {Fraction(0): Fraction(0)}
 
-    def prove(candidates: dict[Fraction, Fraction]) -> list[Fraction]:
+    def prove(candidates: dict[Fraction, Fraction]) -> set[Fraction]:
         below = decay_integrals_below(protocol.T_r, protocol.mu2, pole, candidates.values(), REACHING_BITS)
         proved = {size: z for size, z in candidates.items() if size <= push * below[z]}
         instants.update(proved)
-        return list(proved)
+        return set(proved)
 
+    # Near 0 the integral is T_r z.
+    guesses = {
+        abs(x): abs(x) / (push * protocol.T_r) if abs(x) < _LEAST else Fraction(z)
+        for x, z in zip(sigma0, worst.z.tolist(), strict=True)
+        if z < math.inf
+    }
     for slack in (1e-12, 1e-9, 1e-6, 1e-3):
-        finite = {size: z for size, z in guesses.items() if size not in instants and math.isfinite(z)}
-        prove({size: Fraction(z * (1 + slack)) for size, z in finite.items()})
+        raised = {size: z * Fraction(1 + slack) for size, z in guesses.items() if size not in instants}
+        prove({size: rounded(z, _INSTANT_BITS, up=True) for size, z in raised.items()})
     # What floats cannot place is within a tenth; with mu3 kappa < 1 the integral does not grow any more from ``z`` on.
-    z = min(_LARGEST_Z, (60 if pole < 1 else 1600) / abs(pole - 1)) if pole != 1 else _LARGEST_Z
-    rest = [size for size in guesses if size not in instants]
-    while rest:
-        rest = prove(dict.fromkeys(rest, z))
-        z = Fraction(float(z) / 1.1)
+    z = float(min(_LARGEST_Z, (60 if pole < 1 else 1600) / abs(pole - 1)) if pole != 1 else _LARGEST_Z)
+    steps = round((math.log(z) - math.log(_LEAST)) / math.log(1.1))
+    places = dict.fromkeys(prove(dict.fromkeys(set(map(abs, sigma0)) - set(instants), Fraction(z))), (0, steps))
+    for _ in range(steps.bit_length()):
+        middle = {size: sum(ends) // 2 for size, ends in places.items()}
+        proved = prove({size: Fraction(math.exp(math.log(z) - k * math.log(1.1))) for size, k in middle.items()})
+        places = {
+            size: (middle[size], last) if size in proved else (first, middle[size])
+            for size, (first, last) in places.items()
+        }
     return tuple(ReachingTime(protocol.T_r, instants.get(abs(size))) for size in sigma0)
 
 
@@ -161,7 +174,7 @@ class ReachingProblem:
     ----------
     z : (N,) array
         ``ln(T_r/(T_r - t))`` where each sliding variable reaches 0, to near machine precision; 0 for one that starts
-        there, infinite for one that is 0 at ``T_r`` only.
+        there or below 1e-290, infinite for one that is 0 at ``T_r`` only.
 
     Raises
     ------
@@ -171,6 +184,7 @@ class ReachingProblem:
 
     def __init__(self, protocol: ReachingProtocol, sigma0: np.ndarray, disturbance: Disturbance):
         self._protocol, self._disturbance = protocol, disturbance
+        sigma0 = np.where(np.abs(sigma0) < _LEAST, 0.0, sigma0)  # floats lose digits there
         # Each sliding variable in units of its own initial state: the bracket begins at 1.
         self._unit, self._sign = np.abs(sigma0), np.sign(sigma0)
         self._agents = np.flatnonzero(self._sign)

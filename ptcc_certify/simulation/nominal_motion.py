@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 # A disturbance may be fast: so many steps between two instants.
 MANY_STEPS = 500_000
-# From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit.
+# From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit; noise times a gain that grows
+# further is not, but without limits of the gain nothing is asked of noise.
 _LAST_TAU = 40.0
 # No tolerance is made finer than this on the way to the state at T.
 _FINEST = 1e-13
@@ -84,6 +85,7 @@ class NominalMotion(Motion):
     ):
         super().__init__(graph, state, state.shape[1], tolerances)
         self._unit = np.ones(state.shape[1]) if unit is None else unit
+        self._to_pole = True  # whether the gain grows up to T
         if forcing is not None:
             self._options["max_num_steps"] = MANY_STEPS
             self.sources = forcing.disturbance, forcing.noise
@@ -94,7 +96,7 @@ class NominalMotion(Motion):
         import casadi as ca
 
         R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
-        if not self.sources or (ends[0] >= _LAST_TAU and not phase.past):
+        if not self.sources or (ends[0] >= _LAST_TAU and self._to_pole and not phase.past):
             return -phase.nominal(R) * self._product(x)
         per_unit = ca.DM(1 / self._unit).T
         d, noise = (ca.mtimes(source(phase, ends, t, 0), per_unit) for source in self._signals)
@@ -121,6 +123,7 @@ class NominalMotion(Motion):
             beyond = bool((remaining <= stretch.end).any())
             if not here.any() and not beyond:
                 break
+            self._to_pole = stretch.level is None and not stretch.end
             if stretch.level is None:
                 phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, remaining)[here]
                 least = _LAST_TAU if self.sources else begin

@@ -45,7 +45,7 @@ EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
 #: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
 FLOATS = {
     ("lmi/exact/decimal_rounding.py", "float_up"): "the float next to a number",
-    ("lmi/exact/decimal_rounding.py", "_written"): "prints a number; the digits come from a Decimal",
+    ("lmi/exact/decimal_rounding.py", "_write"): "prints a number; the digits come from a Decimal",
     ("ptcc_certify/checker/__init__.py", "main"): "GB that are allowed",
     ("ptcc_certify/checker/__init__.py", "read_and_check"): "tells the GB that were needed",
     ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",

@@ -17,6 +17,7 @@ from lmi.exact import polynomials
 from lmi.exact import routh_test as spectrum
 from lmi.exact.polynomials import characteristic, rank
 from lmi.exact.routh_test import nonzero_spectrum_beyond
+from lmi.exact.work import WorkError, limited
 
 #: Weights of the edges from j to i, by (j, i).
 Edges = dict[tuple[int, int], Fraction]
@@ -400,3 +401,16 @@ def test_a_large_graph():
         line = Fraction(slowest * factor).limit_denominator(10**9)
         assert nonzero_spectrum_beyond(rows, unit, line) == expected
         print(f"{size} nodes, {expected}: {time.perf_counter() - start:.2f} s")
+
+
+def test_a_line_beside_an_eigenvalue_costs_no_more_than_its_own_component():
+    """The ring has 3 +- i sqrt(3), and the line is nearer than any enclosure tells; the followers are dense."""
+    r = random.Random(1)
+    edges = ring([0, 1, 2], 2) | {(0, i): 100 for i in range(3, 18)}
+    edges |= {(j, i): r.choice([-1, 1]) * r.randrange(3, 9) for i in range(3, 18) for j in range(3, 18) if i != j}
+    rows, unit, _ = laplacian(18, edges)
+    line = 3 - Fraction(1, 2**8600)
+    with limited(1):
+        assert nonzero_spectrum_beyond(rows, unit, line, parts(18, edges)) == "beyond"
+    with pytest.raises(WorkError, match="Routh"), limited(1):
+        nonzero_spectrum_beyond(rows, unit, line)

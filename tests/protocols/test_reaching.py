@@ -510,3 +510,13 @@ def test_a_disturbance_that_jumps_too_often_is_refused():
     noise = SampledDisturbance(times, rng.uniform(-1, 1, times.size))
     with pytest.raises(SimulationError, match="too fast, or jumps too often"):
         ReachingProblem(protocol(F(1)), np.array([1.0, 2.0]), noise)
+
+
+@pytest.mark.parametrize("sizes", [("1e-310", "1"), ("1e300", "-1e-300"), ("1e-320", "1e100"), ("1e-291", "1e-289")])
+def test_tiny_and_huge_sliding_variables_are_proved_beside_each_other(sizes: tuple[str, str]):
+    p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    sigma0 = [Fraction(x) for x in sizes]
+    for size, reached in zip(sigma0, certified_reaching_times(p, sigma0), strict=True):
+        assert reached.z is not None
+        if abs(size) < 1e-9:  # the integral is T_r z there
+            assert abs(size) <= reached.z <= abs(size) * (1 + Fraction(1, 10**8))

@@ -354,6 +354,16 @@ def test_jumping_signals_are_met_at_their_jumps():
     assert np.abs(run.states - expected).max() < 2e-8
 
 
+@pytest.mark.parametrize("limits", [Actuator("1e19"), Actuator(stop_before="1e-20")], ids=["cap", "stop"])
+def test_noise_moves_agents_as_long_as_the_gain_acts(limits: Actuator):
+    """Long after a disturbance has ceased to matter: the states follow the noise, ``x -> Q (x + n) - n``."""
+    times = [0, 0.5, 1 - 1e-6, 1]
+    run = simulate(TRIO, PROTOCOL, X0, actuator=limits, noise="10*(k-2)", noise_bound=10, times=times)
+    n = np.array([-10.0, 0.0, 10.0])
+    modes = expm(-40 * TRIO.laplacian().toarray())  # of an unbalanced graph nothing remains
+    assert run.states[:, -1] == pytest.approx(modes @ (X0 + n) - n, abs=5e-3)
+
+
 def test_telegraph_signals_of_disturbance_and_noise_differ():
     forcing = as_forcing(TRIO, PROTOCOL.T, "telegraph", 1, "telegraph", "0.1", 1.0)
     assert not set(forcing.disturbance.breaks(1.0)) & set(forcing.noise.breaks(1.0))

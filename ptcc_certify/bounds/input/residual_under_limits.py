@@ -12,8 +12,8 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.effort import Disturbed, Limited, Peak
-from ptcc_certify.bounds.input.tightest_bound import decaying, least, log, round_up
-from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above
+from ptcc_certify.bounds.input.tightest_bound import BOUND_BITS, decaying, least, log, round_up
+from ptcc_certify.checker.input_formulas import LAST_PERIODS, InputBounds, Limits, root_above, rounded
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -62,7 +62,8 @@ class LimitedBounds:
         With sampling, which may drive the agents apart, that is certified which leaves ``||E||`` no larger than at
         first.
         """
-        top, clock = limits.largest_gain(self.bounds.gain), limits.clock_below(self.bounds.gain)
+        top = limits.largest_gain(self.bounds.gain)
+        clock = rounded(limits.clock_below(self.bounds.gain), BOUND_BITS)  # short of what other roundings find
         best = least((partial(self._bound_by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
         if best is None or self.noise is None or limits.sample_period is not None:
             return best

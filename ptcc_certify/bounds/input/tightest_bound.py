@@ -72,7 +72,9 @@ def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequen
     best: Witness | None = None
     for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in functions):
         if z <= LATEST:
-            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), bounds.quiet)
+            # Short of what another checker may find, with other roundings, for the end of the reaching phase.
+            quiet = rounded(bounds.quiet, BOUND_BITS, up=True)
+            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), quiet)
             try:
                 own = Witness(round_up(bounds.bound(of, agent, k, instant)), k, instant)
             except (ValueError, ArithmeticError):
