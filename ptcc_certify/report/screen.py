@@ -322,7 +322,9 @@ def _sliding_lines(certificate: Certificate) -> Lines:
         if last is not None and last.z:
             agent = labels[reaching.index(last)]
             margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
-            clauses.append(f"{'others' if late else 'all'} by t = {up(last.time, 6)}, {margin} (agent {agent})")
+            clauses.append(
+                f"reaching time{' of others' * bool(late)} at most {up(last.time, 6)}, {margin} (agent {agent})"
+            )
         if late and (p := certificate.protocol.reaching) is not None:
             pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r
             why = "0 is reached nearer to T_r than can be written"
@@ -330,8 +332,8 @@ def _sliding_lines(certificate: Certificate) -> Lines:
                 why = "mu3 kappa < 1 and sigma(0) is large"
             if push + pole > LARGEST_PUSH:
                 why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
-            clauses.append(f"only at T_r for {_shorten_list(late, 40)}: {why}")
-        yield "sliding", f"sigma_k = 0 proved: {'; '.join(clauses)}"
+            clauses.append(f"reaching time T_r for {_shorten_list(late, 40)}: {why}")
+        yield "sliding", "; ".join(clauses)
     if run is not None and (slid := run.sliding) is not None:
         yield "disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"
 

@@ -366,7 +366,7 @@ def check(cert: Certificate, power: Fraction) -> None:
         assert not any(late)
         assert np.isfinite(run.reaching_z).all()
     shown = "\n".join(certificate_lines(cert, "graph"))
-    assert ("only at T_r for" in shown) == any(late)
+    assert ("reaching time T_r for" in shown) == any(late)
     # sigma is certain to be 0 at T_r in any case.
     assert (run.sigma[:, run.reaching_remaining == 0] == 0).all()
 

@@ -122,7 +122,7 @@ def plot_sliding(
     >>> run = simulate(pair, p, [3, 5], sigma0=[1, -4])
     >>> ax = plot_sliding(run, certified_reaching_times(p, [1, -4]))
     >>> [text.get_text() for text in ax.get_legend().get_texts()]
-    ['$\\sigma_k$ reaches 0', 'proved at the latest', '$T_r$']
+    ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """
     ax, T_r = axes_of(ax), float(trajectory.protocol.T_r)
     shown = trajectory.t <= 1.1 * T_r
@@ -133,7 +133,7 @@ def plot_sliding(
         ax.plot(reached, np.zeros(reached.size), "o", color=RUN, markersize=3, label="$\\sigma_k$ reaches 0")
     if reaching is not None:
         proved = [r.time for r in reaching if r.z is None or r.z > 0]
-        ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, label="proved at the latest")
+        ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, label="reaching time at most")
     ax.axvline(T_r, color="black", linewidth=0.8, linestyle=":", label="$T_r$")
     return finished(ax, "time $t$", "sliding variable $\\sigma_k$")
 
