@@ -605,10 +605,14 @@ class InputBounds:
             return constants
         if form.diagonal is None:
             raise ValueError("a full matrix without constants")
-        weight = dict(zip(form.nodes, form.diagonal, strict=True))
-        if form.coordinates == "E":
-            return [1 / weight[v] if v in weight else Fraction(0) for v in range(len(self.rows))]
-        return [sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in self.rows]
+        if (k, "constants") not in self._cache:
+            weight = dict(zip(form.nodes, form.diagonal, strict=True))
+            if form.coordinates == "E":
+                known = [1 / weight[v] if v in weight else Fraction(0) for v in range(len(self.rows))]
+            else:
+                known = [sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in self.rows]
+            self._cache[k, "constants"] = known
+        return self._cache[k, "constants"]
 
     def root_constant(self, k: int, v: int | None) -> Fraction:
         """Return ``c`` with ``|e_v| <= c sqrt(V)``, or ``||E|| <= c sqrt(V)`` without an agent."""
