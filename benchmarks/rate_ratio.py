@@ -214,7 +214,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
             if bound[:, column].min() > 1e-250:
                 agents = max(agents, float((deviations(graph, x0, final, s) / bound[:, column]).max()))
     result["worst"], result["agents"] = worst, agents
-    limit, reached = found["lmi"].diagonal_limit, found["lmi"].tried.get("lmi")
+    limit, reached = found["lmi"].diagonal_limit, found["lmi"].searched.get("lmi")
     result["gap"] = None if limit is None or reached is None else limit / reached - 1
     proved = [float(m.rate) for m in found["lmi"].functions]
     result["proved_of_limit"] = None if limit is None else max(proved, default=0.0) / limit

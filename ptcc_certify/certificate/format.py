@@ -418,7 +418,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         "search": {
             "method": content.method,
             "at": None if content.at is None else float(content.at),
-            "tried": {kind: finite(rate) for kind, rate in search.tried.items()},
+            "searched": {kind: finite(rate) for kind, rate in search.searched.items()},
             "diagonal_limit": finite(search.diagonal_limit),
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,

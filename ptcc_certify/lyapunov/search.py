@@ -90,7 +90,7 @@ class Search:
     ----------
     functions : tuple of LyapunovFunction
         Proved.
-    tried : dict of str to float
+    searched : dict of str to float
         Largest rate found of each class at any overshoot constant, in floating point.
     diagonal_limit : float or None
         No diagonal matrix has a larger rate, by a dual solution in floating point; None if not computed.
@@ -101,7 +101,7 @@ class Search:
     """
 
     functions: tuple[LyapunovFunction, ...] = ()
-    tried: dict[str, float] = field(default_factory=dict)
+    searched: dict[str, float] = field(default_factory=dict)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
     cut_off: tuple[str, ...] = ()

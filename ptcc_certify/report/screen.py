@@ -150,8 +150,8 @@ def _class_lines(certificate: Certificate) -> Lines:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
         yield "", f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
-    if search.tried:
-        searched = [f"{kind} {rate:.4g}" for kind, rate in search.tried.items()]
+    if search.searched:
+        searched = [f"{kind} {rate:.4g}" for kind, rate in search.searched.items()]
         limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
         yield "", f"searched {', '.join(searched)} (numerical{limit}{time})"

@@ -135,7 +135,7 @@ KEYS = {
     "input": "bounded threshold initial_set constants peak energy path_length sliding residual disturbed",
     "input.threshold": "lower upper",
     "unverified": "spectral optimality_ratio paper_rate search residual final_state asked simulation notes",
-    "unverified.search": "method at tried diagonal_limit",
+    "unverified.search": "method at searched diagonal_limit",
     "unverified.simulation": "worst_ratio floor resolved_until ratios stop tolerances deadline_resolved judged "
     "deviation_ratio",
 }

@@ -207,7 +207,7 @@ def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool)
     assert perron < 0.95 * best and both == pytest.approx(best, rel=1e-6)
     assert best <= (found["lmi"].spectral_rate or 0) * (1 + 1e-9)
     assert {m.kind for m in found["lmi"].search.functions} == {"lmi"}
-    assert set(found["best"].search.tried) == {"perron", "lmi"}
+    assert set(found["best"].search.searched) == {"perron", "lmi"}
 
 
 @pytest.mark.parametrize("balanced", [True, False])

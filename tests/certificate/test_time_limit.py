@@ -97,7 +97,7 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(search_functions, "_lmi_candidates", without_end)
     cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
     assert cert.cut_off == ("class lmi",)
-    assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.search.tried)
+    assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.search.searched)
     assert check(cert.to_dict()).accepted
 
 

@@ -199,7 +199,7 @@ def test_the_method_decides_which_classes_are_searched(method: str):
     classes = [function["class"] for function in data["lyapunov"]["functions"]]
     wanted = {"paper": {"paper"}, "best": {"paper", "lmi", "full"}}.get(method, {"paper", method})
     assert classes[0] == "paper" and set(classes) == wanted
-    assert set(data["unverified"]["search"]["tried"]) == (
+    assert set(data["unverified"]["search"]["searched"]) == (
         {"perron", "lmi", "full"} if method == "best" else wanted - {"paper"}
     )
     screen = ptcc("certify", "fig3a", "--method", method, "--x0", X0).out

@@ -88,8 +88,8 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
         useful = [float(m.rate) for m in found.functions if m.overshoot <= LARGEST_PREFACTOR]
         assert spectral is not None and max(useful) >= 0.95 * spectral, name
         assert found.diagonal_limit is not None
-        assert found.tried["lmi"] >= found.diagonal_limit * (1 - 1e-4), name
-        assert found.tried["perron"] <= found.diagonal_limit * (1 + 1e-9), name
+        assert found.searched["lmi"] >= found.diagonal_limit * (1 - 1e-4), name
+        assert found.searched["perron"] <= found.diagonal_limit * (1 + 1e-9), name
         assert max(float(m.rate) for m in found.functions) <= spectral * (1 + 1e-5), name
 
 
