@@ -15,9 +15,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, influence
-from ptcc_certify.bounds.final_state_deviation import DeviationGeometry
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state

@@ -38,7 +38,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
             run.certificate.save(Path(output) / f"{stem}.json")
     if output:
         from ptcc_certify.graphs.io import write_atomically
-        from ptcc_certify.report.paper_figures import paper_figures
+        from ptcc_certify.report.example_figures import paper_figures
         from ptcc_certify.report.plots.style import save_figure
 
         for title, figure in paper_figures(runs).items():

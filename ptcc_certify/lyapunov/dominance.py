@@ -36,7 +36,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import Dominance, GroupProof, LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.composite import prove_connectivity
 from ptcc_certify.theorems.lemmas import EXACT_NODES, dyadic_left_vector, gauge, left_vector
-from ptcc_certify.theorems.matrix_blocks import diagonal_matrix, symmetric_product
+from ptcc_certify.theorems.matrix_arithmetic import diagonal_matrix, symmetric_product
 
 #: Relative deviations of ``t`` below the smallest eigenvalue: the larger, the smaller the overshoot constant.
 LOSSES = (1e-5, 1e-2, 0.1, 0.5, 0.9, 0.99, 1.0)

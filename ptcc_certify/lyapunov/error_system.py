@@ -18,7 +18,7 @@ from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.theorems.lemmas import left_vector
-from ptcc_certify.theorems.matrix_blocks import (
+from ptcc_certify.theorems.matrix_arithmetic import (
     Matrix,
     exact_block,
     float_block,

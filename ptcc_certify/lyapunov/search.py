@@ -33,7 +33,7 @@ from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
 from ptcc_certify.theorems.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
-from ptcc_certify.theorems.matrix_blocks import BITS, diagonal_matrix
+from ptcc_certify.theorems.matrix_arithmetic import BITS, diagonal_matrix
 
 METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")

@@ -21,8 +21,8 @@ from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDepe
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.cvodes_nominal import MANY_STEPS, NominalMotion, signal
 from ptcc_certify.simulation.instants import Instants, tau_before
-from ptcc_certify.simulation.nominal_motion import MANY_STEPS, NominalMotion, signal
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDis
 from ptcc_certify.protocols.gain_limits import GainLimits, Periods
 from ptcc_certify.protocols.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Phase, Tolerances
+from ptcc_certify.simulation.cvodes_nominal import Forcing, NominalMotion
 from ptcc_certify.simulation.instants import Instants
-from ptcc_certify.simulation.nominal_motion import Forcing, NominalMotion
 from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:

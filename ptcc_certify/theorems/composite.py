@@ -27,7 +27,7 @@ from ptcc_certify.theorems.lemmas import (
     left_vector,
     unbalanced_diagonal,
 )
-from ptcc_certify.theorems.matrix_blocks import (
+from ptcc_certify.theorems.matrix_arithmetic import (
     congruence,
     diagonal_matrix,
     exact_block,

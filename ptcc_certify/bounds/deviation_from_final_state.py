@@ -26,7 +26,7 @@ from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.initial_set import ways
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import DeviationBound, LyapunovFunction
-from ptcc_certify.theorems.matrix_blocks import integer_matrix, integer_rows
+from ptcc_certify.theorems.matrix_arithmetic import integer_matrix, integer_rows
 
 #: Bits of the constants.
 CONSTANT_BITS = 40
