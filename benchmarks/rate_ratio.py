@@ -26,7 +26,7 @@ import numpy as np
 from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_graph
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.lyapunov.error_system import ErrorSystem
-from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, search_functions
+from ptcc_certify.lyapunov.search import LARGEST_OVERSHOOT, search_functions
 
 CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
 DECADES = (1, 6)
@@ -195,7 +195,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
     for kind, own in functions.items():
         in_error = [m for m in own if m.coordinates == "E"]
         rates = [m.rate_below for m in own]
-        useful = [m.rate_below for m in own if m.overshoot <= LARGEST_PREFACTOR]
+        useful = [m.rate_below for m in own if m.overshoot <= LARGEST_OVERSHOOT]
         bounds = [
             min((math.log(m.overshoot) / 2 - m.rate_below * s / 2 for m in in_error), default=math.inf) for s in clocks
         ]
@@ -218,7 +218,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
     result["gap"] = None if limit is None or reached is None else limit / reached - 1
     proved = [float(m.rate) for m in found["lmi"].functions]
     result["proved_of_limit"] = None if limit is None else max(proved, default=0.0) / limit
-    useful = [float(m.rate) for m in found["lmi"].functions if m.overshoot <= LARGEST_PREFACTOR]
+    useful = [float(m.rate) for m in found["lmi"].functions if m.overshoot <= LARGEST_OVERSHOOT]
     several = len(structure.closed_components) > 1 or structure.followers.size > 0
     result["composite"] = max(useful, default=0.0) / limit if several and limit else None
     result["undirected"] = structure.undirected

@@ -572,7 +572,7 @@ class Recheck:
         return positive_definite(product(transposed(basis), product(S, basis)))
 
     def searched_functions(self, functions: list[dict[str, Any]]) -> None:
-        """Rate, prefactor and distances of every member beside the paper's, and that the proof speaks of them."""
+        """Rate, overshoot constant and deviations of every other function, and that the proof speaks of them."""
         for k, function in enumerate(functions, start=1):
             of = f"lyapunov.functions[{k}]"
             assert set(function) == {"class", "coordinates", "blocks", "rho", "rate", "overshoot", "deviation"}

@@ -44,7 +44,7 @@ SEARCHING = 0.6
 #: Above so many nodes a search runs in a process of its own, which a time limit ends whatever it is at.
 APART_NODES = 40
 #: The Lyapunov function with the largest rate is chosen among those with at most this overshoot constant.
-LARGEST_PREFACTOR = 1e6
+LARGEST_OVERSHOOT = 1e6
 #: Relative losses of rate at which blocks are coupled: a smaller loss costs a larger overshoot constant.
 _COUPLING_LOSSES = (1e-5, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5)
 #: Wanted losses of full matrices where the bound is optimised at one instant.
@@ -242,7 +242,7 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     """
     if not candidates:
         return []
-    useful = [c for c in candidates if c.condition <= LARGEST_PREFACTOR]
+    useful = [c for c in candidates if c.condition <= LARGEST_OVERSHOOT]
     selection = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
     selection += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
@@ -383,7 +383,7 @@ def _lmi_candidates(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
     A, basis = system.matrix, system.basis
     best = lmi.diagonal_lyapunov(A, objective="rate", basis=basis)
     yield replace(_diagonal("lmi", best), upper=best.upper)
-    for largest in (LARGEST_PREFACTOR, _HOPELESS / 1e3):
+    for largest in (LARGEST_OVERSHOOT, _HOPELESS / 1e3):
         if best.log_condition > math.log(largest):
             with contextlib.suppress(lmi.NoCertificate):
                 near = lmi.diagonal_lyapunov(

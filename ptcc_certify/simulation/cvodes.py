@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -99,7 +100,7 @@ class Phase:
         return share if self.past else -np.log1p(-share)
 
 
-class Motion:
+class Motion(ABC):
     """Columns of agents moved by CVODES from stop to stop of a phase; the jumps of what drives them are stops, too.
 
     Attributes
@@ -159,9 +160,9 @@ class Motion:
             self.state = later_states[-1]
         return states
 
+    @abstractmethod
     def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
         """Return ``dX/dz`` between two neighbouring stops."""
-        raise NotImplementedError
 
     def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
         """Return the (len(z), N, S) states at increasing instants ``z > start``."""

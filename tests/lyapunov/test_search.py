@@ -15,7 +15,7 @@ from ptcc_certify import NominalProtocol, SignedDigraph, SlidingModeProtocol, an
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import root_above
-from ptcc_certify.lyapunov.search import LARGEST_PREFACTOR, Candidate, choose, prove_function, search_functions
+from ptcc_certify.lyapunov.search import LARGEST_OVERSHOOT, Candidate, choose, prove_function, search_functions
 
 P = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLOCKS = [float(P.gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
@@ -85,7 +85,7 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
         found = search_functions(system, "best", CLOCKS)
         assert all("needs an overshoot constant above" in note for note in found.notes), (name, found.notes)
         spectral = certify(structure.graph, P, simulation=False, method="paper").spectral_rate
-        useful = [float(m.rate) for m in found.functions if m.overshoot <= LARGEST_PREFACTOR]
+        useful = [float(m.rate) for m in found.functions if m.overshoot <= LARGEST_OVERSHOOT]
         assert spectral is not None and max(useful) >= 0.95 * spectral, name
         assert found.diagonal_limit is not None
         assert found.searched["lmi"] >= found.diagonal_limit * (1 - 1e-4), name
