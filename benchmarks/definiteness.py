@@ -44,9 +44,9 @@ def timed(action: Callable[..., Any], *args: Any, **kwargs: Any) -> tuple[Any, f
     return result, time.perf_counter() - start
 
 
-def report(what: str, prove: float | None, check: float, goal: str, holds: bool, note: str = "") -> bool:
-    found = "-" if prove is None else f"{prove:.2f}"
-    print(f"{what:<44} {found:>8} {check:>8.2f}  {goal:<16} {'proved' if holds else 'NOT PROVED'}  {note}".rstrip())
+def report(what: str, prove: float | None, check: float | None, goal: str, holds: bool, note: str = "") -> bool:
+    proof, verified = ("-" if x is None else f"{x:.2f}" for x in (prove, check))
+    print(f"{what:<44} {proof:>8} {verified:>8}  {goal:<16} {'proved' if holds else 'NOT PROVED'}  {note}".rstrip())
     return holds
 
 
@@ -129,9 +129,9 @@ def dominance(n: int, goal: str) -> bool:
         u, v = (1 + abs(off) @ u) / diagonal, (1 + abs(off).T @ v) / diagonal
     proof, prove = timed(lmi.prove_dominance, A, u, v)
     if proof is None:
-        return report(f"dominance {n}", prove, 0.0, goal, False)
+        return report(f"dominance {n}", prove, None, goal, False)
     note = f"{len(sources)} edges, b = {float(proof.rate):.6g}"
-    return report(f"dominance {n:.0e}", prove, 0.0, goal, True, note)
+    return report(f"dominance {n:.0e}", prove, None, goal, True, note)
 
 
 # ---------------------------------------------------------------------- a real core

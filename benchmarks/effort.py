@@ -36,11 +36,11 @@ KINDS = ("peak of an agent", "largest peak", "peak of the norm", "energy", "path
 Ratios = dict[str, list[float]]
 
 
-def motion(graph: SignedDigraph, protocol: NominalProtocol, initial_set: np.ndarray) -> tuple[np.ndarray, ...]:
+def motion(graph: SignedDigraph, protocol: NominalProtocol, initial_states: np.ndarray) -> tuple[np.ndarray, ...]:
     """Sizes of every agent's input at most (N, S), of the norm, energy and path length (S,)."""
     L, still = graph.laplacian().toarray(), sum(c.balanced for c in analyse(graph).closed_components)
     basis = np.linalg.svd(L)[0][:, : graph.n_nodes - still]  # of what decays
-    inside, E = basis.T @ L @ basis, -basis.T @ L @ initial_set
+    inside, E = basis.T @ L @ basis, -basis.T @ L @ initial_states
     gain, T = protocol.gain, float(protocol.T)
     s, before = gain.clock_at_tau(Z), 0.0
     u = gain.value_at_remaining(1.0) * np.abs(basis @ E)
@@ -56,7 +56,7 @@ def motion(graph: SignedDigraph, protocol: NominalProtocol, initial_set: np.ndar
 
 
 def ratios(effort: Effort, seen: tuple[np.ndarray, ...]) -> Ratios:
-    """Bounds over what was seen of the starts together."""
+    """Bounds over what was seen of the initial states together."""
     assert effort.peak is not None and effort.energy is not None and effort.path_length is not None
     agents = zip(effort.peak.agents, seen[0].max(axis=1), strict=True)
     bounds = (effort.peak.largest, effort.peak.norm, effort.energy.value, effort.path_length.value)

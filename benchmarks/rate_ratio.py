@@ -3,9 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python benchmarks/rate_ratio.py [--per-case 10] [--jobs 2] [--real FOLDER] [--output FILE]
 
 An ensemble of random signed digraphs (generator and seeds below), and the real graphs of a folder if it is given. For
-each class of Lyapunov functions: the ratio of the proved rate, and the proved bound of ``||E(t)|| / ||E(0)||`` over
-``||exp(-L s)||`` on the range of ``L``, from ball arithmetic. Every bound is compared with that norm, and the deviation
-of every agent to its final state with its own bound, from a random initial state.
+each class of Lyapunov functions: the ratio of the proved rate to the spectral one, and the proved bound of
+``||E(t)|| / ||E(0)||`` over ``||exp(-L s)||`` on the range of ``L``, from ball arithmetic. Every bound is compared with
+that norm, and the deviation of every agent from its final state with its own bound, from a random initial state.
 """
 
 from __future__ import annotations

@@ -278,8 +278,8 @@ def perron_certificate(A: Any) -> DiagonalCertificate:
     -------
     DiagonalCertificate
         ``rate`` is the tight rate of this ``Omega`` (see :func:`lmi.diagonal_solution.diagonal_rate`), lowered by
-        its rounding up to 1,500 rows and by its residual above; ``upper`` is infinite, ``witness`` is ``(log u, log
-        v)``.
+        its rounding up to 1,500 rows and by its residual above; ``upper`` is infinite, ``witness`` is
+        ``(log u, log v)``.
 
     Raises
     ------

@@ -83,7 +83,7 @@ class ResidualWitness:
 
 @dataclass(frozen=True)
 class DefinitenessProof:
-    """Final state of :func:`prove_positive_definite`.
+    """What :func:`prove_positive_definite` decided, with its witness.
 
     Attributes
     ----------

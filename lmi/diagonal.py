@@ -27,8 +27,6 @@ from lmi.matrix_classes import block_columns, irreducible_blocks, square
 from lmi.schur_coupling import couple_blocks
 from lmi.search_time import checkpoint, seconds_left, uncounted
 
-#: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
-RESOLVED = 100.0
 #: Up to this many rows Clarabel finds the best margin, as the paper does, within half a second; above,
 #: :mod:`lmi.interior_point`.
 CLARABEL_MARGIN_ROWS = 32
@@ -87,8 +85,8 @@ def diagonal_lyapunov(
     tolerance : float
         Relative gap asked of the solver.
     solver : {"clarabel", "interior-point", "sdpa"}, optional
-        Margin only; by default Clarabel up to 32 rows and :mod:`lmi.interior_point` above. SDPA needs the package
-        sdpa-python.
+        Margin only; by default Clarabel up to 32 rows, and :mod:`lmi.interior_point` above and in a forked process.
+        SDPA needs the package sdpa-python.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Diagonal Lyapunov matrices of leaders and followers, found together in one semidefinite program."""
+"""Diagonal Lyapunov matrices of leaders and followers: leader blocks weighed, and followers found, in one program."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from lmi.diagonal import RESOLVED, diagonal_lyapunov, h_matrix_lyapunov, largest_entry, positive
+from lmi.diagonal import diagonal_lyapunov, h_matrix_lyapunov, largest_entry, positive
 from lmi.errors import MatrixError
 from lmi.interior_point import maximise_margin
 from lmi.matrix_classes import square
+
+#: A joint rate, in units of the largest entry, below this multiple of the tolerance is noise of the solver.
+_RESOLVED = 100.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ class CoupledCertificate:
 def coupled_lyapunov(
     leaders: Sequence[FixedLeader | FreeLeader], A_FL: Any, A_F: Any, *, tolerance: float = 1e-9
 ) -> CoupledCertificate:
-    """Find free leader blocks, follower matrix and coupling factor in one semidefinite program.
+    """Find weights of the leader blocks, follower matrix and coupling factor in one semidefinite program.
 
     With ``Gamma`` the block diagonal of ``s diag(decrease)`` (fixed blocks) and ``t_k I`` (free blocks,
     ``H_k A_k + A_k' H_k >= t_k I``), solves
@@ -155,7 +158,7 @@ def coupled_lyapunov(
     if A_FL.shape != (n_F, n_L):
         raise MatrixError(f"A_FL has shape {A_FL.shape}, not {(n_F, n_L)}")
     # One unit for all blocks: the rate is the smallest eigenvalue of the whole matrix.
-    scale = max(largest_entry(A_F), *(largest_entry(b.A) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
+    scale = max(largest_entry(A_F), *(largest_entry(square(b.A)) for b in leaders if isinstance(b, FreeLeader)), 1e-300)
     top = max((float(b.omega.max()) for b in fixed), default=1.0)
     omegas, halves, groups = [], [], []
     for k, block in enumerate(leaders, start=1):
@@ -171,7 +174,7 @@ def coupled_lyapunov(
     C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, n_F))], [A_FL / scale, A_F / scale]])
     own = np.concatenate([shared, shared.max() + 1 + np.arange(n_F)])
     solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
-    if solution.t > RESOLVED * tolerance:
+    if solution.t > _RESOLVED * tolerance:
         weights = positive(solution.omega)
     else:  # the best joint rate lies below what the method resolves: each block by itself
         followers = h_matrix_lyapunov(A_F, tolerance=tolerance).omega if n_F else np.zeros(0)

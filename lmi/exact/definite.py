@@ -289,7 +289,7 @@ class Arithmetic:
         (True, False)
         """
         S = scaled(n, entries, factor, power, scale)
-        return S is not None and ((margins := self.spare(S)) is not None and min(margins, default=1) > 0)
+        return S is not None and (margins := self.spare(S)) is not None and min(margins, default=1) > 0
 
     def spare(self, S: Scaled) -> list[int] | None:
         """Return by how much each row of the remainder dominates, None if that is too much work."""

@@ -1,7 +1,7 @@
 """Rational enclosures of square roots, exponentials and logarithms, with the standard library alone.
 
-Every function returns ``(below, above)``: rationals between which the true value lies, apart by about ``2^-bits`` of
-its size. The functions are those of :mod:`decimal`, which rounds them correctly to any number of digits.
+Each enclosure is ``(below, above)``: rationals between which the true value lies, apart by about ``2^-bits`` of
+its size. They come from those of :mod:`decimal`, which rounds them correctly to any number of digits.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Exact numbers: the one written grammar, integers over a common denominator, rounding to bits.
+"""Exact numbers: the one written grammar, integers over a common denominator, limits of length.
 
 A number is written as
 

@@ -80,7 +80,7 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
         elif isinstance(source, Ensemble):
             ensembles += 1
             name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
-            own_sources = _functions(name, source, ("ensemble", ensembles))
+            own_sources = _graphs_of(name, source, ("ensemble", ensembles))
         elif isinstance(source, str | os.PathLike):
             own_sources = _expand(os.fspath(source), own)
         else:
@@ -123,11 +123,11 @@ def _file(text: str) -> list[Source]:
     """Return what a file, or a link to nowhere, stands for; of ``link/..`` the system knows best what it means."""
     name, key = re.sub(r"^(?:\./+)+", "", text), ("file", os.path.realpath(text))
     if name.lower().endswith(".toml") and os.path.isfile(text):  # noqa: PTH113 - Path.is_file may raise
-        return _functions(name, Ensemble.read(text), key)
+        return _graphs_of(name, Ensemble.read(text), key)
     return [Source(name, text, key)]
 
 
-def _functions(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
+def _graphs_of(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
     mark = hashlib.sha256(json.dumps(ensemble.to_dict(), sort_keys=True).encode()).hexdigest()
     return [Source(f"{name}#{i}", (ensemble, i), (key, i), f"ensemble {mark} {i}") for i in range(len(ensemble))]
 

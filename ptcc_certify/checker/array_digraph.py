@@ -20,7 +20,7 @@ CHUNK = 8192
 
 
 class ArrayDigraph(Digraph):
-    """The same with NumPy."""
+    """A :class:`Digraph` whose sums, searches for pieces and lines of the hash are by NumPy."""
 
     @cached_property
     def out(self) -> Adjacency:

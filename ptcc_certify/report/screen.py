@@ -95,7 +95,7 @@ def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
 
 
 def camps(component: ClosedComponent) -> list[list[int]]:
-    """Return the camps of a balanced leader group, the one of its first Lyapunov function first."""
+    """Return the camps of a balanced leader group, the one of its first node first."""
     gauge = component.gauge or ()
     both = ([v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
     return [camp for camp in both if camp]

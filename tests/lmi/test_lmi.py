@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import sparse
 
 import lmi
 import ptcc_certify
@@ -243,6 +244,8 @@ def test_the_joint_search_is_at_least_as_good_as_block_by_block(seed):
 def test_free_leaders_alone_and_shapes():
     A = np.array([[2.0, 1.0], [-1.0, 2.0]])
     found = lmi.coupled_lyapunov([lmi.FreeLeader(A)], np.zeros((0, 2)), np.zeros((0, 0)))
+    sparse_block = lmi.coupled_lyapunov([lmi.FreeLeader(sparse.csr_array(A))], np.zeros((0, 2)), np.zeros((0, 0)))
+    assert np.array_equal(sparse_block.leaders[0], found.leaders[0])
     assert found.leaders[0] == pytest.approx([1, 1], rel=1e-6)
     assert found.followers.size == 0
     with pytest.raises(lmi.MatrixError, match="A_FL"):

@@ -67,7 +67,7 @@ class InputRequest:
     influence : Influence, optional
         ``Q``, for the drift under disturbances.
     deviations : sequence
-        Of every Lyapunov function, the constants from ``V`` to the deviations of agents to their final states, or None.
+        Of every Lyapunov function, the constants from ``V`` to how far agents are from their final states, or None.
     limits : sequence of Limits
         Nominal protocol: limits of the gain to be judged.
     delta : Fraction, optional
