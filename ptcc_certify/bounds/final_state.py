@@ -289,7 +289,7 @@ class FinalState:
 
     @property
     def exact(self) -> bool:
-        """Whether ``final_state`` is exact: rational, without a radius."""
+        """Whether ``states`` is exact: rational, without a radius."""
         return self.radius is None and all(isinstance(x, Fraction) for x in self.states)
 
     @property
@@ -302,7 +302,7 @@ class FinalState:
 
     @cached_property
     def values(self) -> np.ndarray:
-        """(N,) float64 array: ``final_state``, rounded."""
+        """(N,) float64 array: ``states``, rounded."""
         return np.array([float(x) for x in self.states])
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
-from ptcc_certify.certificate.format_effort import effort_section, energy_witness, peak_witness, read_effort
+from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_vectors import (
     Reader,
@@ -45,8 +45,6 @@ from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
-
-_LIMITS = ("gain_cap", "stop_before", "sample_period")
 
 
 def certificate_document(content: Content, verdict: str, files: bool = False) -> tuple[dict[str, Any], Writer]:
@@ -291,7 +289,7 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
 
 
 def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Write the final state of a large graph: left null vector of leader groups, and the final state in intervals."""
+    """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
     labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
     final: dict[str, Any] | None = None
@@ -303,16 +301,16 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any],
         else:
             final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
-    for k, (component, null_vector) in enumerate(zip(matrix.balanced, matrix.left_null_vectors, strict=True)):
+    for k, (component, null_vector) in enumerate(matrix.groups):
         if k in matrix.enclosure.left_null_vectors:
             middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
-            left_null_vectors: list[Any] = [
+            left_null_vector: list[Any] = [
                 {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
             ]
         else:
-            left_null_vectors = [exact_or_ball(Fraction(w)) for w in null_vector]
+            left_null_vector = [exact_or_ball(Fraction(w)) for w in null_vector]
         if len(component.nodes) > 1:
-            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vectors})
+            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
     degenerate = None if final_state is None else list(final_state.degenerate)
     return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
 
@@ -468,7 +466,7 @@ def _write_request(request: Request) -> dict[str, Any]:
         "behaviour": expectations.behaviour,
         "min_rate": text(expectations.min_rate),
         "max_input": text(expectations.max_input),
-        "limits": [{name: text(getattr(entry, name)) for name in _LIMITS} for entry in request.limits],
+        "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
     }
@@ -484,9 +482,7 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
     except ValueError:
         behaviour = None
     entries = section.get("limits")
-    each = [
-        [_positive(entry, key) for key in _LIMITS] for entry in (entries if isinstance(entries, list) else [])[:100]
-    ]
+    each = [[_positive(entry, key) for key in LIMITS] for entry in (entries if isinstance(entries, list) else [])[:100]]
     return Request(
         method=method if method in METHODS else "best",
         initial_set=initial_set,

@@ -21,7 +21,7 @@ Section = Mapping[str, Any]
 
 ENDS = ("lower", "upper")
 LIMITS = ("gain_cap", "stop_before", "sample_period")
-#: Keys under ``noise`` of what limits leave, and the attributes of :class:`~ptcc_certify.bounds.input.Limited`.
+#: Keys under ``noise`` of what limits leave, and the attributes of :class:`~ptcc_certify.bounds.input.effort.Limited`.
 NOISE = {"bound": "noise", "norm": "noisy_norm", "largest": "noisy_largest"}
 
 

@@ -121,7 +121,7 @@ def certify(
     initial_set : InitialSet or positive number, optional
         The set of initial states for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
         ``||X(0)||_inf <= R``.
-    limits : sequence of Actuator
+    limits : sequence of GainLimits
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
         With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
@@ -349,11 +349,8 @@ def _search_and_prove(
     except (LMIError, np.linalg.LinAlgError) as error:
         notes.append(f"no Lyapunov matrix was found: {error}")
         return None, nothing, None
-    except (
-        HypothesisError,
-        ZeroDivisionError,
-        OverflowError,
-    ):  # the structure meets the hypotheses exactly, so it is the floats that do not
+    except (HypothesisError, ZeroDivisionError, OverflowError):
+        # The structure meets the hypotheses exactly, so it is the floats that do not.
         notes.append("no Lyapunov matrix was found: the weights lie too far apart for floating point")
         return None, nothing, None
     if n > EXACT_NODES:

@@ -21,8 +21,8 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.gain import parameter
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 
 #: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
@@ -38,7 +38,7 @@ class Expectations:
     Attributes
     ----------
     behaviour : str or None
-        As :attr:`ptcc_certify.graphs.structure.Claim.behaviour` or one of its special cases.
+        As :attr:`ptcc_certify.theorems.claims.Claim.behaviour` or one of its special cases.
     min_rate : Fraction or None
         A proved rate of at least so much, per unit of the stretched clock.
     max_input : Fraction or None

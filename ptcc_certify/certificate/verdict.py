@@ -101,7 +101,7 @@ class Assessment:
     def exit_code(self) -> int:
         """0 proved and everything asked holds, 1 violated, 3 an expectation refuted, 4 undecided or one left open."""
         statuses = {answer.status for answer in self.answers}
-        return exit_code(self.violated, REFUTED in statuses, OPEN in statuses or self.verdict != "certified")
+        return exit_code(self.violated, REFUTED in statuses, OPEN in statuses or self.verdict != CERTIFIED)
 
     @property
     def asked(self) -> str | None:
@@ -114,7 +114,7 @@ class Assessment:
         """The verdict in a few words."""
         if self.violated:
             return "VIOLATED"
-        if self.asked in (REFUTED, OPEN) and (self.asked == REFUTED or self.verdict == "certified"):
+        if self.asked in (REFUTED, OPEN) and (self.asked == REFUTED or self.verdict == CERTIFIED):
             return str(self.asked)
         return f"{self.verdict}, says little by T" if self.useful is False else self.verdict
 
@@ -131,7 +131,7 @@ class Assessment:
             advice = f"; {self.advice}" if self.advice else ""
             parts.append(f"{little}{advice}" if crowded else f"{little}: {self.remark}{advice}")
         else:
-            colon = ": " if self.verdict != "certified" else "; "
+            colon = ": " if self.verdict != CERTIFIED else "; "
             parts.append(f"{self.verdict}{colon}{self.remark}" if self.remark and not crowded else self.verdict)
         met = [str(answer) for answer in self.answers if answer.status == MET]
         parts += [f"{MET}: {', '.join(met)}"] if met else []

@@ -32,7 +32,7 @@ _MAX_TAU = 1e300
 
 
 class Forcing(NamedTuple):
-    """What is added to ``x'`` and to every measurement, both in words, and the size of what they move."""
+    """What is added to ``x'`` and to every measurement, in words, how large it gets, and whether there is noise."""
 
     disturbance: Disturbance
     noise: Disturbance
