@@ -636,6 +636,7 @@ def test_importing_the_reader_loads_nothing_heavy():
         return set(done.stdout.split())
 
     loaded, preloaded = modules("import ptcc_certify.graphs.io"), modules("pass")
+    loaded = {name for name in loaded if not name.strip("_").startswith("cython")}  # parts of older NumPy
     assert "numpy" in loaded
     assert loaded <= {*sys.stdlib_module_names, "__mp_main__", "lmi", "numpy", "ptcc_certify"} | preloaded
 
@@ -883,7 +884,9 @@ BAD_FILES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "content", "words"), BAD_FILES)
+@pytest.mark.parametrize(
+    ("name", "content", "words"), BAD_FILES, ids=[f"{name}, {words[0]}" for name, _, words in BAD_FILES]
+)
 def test_a_bad_file_is_refused_with_one_line_that_names_it(put, name, content, words):
     path = put(name, content)
     with pytest.raises(FormatError) as caught:
