@@ -136,7 +136,7 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
     loop = protocol.closed_loop(graph)
     t, x = loop["t"], loop["x"]
     gain = protocol.gain.expression(t)
-    L = ca.DM(graph.laplacian().tocsc())
+    L = ca.DM(csc_matrix(graph.laplacian()))  # CasADi reads matrices, not sparse arrays, of older SciPy
     E = -ca.mtimes(L, x)
     nodes, weights = list(V.nodes), np.array([float(w) for w in V.weights])
     if V.coordinates == "E":

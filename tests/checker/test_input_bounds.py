@@ -541,7 +541,7 @@ def test_no_sliding_variable_moves_the_error_further(seed: int):
         t = 2 * (1 - np.exp(-np.append(instants[:-1], later[:-1])))
         assert norm.max() <= peak * 1.001
         assert (np.abs(u).max(axis=0) <= np.array(agents) * 1.001).all()
-        assert trapezoid(norm**2, t) <= energy * 1.01 and np.trapezoid(norm, t) <= length * 1.01
+        assert trapezoid(norm**2, t) <= energy * 1.01 and trapezoid(norm, t) <= length * 1.01
 
 
 @pytest.mark.parametrize("seed", range(8))
