@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
