@@ -13,8 +13,9 @@ from fractions import Fraction
 from typing import Any
 
 import jinja2
-from latex2mathml.converter import convert
+import ziamath
 from markupsafe import Markup, escape
+from ziamath.tex import tex2mml
 
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.certificate.certificate import Certificate
@@ -30,6 +31,8 @@ AUTHORS = "Zhen-Hua Zhu, Huaiyu Wu, Zhi-Hong Guan, Zhi-Wei Liu, Yang Chen, Xiuju
 TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic networks with disturbances"
 
 _MINUS = "\N{MINUS SIGN}"
+#: Units of a formula's drawing in the size of its letters.
+_EM = 200
 _LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4"}
 
 # ---------------------------------------------------------------------- texts of the file
@@ -126,12 +129,58 @@ def symbol(name: str) -> Markup:
     return indexed(f"{letter}_{index}" if index else letter)
 
 
-def equations(protocol: Protocol) -> Markup:
-    """Return the equations of a protocol in MathML; their LaTeX is the text in their place."""
-    source = protocol.latex()
-    latex = re.sub(r"\\(operatorname|mathrm)\b", r"\\text", source.replace("{aligned}", "{align*}"))
-    opening = Markup('<math display="block" alttext="{}">').format(" ".join(source.split()))
-    return opening + Markup(convert(latex, display="block").partition(">")[2])
+def formula_svg(latex: str, inline: bool = True) -> Markup:
+    r"""Draw a formula as inline SVG, in the colour and the size of the text around it; no font is needed.
+
+    Parameters
+    ----------
+    latex : str
+        In LaTeX, without dollar signs; it is the text for who cannot see the picture.
+    inline : bool
+        Whether the formula stands in a line of text; otherwise it is displayed.
+
+    Returns
+    -------
+    Markup
+        A text of HTML, the element ``svg``, the same for the same formula.
+
+    Examples
+    --------
+    >>> print(formula_svg("-x").partition(" style")[0])
+    <svg role="img" aria-label="-x" viewBox="-8 -116 298 138"
+    >>> "<text" in formula_svg(r"\frac{\rho_1}{T - t}", inline=False)
+    False
+    """
+    mathml = tex2mml(latex, inline=inline).replace('rowspacing="3pt"', 'rowspacing="0.4em"')
+    before, ziamath.config.svg2 = ziamath.config.svg2, False
+    try:
+        drawn = ziamath.Math(mathml, size=_EM, margin=_EM / 10).svgxml()
+    finally:
+        ziamath.config.svg2 = before
+    left, top, width, height = (round(float(x)) for x in drawn.attrib["viewBox"].split())
+    shape = f"width:{width / _EM:.4g}em;height:{height / _EM:.4g}em;vertical-align:{-(top + height) / _EM:.4g}em"
+    paths = [_relative_path(path.attrib["d"]) for path in drawn.iter("path")]
+    bars = ({key: round(float(bar.attrib[key])) for key in ("x", "y", "width", "height")} for bar in drawn.iter("rect"))
+    paths += ["M{x} {y}h{width}v{height}h-{width}z".format_map(bar) for bar in bars]
+    picture = Markup('<svg role="img" aria-label="{}" viewBox="{}" style="{}"><path d="{}" fill="currentColor"/></svg>')
+    return picture.format(" ".join(latex.split()), f"{left} {top} {width} {height}", shape, "".join(paths))
+
+
+def _relative_path(path: str) -> str:
+    """Write the whole coordinates of an SVG path from point to point, which takes half the letters."""
+    x = y = 0
+    steps = []
+    for letter, numbers in re.findall("([MLQZ])([^MLQZ]*)", path):
+        values = [round(float(number)) for number in numbers.split()]
+        moved = [value - (y if k % 2 else x) for k, value in enumerate(values)]
+        if values:
+            x, y = values[-2:]
+        if letter == "M":
+            moved = values
+        elif letter == "L" and not any(moved):
+            continue
+        steps.append((letter if letter == "M" else letter.lower()) + " ".join(map(str, moved)).replace(" -", "-"))
+    return "".join(steps)
 
 
 # ---------------------------------------------------------------------- words

@@ -124,7 +124,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
         "remarks": remarks_on(saved.structure),
-        "equations": texts.equations(saved.protocol),
+        "equations": texts.formula_svg(saved.protocol.latex(), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
         **dict(zip(("states_head", "states"), _states(saved), strict=True)),
