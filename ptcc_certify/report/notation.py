@@ -49,10 +49,10 @@ def label(text: str) -> Markup:
     return Markup("<bdi>{}</bdi>").format(printable(text))
 
 
-def labels(nodes: Sequence[Any], names: Sequence[str] | None = None) -> Markup:
-    """Return up to 30 labels, or those of nodes, and how many more there are."""
-    listing = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:LISTED])
-    return listing + (f" and {len(nodes) - LISTED:,} more" if len(nodes) > LISTED else "")
+def labels(nodes: Sequence[Any], names: Sequence[str] | None = None, most: int = LISTED) -> Markup:
+    """Return up to ``most`` labels, or those of nodes, and how many more there are."""
+    listing = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:most])
+    return listing + (f" and {len(nodes) - most:,} more" if len(nodes) > most else "")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -82,13 +82,15 @@ def rational(x: Fraction) -> str:
 def _near(x: Fraction) -> Markup:
     if abs(x) > 10**300:
         return Markup("beyond {}10<sup>300</sup>").format("" if x > 0 else _MINUS)
-    return "\N{ALMOST EQUAL TO} " + power(f"{nearest_float(x):.6g}")
+    return "\N{ALMOST EQUAL TO}\u00a0" + power(f"{nearest_float(x):.6g}")
 
 
 def power(text: str) -> Markup:
     """Write ``3e-07`` as a product with a power of ten, and a true minus sign."""
     mantissa, _, exponent = text.partition("e")
-    product = Markup("{} \u00d7 10<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
+    product = (
+        Markup("{}\u00a0\u00d7\u00a010<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
+    )
     return product.replace("-", _MINUS)
 
 
@@ -203,18 +205,22 @@ def agent_parts(saved: Certificate) -> list[str]:
 
 
 def state_columns(
-    saved: Certificate, heads: tuple[str, str, str, str], rows: int, written: Callable[[tuple[Fraction, Fraction]], str]
+    saved: Certificate,
+    heads: tuple[str, str, str, str],
+    agents: Sequence[int],
+    written: Callable[[tuple[Fraction, Fraction]], str],
 ) -> dict[str, list[str]]:
-    """Return initial state, ``sigma(0)`` and final state of the first agents, as far as there are, by their heads.
+    """Return initial state, ``sigma(0)`` and final state of agents, as far as there are, by their heads.
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    columns = {heads[0]: [rational(x) for x in (saved.initial_state or ())[:rows]]}
+    x0, sigma0 = saved.initial_state or (), saved.sigma0 or ()
+    columns = {heads[0]: [rational(x0[k]) for k in agents]}
     if not saved.direct:
-        columns[heads[1]] = [rational(x) for x in (saved.sigma0 or ())[:rows]]
-    if saved.final_state is not None:
+        columns[heads[1]] = [rational(sigma0[k]) for k in agents]
+    if saved.final_state is not None and (intervals := saved.final_state.intervals):
         ends = heads[2] if saved.verdict == "certified" else heads[3]
-        columns[ends] = [written(x) for x in (saved.final_state.intervals or ())[:rows]]
+        columns[ends] = [written(intervals[k]) for k in agents]
     return columns
 
 

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import unicodedata
+from datetime import date
 from fractions import Fraction
 from functools import cache
 from html.parser import HTMLParser
@@ -35,7 +36,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.report.notation import LISTED, formula_svg, printable
-from ptcc_certify.report.page import ROWS, _environment, report_html
+from ptcc_certify.report.page import EXTREMES, _environment, report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import _tex, report_latex
 
@@ -45,8 +46,8 @@ SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=
 TAGS = frozenset(
     re.findall(
         "[a-z0-9]+",
-        "html head meta title style body main h1 h2 h3 div strong span p nav ul li a section table caption thead tbody "
-        "tr th td code pre q cite details summary figure figcaption bdi sub sup svg g defs clippath path rect use",
+        "html head meta title style body main h1 h2 h3 h4 div strong span p nav ul li a section table caption thead tbody "
+        "dl dt dd tr th td code pre q cite details summary figure figcaption bdi sub sup svg g defs clippath path rect use",
     )
 )
 HOSTILE = [
@@ -150,7 +151,7 @@ def rows(source: str, caption: str) -> list[list[str]]:
 
 
 def plain(text: str) -> str:
-    text = re.sub(r" \u00d7 10<sup>(.*?)</sup>", r"e\1", text)
+    text = re.sub(r"\s\u00d7\s10<sup>(.*?)</sup>", r"e\1", text)
     return html.unescape(re.sub("<[^>]*>", "", text)).replace("\u2212", "-")
 
 
@@ -266,7 +267,7 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     made = example(name)
     source = reported(made, tmp_path)
     page = sound(source)
-    assert page.text.index("CERTIFIED") < page.text.index("What was asked")
+    assert page.text.index("CERTIFIED") < page.text.index("Where they end") < page.text.index("What was asked")
     assert made.graph.sha256 in page.text and made.to_dict()["digest"] in page.text
     assert "ptcc check c.json" in page.text and "python -m ptcc_certify.checker c.json" in page.text
     order = ["asked", "proved", "graph", "bound", "effort", "obligations", "check", "limits", "cite"]
@@ -276,11 +277,13 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     report = made.checked
     assert report is not None
     said = rows(source, "Verified by the independent check")
-    assert [row[4] for row in said] == [s.detail for s in report.obligations]
-    assert [row[2] for row in said] == [s.statement for s in report.obligations]
+    assert sum(row[2].count(": ") for row in said) >= len(report.obligations)
+    for s in report.obligations:
+        (row,) = [row for row in said if row[0] == s.kind and row[1].startswith(f"{s.statement} ({s.lemma})")]
+        assert f"{s.of}: {s.detail}" in row[2]
     figures = {a["id"] for a in page.named("figure")}
-    assert ("figure-decay" in figures) == (name not in ("no start", "single"))
-    assert ("figure-input" in figures) == (name not in ("no start", "single"))
+    for figure in ("figure-states", "figure-decay", "figure-input"):
+        assert (figure in figures) == (name not in ("no start", "single"))
     assert ("figure-sliding" in figures) == (name == "sliding")
 
 
@@ -322,9 +325,12 @@ def test_final_states_are_the_proved_ones(tmp_path: Path, monkeypatch: pytest.Mo
     graph = sparse_digraph(np.random.default_rng(7), 150, 2.5)
     reported(certify(graph, NOMINAL, list(range(150)), simulation=False), tmp_path, simulation=False)
     saved = read_certificate(tmp_path / "c.json")
-    said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals")
-    assert saved.final_state is not None and len(said) == 150
-    for row, (middle, radius) in zip(said, saved.final_state.intervals, strict=True):
+    said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals: the 10 highest")
+    assert saved.final_state is not None and saved.final_state.intervals is not None and len(said) == 2 * EXTREMES
+    order = sorted(range(150), key=lambda k: saved.final_state.states[k], reverse=True)
+    assert [row[0] for row in said] == [graph.labels[k] for k in order[:EXTREMES] + order[-EXTREMES:]]
+    for row in said:
+        middle, radius = saved.final_state.intervals[graph.labels.index(row[0])]
         shown, _, wide = row[3].partition(" \u00b1 ")
         assert abs(Fraction(shown) - middle) + radius <= (number(wide) if wide else 0)
 
@@ -355,9 +361,12 @@ def test_reaching_times_are_no_earlier_than_proved(tmp_path: Path):
     assert "whatever the disturbances within \u03b4" in Page(source).text
 
 
-def test_a_page_is_the_same_every_time(tmp_path: Path):
+def test_a_page_is_the_same_every_time_on_the_same_day(tmp_path: Path):
     made = example("sliding")
-    assert reported(made, tmp_path) == reported(made, tmp_path)
+    first = reported(made, tmp_path, day=date(2026, 1, 2))
+    assert first == reported(made, tmp_path, day=date(2026, 1, 2))
+    assert first.replace("2026-01-02", "2026-01-03") == reported(made, tmp_path, day=date(2026, 1, 3))
+    assert date.today().isoformat() in reported(made, tmp_path)
 
 
 def test_without_a_run_the_page_says_why(tmp_path: Path):
@@ -480,7 +489,7 @@ def test_a_long_deadline_is_plain_in_the_title(tmp_path: Path):
     assert (
         "".join(data for tag, data in sound(source).pieces if tag == "title") == "Stability at T \u2248 1 \u00d7 10^8"
     )
-    assert "1 \u00d7 10<sup>8</sup></h1>" in source
+    assert "1\u00a0\u00d7\u00a010<sup>8</sup></h1>" in source
 
 
 def test_numbers_beyond_floats_are_shown(tmp_path: Path):
@@ -499,8 +508,11 @@ def test_the_page_of_a_large_graph_stays_small(tmp_path: Path):
     source = reported(made, tmp_path)
     page = sound(source)
     assert len(source.encode()) < 2_000_000
-    assert len(rows(source, "Where the agents end")) == ROWS
-    assert f"The first {ROWS} of 4,000 agents" in page.text and page.named("figure") == []
+    assert len(rows(source, "Where the agents end")) == 2 * EXTREMES
+    assert "the 10 highest and the 10 lowest of 4,000 agents" in page.text and "under final_state" in page.text
+    assert {a["id"] for a in page.named("figure")} == {"figure-final", "figure-degrees"}
+    sizes = rows(source, f"{len(made.structure.closed_components):,} leader groups by size")
+    assert sum(int(row[1].replace(",", "")) for row in sizes) == len(made.structure.closed_components)
     assert "repeated only where that is asked for" in page.text
 
 
