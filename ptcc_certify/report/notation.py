@@ -44,14 +44,15 @@ def printable(text: str, limit: int = CHARACTERS) -> str:
     return "".join(c if c.isprintable() else f"\\u{{{ord(c):x}}}" for c in short)
 
 
-def label(text: str) -> Markup:
+def label(text: str, limit: int = CHARACTERS) -> Markup:
     """Return a label; ``bdi`` keeps its direction of writing to itself."""
-    return Markup("<bdi>{}</bdi>").format(printable(text))
+    return Markup("<bdi>{}</bdi>").format(printable(text, limit))
 
 
 def labels(nodes: Sequence[Any], names: Sequence[str] | None = None, most: int = LISTED) -> Markup:
-    """Return up to ``most`` labels, or those of nodes, and how many more there are."""
-    listing = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:most])
+    """Return up to ``most`` labels, or those of nodes, and how many more there are; those of a few are cut shorter."""
+    limit = CHARACTERS if most >= LISTED else CHARACTERS // 2
+    listing = Markup(", ").join(label(node if names is None else names[node], limit) for node in nodes[:most])
     return listing + (f" and {len(nodes) - most:,} more" if len(nodes) > most else "")
 
 

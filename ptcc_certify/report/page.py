@@ -203,7 +203,7 @@ def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
     if len(agents) > FEW:
         agents = [agents[0], agents[-1]]
     same = groupby(agents, key=intervals.__getitem__)
-    return [(texts.labels(list(nodes), saved.graph.labels), enclosed(value)) for value, nodes in same]
+    return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
 
 
 def _obligations(saved: Certificate) -> list[tuple[VerifiedObligation, list[VerifiedObligation]]]:

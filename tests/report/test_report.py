@@ -14,7 +14,6 @@ import sys
 import unicodedata
 from datetime import date
 from fractions import Fraction
-from functools import cache
 from html.parser import HTMLParser
 from importlib import resources
 from itertools import pairwise
@@ -27,44 +26,28 @@ import pytest
 from bad_inputs import ptcc
 from generators import sparse_digraph
 from jinja2 import UndefinedError
+from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
+from ptcc_certify import Certificate, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
-from ptcc_certify.checker import digest
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.examples import EXAMPLES, load_graph
+from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.report.notation import LISTED, formula_svg, printable
 from ptcc_certify.report.page import EXTREMES, _environment, report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import _tex, report_latex
 
-NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
-SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 #: What a page needs, and nothing that loads, runs or leaves it.
 TAGS = frozenset(
     re.findall(
         "[a-z0-9]+",
-        "html head meta title style body main h1 h2 h3 h4 div strong span p nav ul li a section table caption thead tbody "
-        "dl dt dd tr th td code pre q cite details summary figure figcaption bdi sub sup svg g defs clippath path rect use",
+        "html head meta title style body main h1 h2 h3 h4 div strong span p nav ul li a section "
+        "table caption thead tbody dl dt dd tr th td code pre q cite details summary figure figcaption bdi sub sup svg "
+        "g defs clippath path rect use",
     )
 )
-HOSTILE = [
-    "<script>alert(1)</script>",
-    "javascript:alert(1)",
-    '" onload="alert(1)',
-    "' onmouseover='alert(1)",
-    "\u202eright to left\u202c",
-    "\x1b[31m\x00\x85",
-    "http://evil.example/x.png",
-    "]]><!-- --> <img src=x>",
-    "$x^2$ \\input{x} _%#&{}~^|<>--``''\"",
-    "</title></style></svg></math>",
-    "&lt;b&gt; &amp;",
-    "\u4e2d\u6587 \u00e9\u00d0",
-    "x" * 3000,
-]
 
 
 class Page(HTMLParser):
@@ -166,79 +149,6 @@ def reported(certificate: Certificate, folder: Path, **options: Any) -> str:
     certificate.save(folder / "c.json")
     assert write_report(folder / "c.json", folder / "c.html", **options) == certificate.verdict
     return (folder / "c.html").read_text(encoding="utf-8")
-
-
-def forged(folder: Path, **changes: Any) -> Path:
-    """Change a saved certificate; its digest is made anew."""
-    data = json.loads((folder / "c.json").read_text(encoding="utf-8"))
-    for key, value in changes.items():
-        data[key] = {**data[key], **value} if isinstance(value, dict) else value
-    data["digest"] = digest(data)
-    (folder / "c.json").write_text(json.dumps(data), encoding="utf-8")
-    return folder / "c.json"
-
-
-def undecided(folder: Path) -> Path:
-    """Take the final state out of a certificate: the decay is proved, where it ends is not stated."""
-    certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(folder / "c.json")
-    data = json.loads((folder / "c.json").read_text())
-    functions = [{**m, "deviation": None} for m in data["lyapunov"]["functions"]]
-    proof = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
-    unverified = {"notes": ["<i>no final state</i>", 7]}
-    return forged(
-        folder,
-        influence=None,
-        final_state=None,
-        verdict="undecided",
-        proof=proof,
-        lyapunov={"functions": functions},
-        unverified=unverified,
-    )
-
-
-def sliding_mode() -> Certificate:
-    example = EXAMPLES[4]
-    start, sigma0 = example.x0.split(","), (example.sigma0 or "").split(",")
-    return certify(
-        load_graph("fig1b"), example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance, simulation=False
-    )
-
-
-def nominal(**options: Any) -> Certificate:
-    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    return certify(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
-
-
-def disconnected() -> Certificate:
-    edges = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2), ("x", "y", -1), ("y", "x", 3)]
-    return certify(SignedDigraph.from_edges(edges, ["z"]), NOMINAL, [1, 2, 3, 4, -5, 6], simulation=False)
-
-
-def hostile() -> Certificate:
-    return certify(
-        SignedDigraph.from_edges([(HOSTILE[i - 1], HOSTILE[i], -1) for i in range(len(HOSTILE))]),
-        NominalProtocol(T="1/3", rho1=Fraction(10**20 + 1, 7**30), rho2=1, kappa=1),
-        [Fraction(k, 7) for k in range(len(HOSTILE))],
-        simulation=False,
-    )
-
-
-MADE = {
-    "nominal": nominal,
-    "limits": lambda: nominal(limits=[Actuator(gain_cap=50)], noise="1/100", delta="1/3"),
-    "initial_set": lambda: nominal(initial_set=5, limits=[Actuator(sample_period="1/1000", gain_cap=20)]),
-    "not bounded": lambda: certify(load_graph("fig5b"), NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1), [1] * 16),
-    "no start": lambda: certify(load_graph("fig1a"), NOMINAL),
-    "sliding": sliding_mode,
-    "disconnected": disconnected,
-    "single": lambda: certify(SignedDigraph.from_edges([], ["alone"]), NOMINAL, [3], simulation=False),
-    "hostile": hostile,
-}
-
-
-@cache
-def example(name: str) -> Certificate:
-    return MADE[name]()
 
 
 # ---------------------------------------------------------------------- the page
