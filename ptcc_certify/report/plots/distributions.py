@@ -50,8 +50,6 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     there = {name: part for name, part in parts.items() if part[0].size}
     samples, colours = zip(*there.values(), strict=True)
     ax.hist(samples, BARS, color=colours, label=list(there), stacked=True)
-    ax.set_yscale("symlog", linthresh=1)
-    ax.set_ylim(0)
     return finished(ax, "final state", "agents")
 
 
