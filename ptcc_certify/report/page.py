@@ -23,7 +23,7 @@ from ptcc_certify.certificate.certificate import Certificate, RejectedCertificat
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.size_limits import DRAWN_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
