@@ -124,7 +124,7 @@ def _environment() -> jinja2.Environment:
         "EXTREMES": EXTREMES,
         "GROUPS": GROUPS,
         "FEW": FEW,
-        "DRAWN_NODES": DRAWN_NODES,
+        "LABELLED_NODES": LABELLED_NODES,
     }
     return environment
 
