@@ -25,7 +25,7 @@ def check(
     Parameters
     ----------
     source : str, Path or mapping
-        A path, or the parsed JSON object.
+        A path, ``"-"`` for standard input, or the parsed JSON object.
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import print_json, print_lines, progress, refuse_output
 from ptcc_certify.errors import ParameterError
 
@@ -54,7 +55,7 @@ def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> in
         raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
     more |= {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
     more |= {"initial_set": options["initial_bound"]}
-    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most)}
+    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     with progress(STEPS) as begin:
         certificate = run(signed, protocol, x0, progress=begin, **more)
     if output:

@@ -10,16 +10,17 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.terminal import print_json, print_lines, progress
-from ptcc_certify.errors import ExitCode
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
 
 
 @click.command()
-@click.argument("certificate")
-@click.argument("graph", required=False)
+@shared.certificate_argument
+@click.argument("graph", required=False, shell_complete=complete(GRAPHS, PACKAGED))
 @shared.reading_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
 @shared.memory_option
@@ -27,12 +28,15 @@ if TYPE_CHECKING:
 def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, **options: Any) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
-    GRAPH is read as the certificate says that it was read, which is printed; the options about reading override that.
-    Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
-    certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
+    CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
+    certificate says that it was read, which is printed; the options about reading override that. Prints every
+    obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the certificate
+    itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
     """
     from ptcc_certify.certificate.checking import read_and_check
 
+    if certificate == graph == "-":
+        raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
     with progress(("independent check",)) as begin:
         begin("independent check")
         document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
@@ -69,7 +73,7 @@ def _same_graph(
 
 
 @click.command()
-@click.argument("certificate")
+@shared.certificate_argument
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False), required=True, help="A page, .html, or a statement, .tex"
 )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 
@@ -79,7 +79,7 @@ def graph_path(name: str) -> Path:
         No such graph; the message lists them.
     """
     if name not in GRAPHS:
-        raise ParameterError(f'no packaged graph "{name}"; there are ' + ", ".join(GRAPHS))
+        raise ParameterError(f'no packaged graph "{name}"{did_you_mean(name, GRAPHS)}; there are {", ".join(GRAPHS)}')
     return Path(str(resources.files(__name__) / f"{name}.csv"))
 
 
@@ -117,5 +117,7 @@ def select(name: str) -> list[tuple[Example, str, str]]:
     selection = [run for run in runs if name in ("all", str(run[0].number), run[1])]
     if not selection:
         numbers = ", ".join(map(str, EXAMPLES))
-        raise ParameterError(f'no example "{name}"; use all, {numbers} or ' + ", ".join(GRAPHS))
+        raise ParameterError(
+            f'no example "{name}"{did_you_mean(name, GRAPHS)}; use all, {numbers} or {", ".join(GRAPHS)}'
+        )
     return selection
