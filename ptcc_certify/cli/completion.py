@@ -26,7 +26,7 @@ class _Bash(BashComplete):
     """Bash, told that what it completes are names of files: it quotes blanks, and adds no blank after a folder."""
 
     source_template = BashComplete.source_template.replace(
-        "COMPREPLY+=($value)", 'COMPREPLY+=("${value%/}"); [[ $value == *[./]* ]] && compopt -o filenames'
+        "COMPREPLY+=($value)", 'COMPREPLY+=("${value%%/}"); [[ $value == *[./]* ]] && compopt -o filenames'
     )
 
 

@@ -140,12 +140,11 @@ def refuse_as_certificate(path: str) -> None:
 def near_files(path: str, names: tuple[str, ...] = ()) -> str:
     """Return near names of files in the folder of a path that does not exist, and of ``names``."""
     try:
-        folder = Path(path).parent
-        with os.scandir(folder) as entries:
-            files = [str(folder / entry.name) for entry in islice(entries, 5000)]
+        with os.scandir(Path(path).parent) as entries:
+            files = [entry.name for entry in islice(entries, 5000)]
     except (OSError, ValueError):
         files = []
-    return did_you_mean(path, [*names, *files])
+    return did_you_mean(Path(path).name, [*names, *files])
 
 
 def shell_word(text: str) -> str:
