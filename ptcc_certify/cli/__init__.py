@@ -11,6 +11,7 @@ of them; :mod:`~ptcc_certify.cli.terminal` prints.
 from __future__ import annotations
 
 import io
+import os
 import sys
 from typing import Any
 
@@ -89,6 +90,11 @@ class _Commands(click.Group):
             return super().invoke(ctx)
         except (PTCCError, click.BadParameter) as error:
             raise placed(ctx, error) from None
+        except click.NoSuchOption as error:
+            files = [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]  # noqa: PTH110
+            if not files:
+                raise
+            raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
@@ -128,6 +134,9 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a label that the terminal cannot show stops nothing
     try:
         code = cli.main(prog_name="ptcc", standalone_mode=False)
+    except click.MissingParameter as error:
+        more = f"; {error.ctx.command_path} --help tells more" if error.ctx else ""
+        code = _refuse(error.format_message().rstrip(".") + more)
     except click.ClickException as error:
         if isinstance(error, _NO_ARGUMENTS):
             click.echo(error.format_message(), err=True)

@@ -64,7 +64,7 @@ def plot(graph: str, what: str | None, output: str | None, **options: Any) -> in
 
     certified = kind_of(graph) == "a certificate"
     what = what or ("decay" if certified else "graph")
-    output = output or f"{'graph' if graph == '-' else PurePath(graph).stem}-{what}.png"
+    output = output or f"{PurePath(graph).stem.lstrip('-') or 'graph'}-{what}.png"
     if PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output, graph)

@@ -185,7 +185,7 @@ class Trajectory(Shown):
         writer = csv.writer(text, lineterminator="\n")
         more = self._more_columns()
         writer.writerow(["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)])
-        states, inputs = (values.reshape(len(names), -1) for values in (self.states, self.input))
+        states, inputs = (values.reshape(len(names), -1) for values in (self.states, self.input + 0.0))
         table = np.vstack([self.t, self.remaining, states, *(values for _, values in more), inputs])
         writer.writerows(table.T.tolist())
         return text.getvalue()
