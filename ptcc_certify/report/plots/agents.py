@@ -40,12 +40,13 @@ def camp_groups(structure: Structure) -> np.ndarray:
 
 
 def draw_agents(
-    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, least: bool = True, **looks: Any
+    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **looks: Any
 ) -> np.ndarray:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the agents that have a line.
 
     Of up to eight agents each has a line. Of more, a part of the graph with more than three agents is drawn as its
-    range and median, with a line for the agent whose quantity is the largest at first, and for that with the least.
+    range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
+    of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
     group = camp_groups(structure)
     named: list[int] = []
@@ -55,10 +56,13 @@ def draw_agents(
         width, label = 0.9 if name == "followers" else 1.5, name
         if len(group) > NAMED_AGENTS and own.size > NAMED_OF_PART:
             rows = np.nan_to_num(values[own])
-            ax.fill_between(run.t, rows.min(axis=0), rows.max(axis=0), color=colour, alpha=0.2, linewidth=0, step=step)
-            label = f"{name} (median, range)"
-            ax.plot(run.t, np.median(rows, axis=0), color=colour, linestyle=line, linewidth=2, label=label, **looks)
-            ends = {int(rows[:, 0].argmax()), int(rows[:, 0].argmin())} if least else {int(rows[:, 0].argmax())}
+            high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
+            ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
+            middle, label = (
+                (high, f"{name} (largest)") if size else (np.median(rows, axis=0), f"{name} (median, range)")
+            )
+            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=label, **looks)
+            ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
             own, width, label = own[sorted(ends)], 0.7, ""
         for v in own:
             drawn = {"color": colour, "linestyle": line, "linewidth": width, "gid": AGENT}

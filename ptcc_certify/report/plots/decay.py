@@ -99,7 +99,7 @@ def plot_decay(
     ax = axes_of(ax)
     for values, looks in bounds.values():
         ax.plot(place, values / scale, **looks)
-    bottom, last = max(float(np.nanmin(best)), 1e-300), remaining.size - 1
+    bottom, last = max(float(np.nanmin(best)), 1e-16 * scale), remaining.size - 1
     if run is not None and norm[0] > 0:
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
         _draw_run(ax, place, resolved(norm, best, floor) / scale, floor / scale, bottom / scale)

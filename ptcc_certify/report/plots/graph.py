@@ -17,16 +17,16 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
-from ptcc_certify.report.plots.graph_layout import arc, places_and_bends
+from ptcc_certify.report.plots.graph_layout import Arrow, arc, arrows_of, places_and_bends
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
-#: Size in points of what is written, and of a label of more characters than fit into a node.
-TEXT_SIZE, INSIDE = 7, 3
-#: Edges of which each has its weight written at it.
-WEIGHED_EDGES = 24
+#: Size in points of what is written; characters of a label that fit into a node, and nodes that are so large.
+TEXT_SIZE, INSIDE, LARGE_NODES = 7, 3, 20
+#: Arrows of which each has its weight written at it.
+WEIGHED_ARROWS = 24
 #: Height of the drawing in inches.
 _HEIGHT = 3.4
 
@@ -35,9 +35,10 @@ _HEIGHT = 3.4
 def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     """Draw the signed digraph ``(V, E, W)``: an arrow from ``j`` to ``k`` where ``w_kj != 0``, so that ``k`` listens.
 
-    Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; where weights differ, ``|w_kj|`` is
-    written at up to 24 edges, and told by widths. Nodes have the colours of their camps; leaders are outlined, and a
-    grey ground lies under each of their groups, the closed strong components. The layout is the same in every run.
+    Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
+    one with two heads. Where weights differ, ``|w_kj|`` is written at up to 24 arrows, and told by widths. Nodes have
+    the colours of their camps; leaders are outlined, and a grey ground lies under each of their groups, the closed
+    strong components. The layout is the same in every run.
 
     Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
     followers stand together.
@@ -55,26 +56,29 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     --------
     >>> ax = plot_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)]))
     >>> [text.get_text() for text in ax.texts]
-    ['a', 'b', 'c', '1', '1', '2']
+    ['a', 'b', 'c', '1', '2']
     """
     structure = structure_of(subject)
     graph, ax = structure.graph, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    radius = float(np.clip(70 / np.sqrt(graph.n_nodes), 6.5, 10))
+    inside = max(map(len, graph.labels)) <= INSIDE and graph.n_nodes <= LARGE_NODES
+    radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5, 10)) if inside else 4.5
     part = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
         part[list(component.nodes)] = number
-    place, bends = places_and_bends(graph, part, radius, (width - 4 * radius, height - 4 * radius))
+    margin = 4 * radius if inside else 60
+    arrows = arrows_of(graph)
+    place, bends = places_and_bends(arrows, part, radius, (width - margin, height - 4 * radius))
     if structure.followers.size:
         for component in structure.closed_components:
             _draw_ground(ax, graph, place, component.nodes, radius)
         ax.fill([], [], color=GROUND, label="leader group")
     _draw_nodes(ax, structure, place, radius)
-    _draw_arrows(ax, graph, place, bends, radius)
-    written = _draw_labels(ax, graph.labels, place, radius)
-    _draw_weights(ax, graph, place, bends, radius, written)
+    _draw_arrows(ax, arrows, place, bends, radius)
+    written = _draw_labels(ax, graph.labels, place, radius, None if inside else _boxes_along(arrows, place, bends))
+    _draw_weights(ax, arrows, place, bends, written)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
     ax.set_ylim(-height / 2, height / 2)
@@ -95,58 +99,65 @@ def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float
             ax.plot([], [], "o", markersize=6, label=name, **looks)
 
 
-def _draw_arrows(ax: Axes, graph: SignedDigraph, place: np.ndarray, bends: np.ndarray, radius: float) -> None:
+def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, radius: float) -> None:
     """Draw the arrows, wide where the weight is large."""
-    size = np.abs(graph.weights)
-    share = np.log1p(size / size.max()) / np.log(2) if size.size and np.ptp(size) > 0 else np.full(size.size, 0.45)
-    arrow: dict[str, Any] = {"arrowstyle": "-|>", "shrinkA": radius, "shrinkB": radius + 1, "zorder": 2}
-    ends = zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), bends, share, strict=True)
-    for source, target, sign, bend, width in ends:
-        colour, line, _ = EDGE_STYLES[sign]
-        looks: dict[str, Any] = {"color": colour, "linestyle": line, "linewidth": 0.6 + 0.9 * width}
-        curve = f"arc3,rad={bend}"
-        ax.add_artist(
-            FancyArrowPatch(place[source], place[target], connectionstyle=curve, mutation_scale=7, **arrow, **looks)
-        )
+    largest = max((a.size for a in arrows), default=1.0)
+    differ = min((a.size for a in arrows), default=1.0) < largest
+    looks: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1, "mutation_scale": 7, "zorder": 2}
+    for arrow, bend in zip(arrows, bends, strict=True):
+        colour, line, _ = EDGE_STYLES[arrow.sign]
+        looks |= {"color": colour, "linestyle": line, "arrowstyle": "<|-|>" if arrow.mutual else "-|>"}
+        width = 0.6 + 1.0 * arrow.size / largest if differ else 0.9
+        ends = place[arrow.source], place[arrow.target]
+        ax.add_artist(FancyArrowPatch(*ends, connectionstyle=f"arc3,rad={bend}", linewidth=width, **looks))
     for sign, (colour, line, name) in EDGE_STYLES.items():
-        if (graph.sign == sign).any():
+        if any(arrow.sign == sign for arrow in arrows):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
 
 
-def _draw_labels(ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float) -> list[np.ndarray]:
-    """Write labels into the nodes if all are short, else where they cover least; return the boxes that are taken."""
+def _draw_labels(
+    ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
+) -> list[np.ndarray]:
+    """Write labels into the nodes, or around them where they cover least of ``lines``; return the boxes that are taken."""
     looks: dict[str, Any] = {"fontsize": TEXT_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
-    taken = [np.array([*(p - radius), *(p + radius)]) for p in place]
-    if max(map(len, labels)) <= INSIDE:
+    nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
+    if lines is None:
         for label, p in zip(labels, place, strict=True):
             ax.annotate(shorten(label), p, color="white", va="center_baseline", **looks)
-        return taken
+        return nodes
+    taken = nodes + lines
     halo = [patheffects.withStroke(linewidth=2, foreground="white")]
     for label, p in zip(labels, place, strict=True):
         text = shorten(label, 12)
         half = np.array([0.31 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
-        around = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1)]
-        spots = [p + np.array(way) * (half + radius * (0.75 if all(way) else 1.0) + 1) for way in around]
+        turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
+        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0) for way in ways]
         box = _least_covered(spots, half, taken)
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
-    return taken
+    return nodes + taken[len(nodes) + len(lines) :]
 
 
 def _draw_weights(
-    ax: Axes, graph: SignedDigraph, place: np.ndarray, bends: np.ndarray, radius: float, taken: list[np.ndarray]
+    ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, taken: list[np.ndarray]
 ) -> None:
     """Write the sizes of the weights at their arrows, if they differ and there are few."""
-    size = np.abs(graph.weights)
-    if not 0 < size.size <= WEIGHED_EDGES or np.ptp(size) == 0:
+    if len({arrow.size for arrow in arrows}) < 2 or len(arrows) > WEIGHED_ARROWS:
         return
-    ground = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
-    for source, target, sign, bend, weight in zip(graph.source, graph.target, graph.sign, bends, size, strict=True):
-        text = f"{weight:.3g}"
+    ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+    for arrow, bend in zip(arrows, bends, strict=True):
+        text = f"{arrow.size:.3g}"
         half = np.array([0.33 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
-        spots = arc(place[source], place[target], bend, np.array([0.5, 0.42, 0.58, 0.34, 0.66, 0.28, 0.72]))
-        box = _least_covered(list(spots), half, taken)
-        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[int(sign)][0]
+        shares = np.array([0.5, 0.42, 0.58, 0.34, 0.66, 0.28, 0.72])
+        box = _least_covered(list(arc(place[arrow.source], place[arrow.target], bend, shares)), half, taken)
+        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=TEXT_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
+
+
+def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[np.ndarray]:
+    """Return small boxes along the arrows."""
+    curves = [arc(place[a.source], place[a.target], bend) for a, bend in zip(arrows, bends, strict=True)]
+    return [np.array([*(p - 1.5), *(p + 1.5)]) for curve in curves for p in curve]
 
 
 def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:

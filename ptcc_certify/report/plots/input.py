@@ -32,11 +32,12 @@ def plot_input(
 ) -> Axes:
     """Draw ``|u_k(t)|`` of one run in the colours and lines of the camps, and the peak that a certificate proves.
 
-    Lines, ranges and names are those of :func:`plot_trajectory`, the named agent of a range being the one whose input
-    is largest at first. The axis is linear; logarithmic for an input that grows to three times its initial size.
-    Behind an actuator it is the input that acts. Nothing is drawn where the integrator no longer resolves what the
-    gain multiplies. No peak is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or
-    noise of the nominal protocol, boundary layers. Under caps and stops that the certificate judges, theirs is drawn.
+    Lines and names are those of :func:`plot_trajectory`; of more than eight agents the largest input in each part of
+    the graph is drawn, with a line for the agent whose input is the largest at first. The axis is linear; logarithmic
+    for an input that grows to three times its initial size. Behind an actuator it is the input that acts. Nothing is
+    drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
+    that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Under caps
+    and stops that the certificate judges, theirs is drawn.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def plot_input(
     peak = None if certificate is None else _certified_peak(run, certificate)
     ax, size = axes_of(ax), np.abs(_resolved_input(run))
     hold = run.held_input is not None
-    named = draw_agents(ax, run, size, structure, least=False, drawstyle="steps-post" if hold else "default")
+    named = draw_agents(ax, run, size, structure, size=True, drawstyle="steps-post" if hold else "default")
     largest = np.nan_to_num(size)
     first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
     shown = peak is not None and (peak <= HIGH_PEAK * top or top == 0)

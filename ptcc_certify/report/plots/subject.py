@@ -56,7 +56,9 @@ def trajectory_of(subject: Any) -> Trajectory:
         run = subject.simulate() if subject.trajectory is None else subject.trajectory
     if not isinstance(run, Trajectory):
         kind = type(subject).__name__
-        raise ParameterError(f"this figure is drawn from a trajectory or a certificate, not from {kind}; simulate first")
+        raise ParameterError(
+            f"this figure is drawn from a trajectory or a certificate, not from {kind}; simulate first"
+        )
     if run.states.ndim != 2:
         raise ParameterError(f"the trajectory holds {run.states.shape[1]} initial states; draw a run of one")
     return run
