@@ -103,7 +103,7 @@ def plot_decay(
     if run is not None and norm[0] > 0:
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
         _draw_run(ax, place, resolved(norm, best, floor) / scale, floor / scale, bottom / scale)
-        last = int(np.flatnonzero(np.fmin(best, 1e300) >= bottom)[-1]) if bounds else last
+        last = int(np.flatnonzero((best if bounds else norm) >= bottom)[-1])
     ax.set_yscale("log")
     ax.set_ylim(bottom / scale, 3 * max(1.0, float(best[0]) / scale if bounds else 0.0))
     ax.set_xscale("log" if axis == "left" else "linear")

@@ -17,14 +17,14 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
-from ptcc_certify.report.plots.graph_layout import Arrow, arc, arrows_of, places_and_bends
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
-#: Size in points of what is written; characters of a label that fit into a node, and nodes that are so large.
-TEXT_SIZE, INSIDE, LARGE_NODES = 7, 3, 20
+#: Size in points of what is written, and characters of a label that fit into a node.
+TEXT_SIZE, INSIDE = 7, 3
 #: Arrows of which each has its weight written at it.
 WEIGHED_ARROWS = 24
 #: Height of the drawing in inches.
@@ -63,12 +63,12 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    inside = max(map(len, graph.labels)) <= INSIDE and graph.n_nodes <= LARGE_NODES
+    inside = max(map(len, graph.labels)) <= INSIDE and graph.n_nodes <= FREE_NODES
     radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5, 10)) if inside else 4.5
     part = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
         part[list(component.nodes)] = number
-    margin = 4 * radius if inside else 60
+    margin = 4 * radius if inside else 60  # for labels
     arrows = arrows_of(graph)
     place, bends = places_and_bends(arrows, part, radius, (width - margin, height - 4 * radius))
     if structure.followers.size:
@@ -118,7 +118,7 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
 def _draw_labels(
     ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
 ) -> list[np.ndarray]:
-    """Write labels into the nodes, or around them where they cover least of ``lines``; return the boxes that are taken."""
+    """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
     looks: dict[str, Any] = {"fontsize": TEXT_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
     nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
     if lines is None:
@@ -132,7 +132,7 @@ def _draw_labels(
         half = np.array([0.31 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0) for way in ways]
+        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
         box = _least_covered(spots, half, taken)
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
     return nodes + taken[len(nodes) + len(lines) :]
@@ -185,19 +185,15 @@ def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Seque
         corners = []
     for corner in corners:
         triangle = place[list(nodes)][corner]
-        if not any(_near(triangle, p, 2 * radius) for p in foreign):
+        if not any(_inside(triangle, p) for p in foreign):
             parts.append(triangle)
     for part in parts:
         width = 2 * REACH * radius
         ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", gid="ground", **looks))  # type: ignore[arg-type]
 
 
-def _near(triangle: np.ndarray, point: np.ndarray, distance: float) -> bool:
-    """Whether a point is in a triangle, or that near to it."""
-    edges = np.roll(triangle, -1, axis=0) - triangle
-    offsets = point - triangle
+def _inside(triangle: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point is in a triangle."""
+    edges, offsets = np.roll(triangle, -1, axis=0) - triangle, point - triangle
     turns = edges[:, 0] * offsets[:, 1] - edges[:, 1] * offsets[:, 0]
-    if (turns > 0).all() or (turns < 0).all():
-        return True
-    along = np.clip((edges * offsets).sum(axis=1) / (edges**2).sum(axis=1), 0, 1)
-    return bool((np.linalg.norm(offsets - along[:, None] * edges, axis=1) < distance).any())
+    return bool((turns > 0).all() or (turns < 0).all())

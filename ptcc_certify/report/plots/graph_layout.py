@@ -14,8 +14,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 BENDS, OPPOSITE_BENDS = (0.0, 0.12, -0.12, 0.22, -0.22, 0.4, -0.4, 0.6, -0.6), (0.22, 0.32, 0.45, 0.6)
 #: Points on an arrow at which its distance from nodes is measured, as shares of its length.
 ALONG = np.linspace(0.06, 0.94, 23)
-#: Layouts by springs that are tried.
-SPRINGS = 5
+#: Layouts by springs that are tried; nodes of which more lie on a circle, around which there is room for labels.
+SPRINGS, FREE_NODES = 5, 20
 
 
 class Arrow(NamedTuple):
@@ -62,7 +62,7 @@ def places_and_bends(
         place = (points - low - span / 2) * scale
         bends, exceptions = _bends(arrows, place, 1.35 * radius)
         gaps = np.linalg.norm(place[:, None] - place, axis=-1)
-        exceptions += int((gaps[np.triu_indices(len(gaps), 1)] < 2.3 * radius).sum())
+        exceptions += int((gaps[np.triu_indices(len(gaps), 1)] < 2.2 * radius).sum())
         if best is None or exceptions < best[0]:
             best = exceptions, place, bends
         if not exceptions:
@@ -95,7 +95,7 @@ def _bends(arrows: Sequence[Arrow], place: np.ndarray, least: float) -> tuple[np
 
 
 def _layouts(arrows: Sequence[Arrow], part: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield layouts: by distances in the graph, then by springs, then on a circle."""
+    """Yield layouts: by distances in the graph, then by springs, then on a circle; of many nodes the last alone."""
     n = part.size
     plain = nx.Graph((a.source, a.target) for a in arrows)
     plain.add_nodes_from(range(n))
@@ -103,13 +103,16 @@ def _layouts(arrows: Sequence[Arrow], part: np.ndarray) -> Iterator[np.ndarray]:
     gap = 2 + max(max(row.values()) for row in hops.values())  # between components
     lengths = {u: {v: hops[u].get(v, gap) for v in plain} for u in plain}
     by_distance = nx.kamada_kawai_layout(plain, lengths)
-    yield _lying(np.array([by_distance[v] for v in range(n)]))
-    for seed in range(SPRINGS):
-        springs = nx.spring_layout(plain, pos=by_distance if seed == 0 else None, seed=seed, k=1.6 / np.sqrt(n))
-        yield _lying(np.array([springs[v] for v in range(n)]))
-    order = np.lexsort((np.arctan2(*np.array([by_distance[v] for v in range(n)]).T), part))
+    points = np.array([by_distance[v] for v in range(n)])
+    if n <= FREE_NODES:
+        yield _lying(points)
+        for seed in range(SPRINGS):
+            springs = nx.spring_layout(plain, pos=by_distance if seed == 0 else None, seed=seed, k=1.6 / np.sqrt(n))
+            yield _lying(np.array([springs[v] for v in range(n)]))
     angle = np.empty(n)
-    angle[order] = 2 * np.pi * np.arange(n) / n
+    order = np.lexsort((np.arctan2(*points.T), part))
+    places = np.arange(n) + np.searchsorted(np.unique(part), part[order])  # one is empty between parts
+    angle[order] = 2 * np.pi * places / (n + np.unique(part).size * (np.unique(part).size > 1))
     yield np.stack([1.15 * np.sin(angle), np.cos(angle)], axis=1)
 
 
