@@ -23,6 +23,8 @@ _EXPORTS = {
     "HypothesisError": "errors",
     "SimulationError": "errors",
     "SignedDigraph": "graphs.digraph",
+    "as_graph": "graphs.io",
+    "as_state": "graphs.io",
     "read_graph": "graphs.io",
     "write_graph": "graphs.io",
     "read_state": "graphs.io",

@@ -49,7 +49,7 @@ def certify_many(
 
     Parameters
     ----------
-    sources : path, pattern, SignedDigraph, Ensemble, or a sequence of these
+    sources : path, pattern, graph-like, Ensemble, or a sequence of these
         A text is a file, a pattern such as ``"graphs/*.csv"`` (``**`` for folders within), the name of a packaged
         graph, or an ensemble's ``.toml`` file. A pattern skips folders and the table itself; a link to nowhere that
         matches has an error. A file that is named several times, in whatever way or through links, has one row, under

@@ -163,8 +163,8 @@ class SignedDigraph(Shown):
         long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
         odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
         for bad, message in (
-            (source == target, "self-loop at node {0}; remove it, or drop all with --drop-self-loops"),
-            (again, "two edges {0} -> {1}; keep one, or merge with --duplicates"),
+            (source == target, "self-loop at node {0}; remove it"),
+            (again, "two edges {0} -> {1}; keep one"),
             (table == 0, "weight 0 of edge {0} -> {1}: an unknown sign is not an edge; remove it or give a weight"),
             (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),
             (odd, "weight of edge {0} -> {1} is outside the range of float64; rescale the weights"),
@@ -349,14 +349,17 @@ class SignedDigraph(Shown):
         >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
+        if not hasattr(graph, "is_multigraph"):
+            raise GraphError(f"a {type(graph).__name__} is no networkx graph; ptcc_certify.as_graph takes other data")
         if graph.is_multigraph():
             raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
         if not graph.is_directed():
-            raise GraphError("the networkx graph is undirected; pass graph.to_directed() if both ends listen")
+            raise GraphError("the networkx graph is undirected; give graph.to_directed() if both ends listen")
+        mend = 'give each edge a signed number, or name the attribute: from_networkx(graph, weight="sign")'
         triples = []
         for u, v, data in graph.edges(data=True):
             if weight not in data:
-                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"')
+                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"; {mend}')
             triples.append((u, v, data[weight]))
         return cls.from_edges(triples, graph.nodes, orientation=orientation)
 

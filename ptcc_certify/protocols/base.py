@@ -151,6 +151,25 @@ class ReachingProtocol(Protocol):
         return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
 
 
+def refuse_no_protocol(protocol: Any) -> None:
+    """Refuse what is no protocol.
+
+    Raises
+    ------
+    ParameterError
+        Tells how to make one.
+
+    Examples
+    --------
+    >>> refuse_no_protocol(0.6)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: protocol = 0.6 is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say
+    """
+    if not isinstance(protocol, Protocol):
+        given = shorten(repr(protocol))
+        raise ParameterError(f"protocol = {given} is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say")
+
+
 # ---------------------------------------------------------------------- expressions
 
 

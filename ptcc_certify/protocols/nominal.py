@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import Protocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
@@ -64,7 +65,7 @@ class NominalProtocol(Protocol):
 
         Parameters
         ----------
-        graph : SignedDigraph
+        graph : graph-like
             N agents.
         x : (N, 1) casadi.SX, optional
             The states; symbols ``x1 .. xN`` by default.
@@ -83,6 +84,7 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         return self.gain.expression(t) * coupling(graph, x)
 
@@ -97,6 +99,7 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph), ca.SX.sym("t")
         return {"t": t, "x": x, "ode": self.input(graph, x, t)}
 
@@ -105,7 +108,7 @@ class NominalProtocol(Protocol):
 
         Parameters
         ----------
-        graph : SignedDigraph, optional
+        graph : graph-like, optional
             At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
             numbers; without a graph they are letters.
 
@@ -129,7 +132,7 @@ class NominalProtocol(Protocol):
         g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
         \end{aligned}
         """
-        rows = nominal_rows(graph)
+        rows = nominal_rows(None if graph is None else as_graph(graph))
         return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
 
 
