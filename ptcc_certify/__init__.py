@@ -70,6 +70,7 @@ _EXPORTS = {
     "Comparison": "bounds.envelope",
     "Certificate": "certificate.certificate",
     "certify": "certificate.procedure",
+    "certify_vectors": "certificate.vector_states",
     "Expectations": "certificate.request",
     "Assessment": "certificate.verdict",
     "RejectedCertificate": "certificate.certificate",

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path
@@ -74,7 +74,12 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
         sources = [sources]
     selection: dict[Hashable, Source] = {}
     graphs = ensembles = 0
-    for source in sources:
+    named = sources if isinstance(sources, Mapping) else {}
+    for name, graph in named.items():
+        graph = as_graph(graph)
+        key = ("named", str(name))
+        selection[key] = Source(str(name), graph, key, _mark_of_graph(graph))
+    for source in () if named else sources:
         if isinstance(source, Ensemble):
             ensembles += 1
             name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
@@ -93,8 +98,11 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
 
 
 def _is_one_graph(source: Any) -> bool:
-    """Tell a networkx graph, a matrix or a table, which can be iterated over, from a sequence of graphs."""
-    return hasattr(source, "is_multigraph") or hasattr(source, "to_numpy") or isinstance(source, np.ndarray)
+    """Tell one graph, matrix or table of edges, which can be iterated over, from a sequence of graphs."""
+    held = isinstance(source, SignedDigraph) or isinstance(getattr(source, "graph", None), SignedDigraph)
+    return (
+        held or isinstance(source, np.ndarray) or any(hasattr(source, x) for x in ("is_multigraph", "columns", "tocoo"))
+    )
 
 
 def _expand(text: str, own: Sequence[Path]) -> list[Source]:

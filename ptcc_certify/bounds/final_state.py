@@ -16,19 +16,22 @@ the certificate forms them exactly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lmi.errors import LMIError
 from lmi.sparse_h_matrix import SparseHMatrix, solve
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
+from ptcc_certify.graphs.tables import series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -37,6 +40,9 @@ from ptcc_certify.theorems.lemmas import (
     exact_left_vector,
     left_vector,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
@@ -278,8 +284,8 @@ class FinalState:
     >>> end = final_state(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
     >>> end
     FinalState(1=1, 2=-1, 3=-1)
-    >>> end.consensus_values, end.degenerate
-    ((Fraction(1, 1),), ())
+    >>> end.consensus_values, end.degenerate, end[2]
+    ((Fraction(1, 1),), (), Fraction(-1, 1))
     """
 
     labels: tuple[str, ...]
@@ -305,6 +311,40 @@ class FinalState:
     def values(self) -> np.ndarray:
         """(N,) float64 array: ``states``, rounded."""
         return np.array([float(x) for x in self.states])
+
+    def __getitem__(self, label: Hashable) -> Number:
+        if str(label) not in self.labels:
+            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
+            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
+        return self.states[self.labels.index(str(label))]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.values, dtype=dtype)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the labels, so that ``dict(final_state)`` has the states by label."""
+        return self.labels
+
+    def to_pandas(self) -> pd.Series:
+        """Return ``values`` as a Series by label.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> final_state([("a", "b", -1)], [3, 5]).to_pandas().to_dict()
+        {'a': 3.0, 'b': -3.0}
+        """
+        return series(self.values, self.labels, "final state")
 
     def __repr__(self) -> str:
         entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])

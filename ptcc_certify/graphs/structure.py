@@ -241,6 +241,14 @@ class Structure(Shown):
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
 
+    def __eq__(self, other: object) -> bool:
+        """Two structures are equal when their graphs are, with their nodes in the same order."""
+        same = isinstance(other, Structure) and self.graph.labels == other.graph.labels
+        return same and self.graph == other.graph  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self.graph)
+
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
         claim = f"{len(self.components)} components"

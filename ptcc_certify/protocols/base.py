@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import fields
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -104,10 +105,12 @@ class Protocol(Parameters, ABC):
         kind = parameters.pop("kind", None)
         if kind not in Protocol._kinds:
             raise ParameterError(f'protocol "{shorten(str(kind))}" is unknown; one of {", ".join(Protocol._kinds)}')
-        try:
-            return Protocol._kinds[kind](**parameters)
-        except TypeError as error:
-            raise ParameterError(f"protocol {kind}: {error}") from None
+        names = [field.name for field in fields(Protocol._kinds[kind])]  # type: ignore[arg-type]
+        for what, odd in (("no", set(names) - set(parameters)), ("an unknown", set(parameters) - set(names))):
+            if odd:
+                named = ", ".join(sorted(map(shorten, odd)))
+                raise ParameterError(f"protocol {kind} has {what} {named}; it has {', '.join(names)}")
+        return Protocol._kinds[kind](**parameters)
 
 
 class ReachingProtocol(Protocol):

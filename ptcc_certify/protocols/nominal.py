@@ -33,9 +33,9 @@ class NominalProtocol(Protocol):
     ----------
     T, rho1, kappa : int, float, str or Fraction
         Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
-        1/time/weight.
+        1/time/weight. By default 1, 1 and 2, as on the command line.
     rho2 : int, float, str or Fraction
-        Not negative, 1/weight.
+        Not negative, 1/weight; by default 1.
 
     Raises
     ------
@@ -52,10 +52,10 @@ class NominalProtocol(Protocol):
     """
 
     kind = "nominal"
-    T: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: NotNegative = NotNegative()
-    kappa: Positive = Positive()
+    T: Positive = Positive(1)
+    rho1: Positive = Positive(1)
+    rho2: NotNegative = NotNegative(1)
+    kappa: Positive = Positive(2)
 
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64

@@ -56,15 +56,15 @@ class SlidingModeProtocol(ReachingProtocol):
     """
 
     kind = "sliding-mode"
-    T_r: Positive = Positive()
-    T_s: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: Positive = Positive()
-    kappa: Positive = Positive()
-    mu1: Positive = Positive()
-    mu2: Positive = Positive()
-    mu3: Positive = Positive()
-    delta: NotNegative = NotNegative()
+    T_r: Positive = Positive("0.5")
+    T_s: Positive = Positive("0.5")
+    rho1: Positive = Positive(1)
+    rho2: Positive = Positive(1)
+    kappa: Positive = Positive(2)
+    mu1: Positive = Positive(2)
+    mu2: Positive = Positive(1)
+    mu3: Positive = Positive(1)
+    delta: NotNegative = NotNegative(1)
 
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:

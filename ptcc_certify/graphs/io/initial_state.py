@@ -59,7 +59,9 @@ def as_state(values: Any, graph: SignedDigraph, name: str = "x0") -> list[Fracti
     """
     rows = as_states(values, graph, name)
     if (size := len(rows[0])) != 1:
-        raise ParameterError(f"the initial state {name} has {size} numbers for each agent; give one column at a time")
+        raise ParameterError(
+            f"the initial state {name} has {size} numbers for each agent; give one, or ask certify_vectors"
+        )
     return [row[0] for row in rows]
 
 
