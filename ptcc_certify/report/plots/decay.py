@@ -84,7 +84,7 @@ def plot_decay(
     if proved is not None:
         _require_bounds(proved, run)
     remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
-    norm, floor, unit = error_norm(run or subject, proved)
+    norm, floor, unit = error_norm(subject if run is None else run, proved)
     bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
     best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
     scale = float(norm[0]) or (float(best[0]) if bounds else 0.0)
