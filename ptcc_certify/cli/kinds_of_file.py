@@ -92,7 +92,7 @@ def refuse_as_graph(path: str) -> None:
     FormatError
         Tells what the file is and what to do with it.
     """
-    from ptcc_certify.examples import GRAPHS
+    from ptcc_certify.graphs.io.packaged import GRAPHS
 
     name, kind, word = shorten(path, 200), kind_of(path), shell_word(path)
     mends = {
@@ -117,7 +117,7 @@ def refuse_as_certificate(path: str) -> None:
     FormatError
         Tells what the file is and which command makes a certificate.
     """
-    from ptcc_certify.examples import GRAPHS
+    from ptcc_certify.graphs.io.packaged import GRAPHS
 
     name, kind = shorten(path, 200), kind_of(path)
     if path == "-" or kind in ("a certificate", "JSON"):

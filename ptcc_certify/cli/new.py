@@ -31,8 +31,8 @@ def new(context: click.Context, graph: str | None, output: str | None, force: bo
     A scenario holds all that a run needs - graph, protocol, initial state, limits, expectations - in one file that
     `ptcc certify`, `simulate`, `design` and `plot` take in place of GRAPH. Flags override it. Without -o it is printed.
     """
-    from ptcc_certify.examples import GRAPHS
     from ptcc_certify.graphs.io import read_graph, write_atomically
+    from ptcc_certify.graphs.io.packaged import GRAPHS
 
     labels: tuple[str, ...] = ()
     if graph == "-":

@@ -206,7 +206,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print exactl
 
 def graph_file(graph: str) -> Any:
     """Return the file of a graph, of a packaged one where no such file exists, of a scenario that of its graph."""
-    from ptcc_certify.examples import GRAPHS, graph_path
+    from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
 
     if graph == "-" and sys.stdin is None:
         raise ParameterError("standard input is closed; name a file")

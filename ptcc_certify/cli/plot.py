@@ -13,14 +13,11 @@ from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.scenario import graph_of
 from ptcc_certify.cli.terminal import FIGURES, progress, refuse_output
-from ptcc_certify.errors import ExitCode, ParameterError, PTCCError
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.graphs.structure import Structure
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Figures of a simulated run.
@@ -47,13 +44,15 @@ OF_A_RUN = ("states", "input", "decay")
     type=click.Path(dir_okay=False),
     help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png, in this folder]",
 )
+@click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
+@click.option("--time-unit", metavar="UNIT", default="", show_default=False, help="Of time on the axes, such as s.")
 @shared.reading_options
 @shared.protocol_options
 @shared.limit_options
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
-def plot(graph: str, what: str | None, output: str | None, **options: Any) -> int:
+def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit: str, **options: Any) -> int:
     """Draw one figure of a certificate, a graph or a scenario.
 
     A certificate is checked first, and its run is repeated. A graph is simulated, for its decay certified, with the
@@ -69,79 +68,63 @@ def plot(graph: str, what: str | None, output: str | None, **options: Any) -> in
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output, graph)
     try:
-        drawn: Any = _of_certificate(graph, what, options["memory"]) if certified else _of_graph(graph, what, options)
+        subject = _of_certificate(graph, what, options["memory"]) if certified else _of_graph(graph, what, options)
     except RejectedCertificate as error:
         click.echo(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
-    except PTCCError:
-        raise
-    except ValueError as error:  # of a figure that has nothing to show
-        raise ParameterError(f"{graph}: no figure of its {what} ({error}); --what names others") from None
-    save_figure(drawn.figure, output)
+    save_figure(_drawn(what, subject, wide, time_unit), output)
     click.echo(f"written    {output}")
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, memory: float) -> Axes:
-    """Draw a figure of a certificate's file."""
+def _of_certificate(path: str, what: str, memory: float) -> Certificate:
+    """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
     from ptcc_certify.certificate.certificate import read_certificate
 
     context = click.get_current_context()
     for parameter in context.command.params:
         given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
-        if given and parameter.name not in ("graph", "what", "output", "memory"):
+        if given and parameter.name not in ("graph", "what", "output", "wide", "time_unit", "memory"):
             raise ParameterError(f"{parameter.opts[0]} is for a graph; the certificate {path} has its own")
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
         certificate = read_certificate(path, memory=memory)
-        if what in OF_A_RUN:
-            begin("simulation")
-            certificate = certificate.with_simulation()
-    return _drawn(what, certificate.structure, certificate.protocol, certificate.trajectory, certificate)
+        begin("simulation")
+        return certificate.with_simulation() if what in OF_A_RUN else certificate
 
 
-def _of_graph(path: str, what: str, options: shared.Options) -> Axes:
-    """Draw a figure of a graph: as it is, simulated, or for its decay certified."""
+def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
+    """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
     from ptcc_certify.certificate.procedure import STEPS, certify
-    from ptcc_certify.graphs.structure import analyse
     from ptcc_certify.simulation.run import simulate
 
     signed, protocol = shared.read(path, options), shared.protocol_of(options, ("delta", "disturbance"))
-    if what not in OF_A_RUN:
-        return _drawn(what, analyse(signed), protocol)
+    if what in ("graph", "spectrum"):
+        return signed, protocol
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more = shared.sliding_keywords(protocol, options, signed)
     if what == "decay":
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
-            certificate = certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
-        return _drawn(what, certificate.structure, protocol, certificate.trajectory, certificate)
+            return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
     if options["kind"] == "nominal":
         more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
-    return _drawn(what, analyse(signed), protocol, simulate(signed, protocol, x0, **more))
+    return simulate(signed, protocol, x0, **more)
 
 
-def _drawn(
-    what: str,
-    structure: Structure,
-    protocol: Protocol,
-    run: Trajectory | None = None,
-    certificate: Certificate | None = None,
-) -> Axes:
+def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
+    """Draw a figure of a certificate, a run, or a graph with its protocol."""
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
     from ptcc_certify.report.plots.spectrum import plot_spectrum
-    from ptcc_certify.report.plots.trajectory import plot_trajectory
+    from ptcc_certify.report.plots.trajectory import plot_run
 
+    subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
     if what == "graph":
-        return plot_graph(structure)
+        return plot_graph(subject)
     if what == "spectrum":
-        return plot_spectrum(structure, protocol)
-    assert run is not None
+        return plot_spectrum(subject, protocol=protocol)
     if what == "states":
-        return plot_trajectory(run, structure)
-    if what == "input":
-        return plot_input(run, structure, certificate)
-    assert certificate is not None
-    return plot_decay(certificate)
+        return plot_run(subject, wide=wide, time_unit=time_unit)
+    return {"input": plot_input, "decay": plot_decay}[what](subject, time_unit=time_unit)

@@ -276,7 +276,7 @@ def _state(value: Any, folder: Path, place: str) -> str:
 
 def _beside(text: str, folder: Path) -> str:
     """Return a path relative to the folder of the scenario; a packaged graph, and standard input, by name."""
-    from ptcc_certify.examples import GRAPHS
+    from ptcc_certify.graphs.io.packaged import GRAPHS
 
     path = folder / text
     return text if text == "-" or (text in GRAPHS and not path.is_file()) else str(path)
@@ -297,7 +297,7 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: str) -> 
     """
     if context.resilient_parsing or not is_scenario(graph):
         return graph
-    from ptcc_certify.examples import GRAPHS
+    from ptcc_certify.graphs.io.packaged import GRAPHS
 
     if kind_of(graph) not in TOML:
         refuse_as_graph(graph)

@@ -171,7 +171,7 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(certificate: str):
         ((certificate, "--T", "2"), "--T is for a graph"),
         (("fig1a", "-o", "x.jpg"), "figures are written to"),
         (("fig1a", "-o", "nowhere/x.png"), "the folder does not exist"),
-        (("fig1b", "--what", "decay", "--x0", "0,0,0,0,0,0"), "no figure of its decay"),
+        (("fig1b", "--what", "decay", "--x0", "0,0,0,0,0,0"), "nothing decays"),
     ):
         run = ptcc("plot", *words)
         assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1) and says in run.err, run
