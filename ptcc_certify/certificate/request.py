@@ -120,7 +120,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=_read_initial_set(structure, arguments["initial_set"]),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
-        time_limit=60 + n / 1000 if seconds is None else seconds,
+        time_limit=60 + n // 1000 if seconds is None else seconds,
         expectations=arguments["expectations"] or Expectations(),
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
