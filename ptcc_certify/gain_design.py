@@ -324,7 +324,7 @@ class Design(Shown):
             rows.append(("", f"gain saturated at {short_exact(self.gain_cap)}, from t = 0 on"))
         rows += [("proved", self.bounds_text), ("deadline", self.deadline_text)]
         if self.ratio is not None:
-            rows.append(("", f"the one is at most {up(self.ratio, 3)} times the other"))
+            rows.append(("", f"ratio of the two at most {up(self.ratio, 3)}"))
         if self.worst is not None and self.protocol is not None:
             rows.append(("numerical", f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"))
         return [f"{name:<10} {text}" for name, text in rows if text]
@@ -707,7 +707,7 @@ def _answer_without_gains(answer: Design) -> Design:
         return answer
     if answer.peak <= U:
         return replace(answer, binding="the residual is not proved")
-    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times max_input"
+    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times the limit"
     return replace(answer, binding=f"{over}; from T = {up(answer.product / U)} on it is met")
 
 

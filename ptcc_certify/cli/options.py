@@ -213,19 +213,16 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
             return [Fraction(0)] * graph.n_nodes
     except NumberError:
         pass
-    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: ")
+    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: sigma(0)")
 
 
-def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    """Return the initial state that ``--x0`` gives, or draw one."""
+def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:
+    """Return the initial state that ``--x0`` gives, or ``sigma(0)`` that ``--sigma0`` gives, or draw one."""
     from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 == "random":
         return [x for (x,) in random_states(seed, graph.n_nodes)]
-    try:
-        return read_state(x0, graph)
-    except PTCCError as error:
-        raise type(error)(f"{option}{error}") from None
+    return read_state(x0, graph, name)
 
 
 def read_initial_states(options: Options, graph: SignedDigraph) -> Any:

@@ -48,6 +48,8 @@ _SHORT_ORIENTATION = _ORIENTATION | {
     "information": "row a,b: information flows a -> b",
     "listens": "row a,b: a listens to b",
 }
+#: Remarks for the long screen alone: "(0 negative)" tells the one, and the other is about pairs of edges.
+_LONG_REMARKS = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
 #: Lines of a short screen of a connected graph, at most.
 SHORT = 8
 
@@ -159,7 +161,8 @@ def _connectivity(structure: Structure) -> str:
 def _reading_text(structure: Structure) -> str:
     """Tell how the rows were read, and what is particular about the graph, as far as it fits."""
     text = _SHORT_ORIENTATION[structure.graph.read["orientation"]]
-    return shorten_text("; ".join([text, *remarks_on(structure)]), TEXT)
+    remarks = [remark for remark in remarks_on(structure) if remark not in _LONG_REMARKS]
+    return shorten_text("; ".join([text, *remarks]), TEXT)
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
@@ -315,7 +318,7 @@ def _verdict_text(certificate: Certificate, tell: Callable[[Answer], str], cut_o
         option = assessment.advice.partition(" (")[0]
         parts.append(f"{CERTIFIED}, but says little by T" + (f"; {option} leaves 1 %" if option else ""))
     else:
-        parts.append(f"{CERTIFIED}; checked without a solver")
+        parts.append(CERTIFIED if parts else f"{CERTIFIED}; checked without a solver")
     parts += [cut_off] * bool(certificate.cut_off and assessment.verdict == CERTIFIED)
     met = [answer.what for answer in assessment.answers if answer.status == MET]
     return "; ".join([*parts, *[f"{MET}: {', '.join(met)}"] * bool(met)])
@@ -591,8 +594,8 @@ def remarks_on(structure: Structure) -> list[str]:
     read, some = structure.graph.read, structure.graph.n_edges > 0
     remarks = (
         (structure.undirected and some, "undirected"),
-        (structure.all_positive and some, "all weights positive"),
-        (not structure.sign_symmetric, "sign-asymmetric"),
+        (structure.all_positive and some, _POSITIVE),
+        (not structure.sign_symmetric, _ASYMMETRIC),
         (not some, "no edges, is this the right file?"),
         (read["duplicates"] != "refused", f"duplicates {read['duplicates']}"),
         (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
