@@ -129,8 +129,10 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
     return request
 
 
-def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
+def _limits(entry: Any, protocol: Protocol) -> GainLimits:
     """Return limits of the gain, or refuse them."""
+    if not isinstance(entry, Limits):
+        raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
     limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
     if limits.ideal:
         raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
