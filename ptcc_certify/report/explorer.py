@@ -25,7 +25,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from lmi.exact.decimal_rounding import down
-from ptcc_certify.bounds.final_state import exact_initial_state, final_state
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
@@ -251,10 +251,10 @@ class Explorer:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         structure, n = base.structure, base.graph.n_nodes
         draws = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
-        x0 = exact_initial_state(structure, draws[0])
+        x0 = [Fraction(x) for x in draws[0]]
         more: dict[str, Any] = {}
         if (sliding := protocol.reaching) is not None:
-            sigma0 = exact_initial_state(structure, draws[1] if settings.reaching else [0] * n)
+            sigma0 = [Fraction(x) for x in (draws[1] if settings.reaching else [0] * n)]
             base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(sliding, sigma0))
             more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, sliding, n)}
         run = simulate(base.graph, protocol, [float(x) for x in x0], samples=_SAMPLES, **more)

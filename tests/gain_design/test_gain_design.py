@@ -22,7 +22,7 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bo
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -80,7 +80,7 @@ def assert_holds_in_simulations(graph, found, R):
     )
     vertices = center[:, None] + rng.choice([-1.0, 1.0], (graph.n_nodes, 20)) * radius[:, None]
     states = np.column_stack([found.worst.x0, vertices])
-    cap = None if found.limits is None else Actuator(gain_cap=found.limits.gain_cap)
+    cap = None if found.limits is None else GainLimits(gain_cap=found.limits.gain_cap)
     run = simulate(graph, found.protocol, states, actuator=cap, past=0)
     before = np.abs(run.input[..., run.t < float(found.deadline)])
     largest = np.linalg.norm(before, axis=0).max() if found.asked.input_norm == 2 else before.max()

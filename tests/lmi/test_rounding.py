@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify import Actuator, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
+from ptcc_certify import GainLimits, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
@@ -80,7 +80,7 @@ def made(k: int) -> Certificate:
         return certify(graph, robust, x0, sigma0=[x / 3 for x in x0], simulation=False)
     protocol = NominalProtocol(T="7/3", rho1="1/3", rho2=["1/7", "3/2", 9][k % 3], kappa=1)
     more: dict[str, Any] = {"initial_set": "1/3"} if k % 5 == 1 else {}
-    limits = [Actuator(gain_cap="100/3"), Actuator(stop_before="1/7")]
+    limits = [GainLimits(gain_cap="100/3"), GainLimits(stop_before="1/7")]
     return certify(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
 
 
