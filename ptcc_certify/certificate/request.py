@@ -83,6 +83,8 @@ class Request:
         Seconds that the searches were given, infinity for no limit.
     expectations : Expectations
         What is asked besides; what became of it is part of ``assessment``.
+    scenario : mapping or None
+        The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
     """
 
     method: str = "best"
@@ -93,6 +95,7 @@ class Request:
     noise: Fraction | None = None
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
+    scenario: Mapping[str, Any] | None = None
 
 
 def refuse(
@@ -122,6 +125,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
         time_limit=60 + n // 1000 if seconds is None else seconds,
         expectations=arguments["expectations"] or Expectations(),
+        scenario=arguments["scenario"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:

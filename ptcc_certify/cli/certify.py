@@ -8,6 +8,7 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("graph")
+@shared.graph_argument
 @shared.protocol_options
 @shared.output_option
 @shared.json_option
@@ -84,7 +85,7 @@ def _requests(options: shared.Options) -> dict[str, Any]:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
     more: dict[str, Any] = {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
     more |= {"initial_set": options["initial_bound"]}
-    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most)}
+    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
         limits = [] if actuator is None else [actuator]

@@ -6,13 +6,13 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.options import expect_option, json_option, read, reading_options
+from ptcc_certify.cli.options import expect_option, graph_argument, json_option, read, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, screen_options
 from ptcc_certify.errors import ExitCode
 
 
 @click.command()
-@click.argument("graph")
+@graph_argument
 @expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @json_option
 @screen_options

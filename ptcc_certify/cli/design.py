@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.cli.options import Options, flag_of, json_option, number_option, output_option, read, reading_options
+from ptcc_certify.cli.options import (
+    Options,
+    flag_of,
+    graph_argument,
+    json_option,
+    number_option,
+    output_option,
+    read,
+    reading_options,
+)
 from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.report.text_layout import wrap_command
@@ -20,7 +29,7 @@ _EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadli
 
 
 @click.command()
-@click.argument("graph")
+@graph_argument
 @number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
 @number_option("--initial-bound", metavar="R", help="Needed. All initial states with |x_k(0)| <= R.")
 @number_option("--deadline", metavar="T", help="Ask for this deadline ..")

@@ -214,7 +214,8 @@ def _short_final_state(certificate: Certificate) -> Lines:
 def _bounds(certificate: Certificate) -> Lines:
     """Tell how near the agents are by when, and how large the input gets."""
     if certificate.constant:
-        yield "error", "none: no agent listens to another, each keeps its state"
+        invariant = "its state" if certificate.direct else "x - sigma"
+        yield "error", f"none: no agent listens to another, each keeps {invariant}"
         return
     norm, agents = _error_texts(certificate)
     if norm:

@@ -543,7 +543,7 @@ def test_what_was_merged_dropped_or_mirrored_is_said():
     assert data["graph"]["edges"] == [["b", "a", "3"], ["a", "b", "3"]]
     read = {"orientation": "information", "duplicates": "sum", "self_loops": "dropped 1", "undirected": True}
     assert data["graph"]["read"] == read
-    screen = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected").out
+    screen = ptcc("classify", "g.csv", "--duplicates", "sum", "--drop-self-loops", "--undirected", "-v").out
     assert "duplicates sum" in screen and "self-loops dropped 1" in screen and "undirected" in screen
 
 
@@ -561,7 +561,7 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
         assert data["graph"]["nodes"] == LABELS
     assert len(ptcc("certify", name).out.splitlines()) <= 24
     run = ptcc("simulate", name, "--samples", "2")
-    assert next(csv.reader(io.StringIO(run.out))) == ["t", "remaining", *LABELS]
+    assert next(csv.reader(io.StringIO(run.out))) == ["t", "remaining", *LABELS, *(f"u({x})" for x in LABELS)]
     items = [f"{label}={k}".replace('"', '""') for k, label in enumerate(LABELS)]
     run = ptcc("certify", name, "--json", "--x0", ",".join(f'"{item}"' for item in items))
     assert one_object(run.out)["initial_state"] == {label: str(k) for k, label in enumerate(LABELS)}
@@ -659,8 +659,10 @@ def test_simulate_prints_csv_up_to_the_deadline_and_past_it():
     run = ptcc("simulate", "fig1b", "--T", "0.6", "--x0", X0, "--samples", "50")
     assert run.code == 0 and run.err == ""
     header, rows = table(run.out)
-    assert header == ["t", "remaining", *"123456"]
-    t, remaining, states = rows[:, 0], rows[:, 1], rows[:, 2:]
+    assert header == ["t", "remaining", *"123456", *(f"u({k})" for k in "123456")]
+    t, remaining, states, inputs = rows[:, 0], rows[:, 1], rows[:, 2:8], rows[:, 8:]
+    L, gain = load_graph("fig1b").laplacian().toarray(), 1 + 2 / 0.6  # rho1 + rho2 kappa / T
+    assert inputs[0] == pytest.approx(-gain * L @ states[0])
     assert (np.diff(t) >= 0).all() and t[0] == 0 and t[-1] > 0.6
     assert (np.diff(remaining) <= 0).all() and remaining[0] == 1 and remaining[-1] == 0
     assert remaining[remaining > 0].min() == pytest.approx(1e-8)
@@ -679,7 +681,7 @@ def test_simulate_without_a_deadline_is_the_plain_exponential():
     L = load_graph("fig1b").laplacian().toarray()
     start = np.array([float(x) for x in X0.split(",")])
     for row in rows[::20]:
-        assert row[2:] == pytest.approx(expm(-0.7 * row[0] * L) @ start, abs=1e-8)
+        assert row[2:8] == pytest.approx(expm(-0.7 * row[0] * L) @ start, abs=1e-8)
 
 
 def test_simulate_agents_of_two_dimensions():
@@ -687,9 +689,9 @@ def test_simulate_agents_of_two_dimensions():
     both = ptcc("simulate", "fig1a", "--dimension", "2", "--x0", "5,1,2,2,-4,3,3,4,-2,5,1,6")
     first, second = (ptcc("simulate", "fig1a", "--x0", x0) for x0 in (X0, "1,2,3,4,5,6"))
     header, rows = table(both.out)
-    assert header == ["t", "remaining", *(f"{k}[{c}]" for k in range(1, 7) for c in (1, 2))]
+    assert header[:14] == ["t", "remaining", *(f"{k}[{c}]" for k in range(1, 7) for c in (1, 2))]
     for component, alone in enumerate((first, second)):
-        assert rows[:, 2 + component :: 2] == pytest.approx(table(alone.out)[1][:, 2:], abs=1e-7)
+        assert rows[:, 2 + component : 14 : 2] == pytest.approx(table(alone.out)[1][:, 2:8], abs=1e-7)
     assert ptcc("simulate", "fig1a", "--dimension", "3").code == 0
 
 
@@ -790,9 +792,8 @@ def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     assert "not certified with this period; with 0.00" in coarse.out and coarse.code == 4
     assert "verdict    left open: limits (certified with a period of 0.00" in coarse.out
     rows = ptcc("simulate", "fig1a", "--gain-cap", "20", "--samples", "11").out.splitlines()
-    assert (
-        rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines() and rows[0] == "t,remaining,1,2,3,4,5,6"
-    )
+    assert rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines()
+    assert rows[0].startswith("t,remaining,1,2,3,4,5,6,u(1),")
 
 
 def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.edge_list import column, records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
@@ -299,8 +299,8 @@ def _in_node_order(
     state: dict[str, Fraction] = {}
     for label, text, place in pairs:
         if label not in graph.index:
-            nodes = _some(graph.labels)
-            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph; its nodes are {nodes}')
+            hint = did_you_mean(label, graph.labels) or f"; its nodes are {_some(graph.labels)}"
+            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph{hint}')
         if label in state:
             raise refusal(f"{place}: node {shorten(label)} has two values; keep one")
         try:
