@@ -16,8 +16,6 @@ from ptcc_certify.cli.terminal import FIGURES, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError, PTCCError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.structure import Structure
     from ptcc_certify.protocols import Protocol
@@ -82,7 +80,7 @@ def plot(graph: str, what: str | None, output: str | None, **options: Any) -> in
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, memory: float) -> Axes:
+def _of_certificate(path: str, what: str, memory: float) -> Any:
     """Draw a figure of a certificate's file."""
     from ptcc_certify.certificate.certificate import read_certificate
 
@@ -100,7 +98,7 @@ def _of_certificate(path: str, what: str, memory: float) -> Axes:
     return _drawn(what, certificate.structure, certificate.protocol, certificate.trajectory, certificate)
 
 
-def _of_graph(path: str, what: str, options: shared.Options) -> Axes:
+def _of_graph(path: str, what: str, options: shared.Options) -> Any:
     """Draw a figure of a graph: as it is, simulated, or for its decay certified."""
     from ptcc_certify.certificate.procedure import STEPS, certify
     from ptcc_certify.graphs.structure import analyse
@@ -127,7 +125,7 @@ def _drawn(
     protocol: Protocol,
     run: Trajectory | None = None,
     certificate: Certificate | None = None,
-) -> Axes:
+) -> Any:
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
