@@ -100,7 +100,7 @@ class HypothesisError(PTCCError, ValueError):
 
     Examples
     --------
-    >>> unbalanced_lyapunov(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]))
+    >>> ptcc.theorems.lemmas.unbalanced_lyapunov(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]))
     Traceback (most recent call last):
     ptcc_certify.errors.HypothesisError: Lemma 3.2 asks for a structurally unbalanced graph; this one is balanced
     """
@@ -112,7 +112,7 @@ class SimulationError(PTCCError, RuntimeError):
     Examples
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> held = Actuator(sample_period="0.001", gain_cap=2_000_000)  # far too long for such a gain
+    >>> held = GainLimits(sample_period="0.001", gain_cap=2_000_000)  # far too long for such a gain
     >>> simulate(foes, NominalProtocol(T=1, rho1=1_000_000, rho2=1, kappa=1), [3, 1], actuator=held)
     Traceback (most recent call last):
     ptcc_certify.errors.SimulationError: the sampled run grows beyond the range of floats; take a shorter sample_period

@@ -62,6 +62,18 @@ def ptcc(*args: str, stdin: bytes = b"") -> Run:
     return Run(code, *texts)
 
 
+def detailed(*args: str) -> Run:
+    """Call ``ptcc .. -v``; of what it prints, lines that continue another are joined to it."""
+    run = ptcc(*args, "-v")
+    lines: list[str] = []
+    for line in run.out.splitlines():
+        if line.startswith(" " * 11) and lines:
+            lines[-1] += " " + line.strip()
+        else:
+            lines.append(line)
+    return Run(run.code, "\n".join(lines) + "\n", run.err)
+
+
 def write(files: Sequence[tuple[str, Content]], folder: Path) -> None:
     for name, content in files:
         path = folder / name
@@ -320,7 +332,7 @@ INPUT = [
     _input("design without a deadline", "--deadline", "--max-input", "1", "--initial-bound", "1", command="design"),
     _input(
         "design with both deadlines",
-        "one of the two",
+        "ask for two things",
         "--max-input",
         "1",
         "--initial-bound",

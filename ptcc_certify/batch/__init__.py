@@ -85,10 +85,10 @@ def certify_many(
 
     Returns
     -------
-    list of dict
-        The rows in the order of ``sources``, with the columns that :mod:`ptcc_certify.batch.rows` lists; ``None`` where
-        an entry is empty. An exception that ends the work, an interrupt too, has those so far in its attribute
-        ``rows``.
+    Table
+        A list of rows, each a dict, in the order of ``sources``, with the columns that :mod:`ptcc_certify.batch.rows`
+        lists; ``None`` where an entry is empty. ``to_pandas()`` makes a DataFrame of it. An exception that ends the
+        work, an interrupt too, has those so far in its attribute ``rows``.
 
     Raises
     ------

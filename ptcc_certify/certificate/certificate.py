@@ -202,8 +202,7 @@ class Certificate(Content, Shown):
             for name in set(_side_files(document)):
                 if not (path.parent / name).exists():
                     shutil.copyfile(self.source.path.parent / name, path.parent / name)
-        # What UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape.
-        write_atomically(path, _json(document).encode("utf-8", "backslashreplace"))
+        write_atomically(path, _bytes(document))
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
         """Return the JSON and the contents of its side files, as the independent check takes them.
@@ -307,14 +306,16 @@ def read_certificate(
     >>> saved.with_simulation(samples=11).comparison.violated
     False
     """
-    if isinstance(path, Certificate | Mapping):
-        with TemporaryDirectory() as folder:
-            file = Path(folder, "certificate.json")
-            if isinstance(path, Certificate):
-                path.save(file)
-            else:
-                write_atomically(file, _json(dict(path)).encode("utf-8", "backslashreplace"))
-            return read_certificate(file, stdlib=stdlib, memory=memory)
+    if isinstance(path, Certificate):
+        with TemporaryDirectory() as folder:  # for its side files
+            path.save(Path(folder, "certificate.json"))
+            return read_certificate(Path(folder, "certificate.json"), stdlib=stdlib, memory=memory)
+    if isinstance(path, Mapping):
+        document, report = read_and_check(path, stdlib=stdlib, memory=memory)
+        file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
+        if not report.accepted:
+            raise RejectedCertificate(file, report)
+        return Certificate(**read_document(file, document, sha256, report))
     path = Path(path)
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)
@@ -343,3 +344,8 @@ def _side_files(value: Any) -> Iterator[str]:
 
 def _json(document: dict[str, Any]) -> str:
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _bytes(document: dict[str, Any]) -> bytes:
+    """Return the file: what UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape."""
+    return _json(document).encode("utf-8", "backslashreplace")

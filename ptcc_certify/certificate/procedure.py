@@ -91,7 +91,7 @@ def certify(
     method: str = "best",
     at: Any = None,
     initial_set: Any = None,
-    limits: Sequence[Limits] = (),
+    limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
@@ -126,7 +126,7 @@ def certify(
     initial_set : InitialSet or positive number, optional
         The set of initial states for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
         ``||X(0)||_inf <= R``.
-    limits : sequence of GainLimits
+    limits : GainLimits or sequence of GainLimits
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
         With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
@@ -176,6 +176,7 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
+    limits = [limits] if isinstance(limits, Limits) else list(limits)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])

@@ -123,7 +123,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
-        time_limit=60 + n / 1000 if seconds is None else seconds,
+        time_limit=60 + n // 1000 if seconds is None else seconds,
         expectations=arguments["expectations"] or Expectations(),
         scenario=arguments["scenario"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
@@ -133,8 +133,10 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
     return request
 
 
-def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
+def _limits(entry: Any, protocol: Protocol) -> GainLimits:
     """Return limits of the gain, or refuse them."""
+    if not isinstance(entry, Limits):
+        raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
     limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
     if limits.ideal:
         raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")

@@ -149,6 +149,10 @@ protocol_options = _options(
     click.option("--rho1", metavar="NUMBER", default="1", help="Constant part of the gain."),
     click.option("--rho2", metavar="NUMBER", default="1", help="Factor of the growing part of the gain."),
     click.option("--kappa", metavar="NUMBER", default="2", help="Exponent of the time scaling."),
+    click.option(
+        "--x0", metavar="STATE", default="random", help="Initial state: 5,2,-4 | label=value,... | FILE.csv | random"
+    ),
+    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of random initial states."),
     *(
         click.option(flag_of(name), name, metavar="NUMBER", help=f"{text}  [default: {value}]")
         for name, (value, text) in _SLIDING.items()
@@ -162,10 +166,6 @@ protocol_options = _options(
     click.option(
         "--sigma0", metavar="STATE", help="Sliding mode: like --x0; 0 leaves no reaching phase.  [default: 0]"
     ),
-    click.option(
-        "--x0", metavar="STATE", default="random", help="Initial state: 5,2,-4 | label=value,... | FILE.csv | random"
-    ),
-    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of random initial states."),
 )
 limit_options = _options(
     number_option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
@@ -275,19 +275,16 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
             return [Fraction(0)] * graph.n_nodes
     except NumberError:
         pass
-    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: ")
+    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: sigma(0)")
 
 
-def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    """Return the initial state that ``--x0`` gives, or draw one."""
+def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:
+    """Return the initial state that ``--x0`` gives, or ``sigma(0)`` that ``--sigma0`` gives, or draw one."""
     from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 == "random":
         return [x for (x,) in random_states(seed, graph.n_nodes)]
-    try:
-        return read_state(x0, graph)
-    except PTCCError as error:
-        raise type(error)(f"{option}{error}") from None
+    return read_state(x0, graph, name)
 
 
 def read_initial_states(options: Options, graph: SignedDigraph) -> Any:

@@ -73,11 +73,11 @@ class Protocol(Parameters, ABC):
         return None
 
     @abstractmethod
-    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
         """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "ode"}``, with ``"p"`` for disturbances."""
 
     @abstractmethod
-    def latex(self, graph: SignedDigraph | None = None) -> str:
+    def latex(self, graph: Any = None) -> str:
         """Return the protocol in LaTeX, printed from its expressions: of an agent k, or of every agent of a graph."""
 
     def _repr_latex_(self) -> str:

@@ -537,7 +537,11 @@ class StateDependent(Disturbance):
         ParameterError
             The function does not return N numbers; or names agent, time and value beyond ``delta``.
         """
-        value = self.function(t, x, sigma)
+        try:
+            value = self.function(t, x, sigma)
+        except TypeError as error:
+            mend = "give a function of (t, x, sigma)"
+            raise ParameterError(f"{self.text} at t = {t:.9g}: {shorten(str(error), 120)}; {mend}") from None
         try:
             values = np.array(value, dtype=float)
         except (TypeError, ValueError, OverflowError):

@@ -33,9 +33,9 @@ class NominalProtocol(Protocol):
     ----------
     T, rho1, kappa : int, float, str or Fraction
         Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
-        1/time/weight. By default 1, 1 and 2, as on the command line.
+        1/time/weight. The defaults are those of the command line.
     rho2 : int, float, str or Fraction
-        Not negative, 1/weight; by default 1.
+        Not negative, 1/weight.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class NominalProtocol(Protocol):
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64
 
-    def input(self, graph: SignedDigraph, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
+    def input(self, graph: Any, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
         """Return ``u = gain(t) E``, ``E = -L x``, as a CasADi expression.
 
         Parameters
@@ -88,7 +88,7 @@ class NominalProtocol(Protocol):
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         return self.gain.expression(t) * coupling(graph, x)
 
-    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
         """Return ``x' = u`` on ``graph`` as CasADi's ``{"t", "x", "ode"}``, for ``casadi.integrator`` (before ``T``).
 
         Examples
@@ -103,7 +103,7 @@ class NominalProtocol(Protocol):
         x, t = symbols("x", graph), ca.SX.sym("t")
         return {"t": t, "x": x, "ode": self.input(graph, x, t)}
 
-    def latex(self, graph: SignedDigraph | None = None) -> str:
+    def latex(self, graph: Any = None) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions: for an agent k, or for every agent of a graph.
 
         Parameters

@@ -75,6 +75,11 @@ class Parameters:
     def replace(self, **changes: Exact) -> Self:
         """Return the same with other values of some parameters.
 
+        Parameters
+        ----------
+        **changes : int, float, str or Fraction
+            By the names of the parameters.
+
         Raises
         ------
         ParameterError

@@ -16,8 +16,6 @@ from ptcc_certify.protocols.parameters import NotNegative, Positive, readable
 if TYPE_CHECKING:
     import casadi as ca
 
-    from ptcc_certify.graphs.digraph import SignedDigraph
-
 
 @dataclass(frozen=True, repr=False)
 class SlidingModeProtocol(ReachingProtocol):
@@ -28,6 +26,8 @@ class SlidingModeProtocol(ReachingProtocol):
 
     ``u^nom`` is the nominal protocol with the deadline ``T = T_r + T_s``. Whatever the disturbance, every sliding
     variable is 0 from ``T_r`` on, and the agents settle at ``T``.
+
+    The defaults of the parameters are those of the command line.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class SlidingModeProtocol(ReachingProtocol):
 
     def input(
         self,
-        graph: SignedDigraph,
+        graph: Any,
         x: ca.SX | None = None,
         varsigma: ca.SX | None = None,
         t: ca.SX | None = None,
@@ -110,7 +110,7 @@ class SlidingModeProtocol(ReachingProtocol):
             self.nominal.input(graph, x, t), sigma, float(self.mu1), self.reaching_gain.expression(t)
         )
 
-    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
         """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "p", "ode"}``.
 
         ``x`` stacks states and auxiliary variables, ``p`` holds the disturbances, and ``ode`` is ``(u + d, -u^nom)``.
@@ -135,7 +135,7 @@ class SlidingModeProtocol(ReachingProtocol):
             "ode": ca.vertcat(motion, -self.nominal.input(graph, x, t)),
         }
 
-    def latex(self, graph: SignedDigraph | None = None) -> str:
+    def latex(self, graph: Any = None) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions; see :meth:`NominalProtocol.latex`.
 
         Parameters

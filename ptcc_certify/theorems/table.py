@@ -51,12 +51,17 @@ def theorem_for(graph: Any, protocol: str | Protocol = "nominal") -> Theorem:
     ----------
     graph : graph-like or Structure
         Whatever :func:`ptcc_certify.as_graph` takes.
-    protocol : {"nominal", "sliding-mode"} or a protocol
+    protocol : {"nominal", "sliding-mode"} or Protocol
 
     Returns
     -------
     Theorem
         One of :data:`THEOREMS`.
+
+    Raises
+    ------
+    ParameterError
+        No protocol is called so.
 
     Examples
     --------

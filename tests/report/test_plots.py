@@ -31,7 +31,7 @@ from ptcc_certify.gain_design import design
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.nominal import NominalProtocol
 from ptcc_certify.report.plots.agents import AGENT, CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
@@ -160,7 +160,7 @@ def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
 
 def test_the_peak_is_drawn_where_it_holds_only() -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
-    protocol, capped = EXAMPLES[2].protocol(), Actuator(gain_cap="0.5")
+    protocol, capped = EXAMPLES[2].protocol(), GainLimits(gain_cap="0.5")
     cert = certify(graph, protocol, start, limits=[capped], simulation=False)
     assert cert.effort is not None and cert.effort.peak is not None
     own = float(cert.effort.residual[0].largest or 0)
@@ -168,8 +168,8 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
     expected = [
         ({}, peak),
         ({"actuator": capped}, own),
-        ({"actuator": Actuator(gain_cap=50)}, peak),
-        ({"actuator": Actuator(sample_period="0.01", stop_before="0.05")}, None),
+        ({"actuator": GainLimits(gain_cap=50)}, peak),
+        ({"actuator": GainLimits(sample_period="0.01", stop_before="0.05")}, None),
         ({"disturbance": "sin(k*t)", "delta": 1, "actuator": capped}, None),
     ]
     assert 0 < own < peak
@@ -632,8 +632,8 @@ def test_the_energy_is_that_of_the_closed_form_or_refused(gains: tuple[float, ..
 
 
 @pytest.mark.parametrize("size", [1e299, 1e154])
-@pytest.mark.parametrize("actuator", [None, Actuator(gain_cap=50), Actuator(sample_period="0.05")])
-def test_an_energy_beyond_floats_is_refused_without_a_warning(size: float, actuator: Actuator | None) -> None:
+@pytest.mark.parametrize("actuator", [None, GainLimits(gain_cap=50), GainLimits(sample_period="0.05")])
+def test_an_energy_beyond_floats_is_refused_without_a_warning(size: float, actuator: GainLimits | None) -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     run = simulate(pair, PROTOCOL, [size, 0], actuator=actuator)
     with pytest.raises(ValueError, match="the energy is beyond the range of floats"):

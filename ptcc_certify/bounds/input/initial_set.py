@@ -11,7 +11,7 @@ from ptcc_certify.checker.input_formulas import InitialSet, Linear
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.io import as_graph, by_label, in_node_order
 from ptcc_certify.graphs.io.initial_state import LARGEST_STATE
-from ptcc_certify.graphs.rationals import as_fraction, writable
+from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.structure import Structure
 
 
@@ -128,9 +128,11 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: Any = None) -> InitialSet
 
 def _without_labels(values: Any, graph: Any, name: str) -> Any:
     if graph is not None:
-        return in_node_order(values, as_graph(graph), name)
-    if by_label(values, name) is not None:
+        values = in_node_order(values, as_graph(graph), name)
+    elif by_label(values, name) is not None:
         raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
+    if isinstance(values, str) or not hasattr(values, "__len__"):
+        raise ParameterError(f"{name} is {shorten(repr(values))}; give one number for each agent")
     return values
 
 

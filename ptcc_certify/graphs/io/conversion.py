@@ -93,15 +93,14 @@ def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, 
     if not hasattr(table, "columns") or not hasattr(table, "to_numpy"):
         return None
     names = [str(name) for name in table.columns]
-    if labels_beside(table) == names:
-        return None
+    if set(labels_beside(table) or ()) == set(names):
+        return None  # an adjacency matrix
     if (columns := header(names, "the DataFrame")) is None:
-        if len(names) != len(table):
-            raise GraphError(
-                f"a DataFrame of {len(table)} rows and the columns {', '.join(map(shorten, names[:5]))} is no graph; "
-                "name its columns source, target, weight, or give a square adjacency matrix"
-            )
-        return None
+        titles = ", ".join(map(shorten, names[:5])) + (", ..." if len(names) > 5 else "")
+        raise GraphError(
+            f"a DataFrame with the columns {titles} is no graph; name them source, target, weight, or give an "
+            "adjacency matrix with the same labels on rows and columns"
+        )
     parts = [list(table[table.columns[i]]) for i in columns]
     for what, column in zip(("source", "target"), parts, strict=False):
         for row, label in enumerate(column, 1):

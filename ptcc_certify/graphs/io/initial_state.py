@@ -124,7 +124,9 @@ def _checked(value: Any, label: str, name: str) -> Fraction:
     return value
 
 
-def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
+def read_state(
+    text_or_path: str | os.PathLike[str], graph: SignedDigraph, name: str = "initial state"
+) -> list[Fraction]:
     """Read one exact number for each node of a graph.
 
     Parameters
@@ -134,6 +136,8 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
         whole (``"a,b=1"``); or the path of a file with rows ``node,value`` (header optional, separators, comments
         and quotes as in an edge list).
     graph : SignedDigraph
+    name : str
+        What messages call it.
 
     Returns
     -------
@@ -155,7 +159,7 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
     """
     if not isinstance(text_or_path, str) or os.path.isfile(text_or_path):  # noqa: PTH113 - Path.is_file may raise
         return _state_of_file(text_or_path, graph)
-    place = f'initial state "{shorten(text_or_path)}"'
+    place = f'{name} "{shorten(text_or_path)}"'
     try:
         items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
     except csv.Error as error:
