@@ -18,6 +18,7 @@ from ptcc_certify.cli.options import (
     read,
     reading_options,
 )
+from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.report.text_layout import wrap_command
@@ -64,7 +65,9 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
         answer = run(signed, input_norm=2 if options["input_norm"] else None, **request)
     LOG.info("%s", one_line(f"{answer.verdict}: {answer.binding}"))
     if output and answer.certificate is not None:
-        answer.certificate.save(output)
+        scenario = scenario_record()
+        recorded = answer.certificate.changed(scenario=scenario) if scenario else answer.certificate
+        recorded.save(output)
     if curve:
         _save_curve(answer, curve)
     command = _certify_command(answer, graph, options)

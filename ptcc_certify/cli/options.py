@@ -132,7 +132,9 @@ reading_options = _options(
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
 )
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
-graph_argument = click.argument("graph", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED))
+graph_argument = click.argument(
+    "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED)
+)
 graph_options = _options(graph_argument, reading_options)
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
 protocol_options = _options(

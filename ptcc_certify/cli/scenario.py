@@ -340,9 +340,6 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
     scenario: Scenario | None = context.meta.get(MEMORY)
     if scenario is None:
         return error
-    if isinstance(error, click.MissingParameter) and error.param is not None:
-        mend = f"write it, or give {error.param.opts[0]}"
-        return ParameterError(f"{scenario.place(error.param.name or '')}: is missing; {mend}")
     if isinstance(error, click.BadParameter):
         option, text = (error.param.name if error.param else None) or "", error.message
     else:

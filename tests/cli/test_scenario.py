@@ -78,8 +78,10 @@ def test_the_certificate_records_its_scenario_and_what_overrode_it():
 def test_a_scenario_gives_what_flags_would_give():
     flags = ("--T", "2", "--rho1", "0.1", "--x0", "ann=5,bob=2,eve=4.25,dan=-1/3")
     assert ptcc("simulate", write()).out == ptcc("simulate", "my data/team.csv", *flags).out
-    design = ptcc("design", write(), "--initial-bound", "5")
+    design = ptcc("design", write(), "--initial-bound", "5", "-o", "d.json")
     assert design.code == 0 and "--max-input 1000" in design.out
+    assert json.loads(Path("d.json").read_text())["unverified"]["scenario"]["design"] == {"deadline": "1"}
+    assert ptcc("check", "d.json", "s.toml").code == 0
     x0 = '"x0.csv"'
     Path("x0.csv").write_text("ann,5\nbob,2\neve,17/4\ndan,-1/3\n")
     for state in (x0, "[5, 2, 4.25, '-1/3']"):
@@ -90,8 +92,8 @@ def test_a_scenario_gives_what_flags_would_give():
 @pytest.mark.parametrize("order", [("s.toml", "--protocol", "sliding-mode"), ("--protocol", "sliding-mode", "s.toml")])
 def test_a_flag_that_changes_the_protocol_leaves_out_the_parameters_of_the_other_one(order: tuple[str, ...]):
     write()
-    run = ptcc("certify", *order)
-    assert run.code == 0 and "sliding-mode: T_r 0.5, T_s 0.5, rho1 0.1" in run.out
+    protocol = json.loads(ptcc("certify", *order, "--json").out)["protocol"]
+    assert [protocol[name] for name in ("kind", "T_r", "rho1")] == ["sliding-mode", "1/2", "1/10"]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +140,6 @@ def test_what_is_wrong_with_a_scenario_is_told_by_section_and_key(old: str, new:
 def test_a_flag_that_is_wrong_is_told_as_the_flag():
     run = ptcc("certify", write(), "--T", "-3")
     assert run.err.startswith("ptcc: T = -3 is outside its domain")
-    assert "s.toml: [initial_state] initial_bound: is missing" in ptcc("design", write()).err
 
 
 @pytest.mark.parametrize(
