@@ -61,7 +61,7 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
     from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.report.plots.style import save_figure
 
-    certified = kind_of(graph) == "a certificate"
+    certified = kind_of(graph) in ("a certificate", "JSON")
     what = what or ("decay" if certified else "graph")
     output = output or f"{PurePath(graph).stem.lstrip('-') or 'graph'}-{what}.png"
     if PurePath(output).suffix.lower() not in FIGURES:
