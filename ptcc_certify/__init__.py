@@ -7,95 +7,72 @@ p = ptcc.NominalProtocol(T=0.6, rho1=0.1, rho2=0.3, kappa=1)
 cert = ptcc.certify(g, p, x0=[5, 2, -4, 3, -2, 1])
 cert.save("certificate.json")
 
+The names at the top, by topic:
+
+- Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
+- Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
+  ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
+- Runs: ``simulate``, ``Trajectory``
+- Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
+- Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
+- Many graphs: ``Ensemble``, ``certify_many``
+- Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
+  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``save_figure``,
+  ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+- Reports: ``write_report``, ``explore``
+- Errors: ``PTCCError``
+
+Everything else is in the rooms of the package, which are loaded when they are named: ``ptcc.errors.GraphError``,
+``ptcc.theorems.lemmas.gauge``, ``ptcc.bounds.behaviours.is_stability``.
+
 .. [Zhu] Z.-H. Zhu, H. Wu, Z.-H. Guan, Z.-W. Liu, Y. Chen, X. Zheng: Robust prescribed-time coordination control of
    cooperative-antagonistic networks with disturbances, manuscript; ``ptcc cite`` prints the BibTeX entry.
 """
 
+from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from typing import Any
 
 _EXPORTS = {
-    "PTCCError": "errors",
-    "NumberError": "errors",
-    "GraphError": "errors",
-    "FormatError": "errors",
-    "ParameterError": "errors",
-    "HypothesisError": "errors",
-    "SimulationError": "errors",
+    # Graphs
     "SignedDigraph": "graphs.digraph",
+    "as_graph": "graphs.io",
+    "as_state": "graphs.io",
     "read_graph": "graphs.io",
     "write_graph": "graphs.io",
-    "read_state": "graphs.io",
-    "Structure": "graphs.structure",
-    "Claim": "theorems.claims",
-    "ClosedComponent": "graphs.structure",
-    "WeakComponent": "graphs.structure",
     "analyse": "graphs.structure",
-    "Gain": "protocols.gain",
-    "prescribed_time_bound": "protocols.gain",
+    "Structure": "graphs.structure",
+    # Protocols, disturbances, actuators
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
     "ExpressionDisturbance": "protocols.disturbance",
     "SampledDisturbance": "protocols.disturbance",
-    "WorstCaseDisturbance": "protocols.disturbance",
     "StateDependent": "protocols.disturbance",
     "telegraph_noise": "protocols.disturbance",
-    "ReachingTime": "protocols.reaching_time",
-    "certified_reaching_times": "protocols.reaching_time",
-    "Trajectory": "simulation.trajectory",
-    "SlidingTrajectory": "simulation.trajectory",
+    "GainLimits": "protocols.gain_limits",
+    # Runs
     "simulate": "simulation.run",
-    "FinalState": "bounds.final_state",
-    "Influence": "bounds.final_state",
+    "Trajectory": "simulation.trajectory",
+    # Certificates
+    "certify": "certificate.procedure",
+    "certify_vectors": "certificate.vector_states",
+    "Certificate": "certificate.certificate",
+    "Expectations": "certificate.request",
+    "read_certificate": "certificate.certificate",
+    "check": "certificate.checking",
+    # Bounds and design
     "final_state": "bounds.final_state",
     "influence": "bounds.final_state",
-    "is_prescribed_time_stable": "bounds.behaviours",
-    "is_stability": "bounds.behaviours",
-    "is_bipartite_consensus": "bounds.behaviours",
-    "is_interval_bipartite_consensus": "bounds.behaviours",
-    "is_bipartite_containment": "bounds.behaviours",
-    "gauge": "theorems.lemmas",
-    "left_vector": "theorems.lemmas",
-    "exact_left_vector": "theorems.lemmas",
-    "laplacian_spectrum": "theorems.lemmas",
-    "algebraic_connectivity": "theorems.lemmas",
-    "unbalanced_lyapunov": "theorems.lemmas",
-    "follower_lyapunov": "theorems.lemmas",
-    "containment_weights": "theorems.lemmas",
-    "exact_containment_weights": "theorems.lemmas",
-    "Envelope": "bounds.envelope",
-    "SlidingEnvelope": "bounds.sliding_envelope",
-    "Comparison": "bounds.envelope",
-    "Certificate": "certificate.certificate",
-    "certify": "certificate.procedure",
-    "Expectations": "certificate.request",
-    "Assessment": "certificate.verdict",
-    "RejectedCertificate": "certificate.certificate",
-    "read_certificate": "certificate.certificate",
-    "report_html": "report.page",
-    "report_latex": "report.statement",
-    "write_report": "report.report_file",
-    "Ensemble": "graphs.ensembles",
-    "certify_many": "batch",
-    "Actuator": "protocols.gain_limits",
-    "GainLimits": "protocols.gain_limits",
-    "InitialSet": "checker.input_formulas",
-    "initial_set_within": "bounds.input.initial_set",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
-    "Effort": "bounds.input.effort",
-    "WorstInitialState": "bounds.input.worst_initial_state",
     "worst_initial_state": "bounds.input.worst_initial_state",
-    "Design": "gain_design",
     "design": "gain_design",
-    "check": "certificate.checking",
-    "CheckReport": "checker",
-    "SymbolicLyapunov": "theorems.symbolic",
-    "symbolic_lyapunov": "theorems.symbolic",
-    "SymbolicSliding": "theorems.symbolic",
-    "symbolic_sliding": "theorems.symbolic",
-    "THEOREMS": "theorems.table",
-    "theorem_for": "theorems.table",
+    # Many graphs
+    "Ensemble": "graphs.ensembles",
+    "certify_many": "batch",
+    # Figures
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",
@@ -106,18 +83,47 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
-    "explore": "report.explorer",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",
+    # Reports
+    "write_report": "report.report_file",
+    "explore": "report.explorer",
+    # Errors
+    "PTCCError": "errors",
 }
-__all__ = sorted(_EXPORTS)
+__all__ = [*_EXPORTS, "__version__"]
+
+
+def modules_of(package: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package: its modules are loaded when they are first named (PEP 562).
+
+    Examples
+    --------
+    >>> ptcc.theorems.lemmas.gauge([("a", "b", -1)]).tolist()
+    [1, -1]
+    """
+
+    def load(name: str) -> Any:
+        if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
+            return import_module(f"{package}.{name}")
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return load
+
+
+_room = modules_of(__name__)
 
 
 def __getattr__(name: str) -> Any:
     if name in _EXPORTS:
         return getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "__version__":
+        try:
+            return version("ptcc-certify")
+        except PackageNotFoundError:
+            return "unknown"
+    return _room(name)
 
 
 def __dir__() -> list[str]:

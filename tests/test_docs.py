@@ -26,23 +26,71 @@ from numpydoc.validate import ERROR_MSGS, validate
 import lmi
 import ptcc_certify
 
-PUBLIC = [(package, name) for package in (ptcc_certify, lmi) for name in package.__all__]
+#: Names of the rooms that are documented like those at the top.
+IN_ROOMS = {
+    "errors": ("NumberError", "GraphError", "FormatError", "ParameterError", "HypothesisError", "SimulationError"),
+    "graphs.io": ("read_state",),
+    "graphs.structure": ("ClosedComponent", "WeakComponent"),
+    "theorems.claims": ("Claim",),
+    "theorems.table": ("THEOREMS", "theorem_for"),
+    "theorems.lemmas": (
+        "gauge",
+        "left_vector",
+        "exact_left_vector",
+        "laplacian_spectrum",
+        "algebraic_connectivity",
+        "unbalanced_lyapunov",
+        "follower_lyapunov",
+        "containment_weights",
+        "exact_containment_weights",
+    ),
+    "theorems.symbolic": ("SymbolicLyapunov", "symbolic_lyapunov", "SymbolicSliding", "symbolic_sliding"),
+    "protocols.gain": ("Gain", "prescribed_time_bound"),
+    "protocols.disturbance": ("WorstCaseDisturbance",),
+    "protocols.reaching_time": ("ReachingTime", "certified_reaching_times"),
+    "simulation.trajectory": ("SlidingTrajectory",),
+    "bounds.final_state": ("FinalState", "Influence"),
+    "bounds.behaviours": (
+        "is_prescribed_time_stable",
+        "is_stability",
+        "is_bipartite_consensus",
+        "is_interval_bipartite_consensus",
+        "is_bipartite_containment",
+    ),
+    "bounds.envelope": ("Envelope", "Comparison"),
+    "bounds.sliding_envelope": ("SlidingEnvelope",),
+    "bounds.input.effort": ("Effort",),
+    "bounds.input.initial_set": ("initial_set_within",),
+    "bounds.input.worst_initial_state": ("WorstInitialState",),
+    "certificate.verdict": ("Assessment",),
+    "certificate.certificate": ("RejectedCertificate",),
+    "checker": ("CheckReport",),
+    "checker.input_formulas": ("InitialSet",),
+    "gain_design": ("Design",),
+    "report.page": ("report_html",),
+    "report.statement": ("report_latex",),
+}
+PUBLIC = [(package, name) for package in (ptcc_certify, lmi) for name in package.__all__ if name != "__version__"]
+PUBLIC += [(import_module(f"ptcc_certify.{module}"), name) for module, names in IN_ROOMS.items() for name in names]
 ROOTS = {"ptcc_certify", "lmi", __name__.split(".")[0]}
 
 
 def of_modules(*modules: str) -> set[str]:
     """Return the public names of modules of these names, whatever their room."""
-    return {name for name, module in ptcc_certify._EXPORTS.items() if set(module.split(".")) & set(modules)}
+    places = [*ptcc_certify._EXPORTS.items(), *((name, room) for room, names in IN_ROOMS.items() for name in names)]
+    return {name for name, module in places if set(module.split(".")) & set(modules)}
 
 
 #: Names that cite nothing, and why.
 NO_SOURCE = {
     "errors state what is wrong with an input, not mathematics": {
-        *(name for name in ptcc_certify.__all__ if name.endswith("Error")),
+        *("PTCCError", *IN_ROOMS["errors"]),
         *("LMIError", "MatrixError", "NoCertificate", "NotAnHMatrix", "NotAnMMatrix", "OutOfTime"),
     },
     "a time limit is what its definition says": {"time_limit"},
-    "files and numbers are converted": {"read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits"},
+    "files and numbers are converted": {
+        *("as_graph", "as_state", "read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits")
+    },
     "figures, pages and tables show what was computed elsewhere": of_modules("plots", "report", "explorer", "batch"),
     "certificates that are read back state what was proved before": {"read_certificate", "RejectedCertificate"},
     "sets of starts are what their definition says": {"InitialSet", "initial_set_within", "box", "ellipsoid"},
@@ -315,7 +363,7 @@ def faults_of_result(function: Any, found: NumpyDocString) -> Iterator[str]:
 
 def is_error(name: str) -> bool:
     """Tell whether a name is a public or built-in exception, or one of another package with its full name."""
-    places: list[Any] = [ptcc_certify, lmi, builtins]
+    places: list[Any] = [ptcc_certify, ptcc_certify.errors, ptcc_certify.certificate.certificate, lmi, builtins]
     if "." in name:
         module, _, name = name.rpartition(".")
         places = [import_module(module)]
@@ -426,7 +474,9 @@ def faults_of_member(function: Any, docs: list[str]) -> Iterator[str]:
 
 def faults_of_constant(package: Any, name: str) -> Iterator[str]:
     """Ask for a comment ``#:`` above a constant where it is defined."""
-    source = Path(inspect.getfile(import_module(f"{package.__name__}.{package._EXPORTS[name]}"))).read_text("utf-8")
+    exports = getattr(package, "_EXPORTS", {})
+    module = import_module(f"{package.__name__}.{exports[name]}") if name in exports else package
+    source = Path(inspect.getfile(module)).read_text("utf-8")
     if not re.search(rf"^#: .*\n([\w, ]+, )?{name}\b.* = ", source, re.MULTILINE):
         yield "a constant without a comment #: above it"
 

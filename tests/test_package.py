@@ -1,15 +1,36 @@
 """Facts about the package as a whole: what it exports, and under which names."""
 
 import pkgutil
+import re
+import subprocess
+import sys
+
+import pytest
 
 import ptcc_certify
 
 
 def test_every_export_is_there_and_stays_what_it_is():
     for name in ptcc_certify.__all__:
-        assert getattr(ptcc_certify, name) is getattr(ptcc_certify, name)
-        assert getattr(ptcc_certify, name).__doc__ or name == "THEOREMS"
+        assert getattr(ptcc_certify, name) == getattr(ptcc_certify, name)
+        assert getattr(ptcc_certify, name).__doc__
     assert set(ptcc_certify.__all__) <= set(dir(ptcc_certify))
+
+
+def test_the_docstring_lists_every_name_at_the_top_and_there_are_few():
+    listed = re.findall(r"``(\w+)``", ptcc_certify.__doc__)
+    assert sorted(listed) == sorted(set(ptcc_certify.__all__) - {"__version__"})
+    assert len(listed) < 50
+
+
+def test_rooms_are_loaded_when_they_are_named():
+    code = (
+        "import sys, ptcc_certify as ptcc; before = 'numpy' in sys.modules; ptcc.theorems.lemmas.gauge; print(before)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "False"
+    assert ptcc_certify.bounds.input.effort.Effort and issubclass(ptcc_certify.errors.GraphError, ValueError)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = ptcc_certify.bounds.nothing
 
 
 def test_no_module_bears_the_name_of_an_export():

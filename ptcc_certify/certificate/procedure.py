@@ -44,6 +44,7 @@ from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
@@ -79,35 +80,39 @@ SETTLED = 1e-6
 
 
 def certify(
-    graph: SignedDigraph,
+    graph: Any,
     protocol: Protocol,
-    x0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    x0: Any = None,
     *,
-    sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    orientation: str | None = None,
+    sigma0: Any = None,
     disturbance: Any = None,
     simulation: bool | None = None,
     method: str = "best",
     at: Any = None,
     initial_set: Any = None,
-    limits: Sequence[Limits] = (),
+    limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
     expectations: Expectations | None = None,
+    scenario: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
 
     Parameters
     ----------
-    graph : SignedDigraph
-        Any signed digraph, disconnected ones included.
+    graph : graph-like
+        Any signed digraph, disconnected ones included, in whatever form :func:`ptcc_certify.as_graph` takes.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
-    x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
-        The initial state, in node order, or by label where there are labels. Without it there is no final state and no
-        simulation.
-    sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+    x0 : state-like, optional
+        The initial state, in node order, or by label where there are labels: whatever :func:`ptcc_certify.as_state`
+        takes. Without it there is no final state and no simulation.
+    orientation : {"information", "listens"}, optional
+        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+    sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
         final state.
     disturbance : Disturbance, str, number, callable or sequence, optional
@@ -121,7 +126,7 @@ def certify(
     initial_set : InitialSet or positive number, optional
         The set of initial states for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
         ``||X(0)||_inf <= R``.
-    limits : sequence of GainLimits
+    limits : GainLimits or sequence of GainLimits
         Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
         With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
     delta : number, optional
@@ -135,6 +140,8 @@ def certify(
         more for every 1,000 nodes.
     expectations : Expectations, optional
         What is asked besides: a behaviour, a rate, a bound of the input. It decides nothing but the ``assessment``.
+    scenario : mapping, optional
+        The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -145,8 +152,9 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong length, with
-        other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond ``delta``.
+        No protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong
+        length, with other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond
+        ``delta``.
 
     References
     ----------
@@ -168,10 +176,13 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
+    limits = [limits] if isinstance(limits, Limits) else list(limits)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
-    request = read_request(structure, protocol, {**options, "time_limit": time_limit, "expectations": expectations})
+    options |= {"time_limit": time_limit, "expectations": expectations, "scenario": scenario}
+    request = read_request(structure, protocol, options)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import Protocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
@@ -32,7 +33,7 @@ class NominalProtocol(Protocol):
     ----------
     T, rho1, kappa : int, float, str or Fraction
         Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
-        1/time/weight.
+        1/time/weight. The defaults are those of the command line.
     rho2 : int, float, str or Fraction
         Not negative, 1/weight.
 
@@ -51,20 +52,20 @@ class NominalProtocol(Protocol):
     """
 
     kind = "nominal"
-    T: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: NotNegative = NotNegative()
-    kappa: Positive = Positive()
+    T: Positive = Positive(1)
+    rho1: Positive = Positive(1)
+    rho2: NotNegative = NotNegative(1)
+    kappa: Positive = Positive(2)
 
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64
 
-    def input(self, graph: SignedDigraph, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
+    def input(self, graph: Any, x: ca.SX | None = None, t: ca.SX | None = None) -> ca.SX:
         """Return ``u = gain(t) E``, ``E = -L x``, as a CasADi expression.
 
         Parameters
         ----------
-        graph : SignedDigraph
+        graph : graph-like
             N agents.
         x : (N, 1) casadi.SX, optional
             The states; symbols ``x1 .. xN`` by default.
@@ -83,10 +84,11 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         return self.gain.expression(t) * coupling(graph, x)
 
-    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
         """Return ``x' = u`` on ``graph`` as CasADi's ``{"t", "x", "ode"}``, for ``casadi.integrator`` (before ``T``).
 
         Examples
@@ -97,15 +99,16 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph), ca.SX.sym("t")
         return {"t": t, "x": x, "ode": self.input(graph, x, t)}
 
-    def latex(self, graph: SignedDigraph | None = None) -> str:
+    def latex(self, graph: Any = None) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions: for an agent k, or for every agent of a graph.
 
         Parameters
         ----------
-        graph : SignedDigraph, optional
+        graph : graph-like, optional
             At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
             numbers; without a graph they are letters.
 
@@ -129,7 +132,7 @@ class NominalProtocol(Protocol):
         g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
         \end{aligned}
         """
-        rows = nominal_rows(graph)
+        rows = nominal_rows(None if graph is None else as_graph(graph))
         return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
@@ -14,8 +15,6 @@ from ptcc_certify.protocols.parameters import NotNegative, Positive, readable
 
 if TYPE_CHECKING:
     import casadi as ca
-
-    from ptcc_certify.graphs.digraph import SignedDigraph
 
 
 @dataclass(frozen=True, repr=False)
@@ -27,6 +26,8 @@ class SlidingModeProtocol(ReachingProtocol):
 
     ``u^nom`` is the nominal protocol with the deadline ``T = T_r + T_s``. Whatever the disturbance, every sliding
     variable is 0 from ``T_r`` on, and the agents settle at ``T``.
+
+    The defaults of the parameters are those of the command line.
 
     Parameters
     ----------
@@ -55,15 +56,15 @@ class SlidingModeProtocol(ReachingProtocol):
     """
 
     kind = "sliding-mode"
-    T_r: Positive = Positive()
-    T_s: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: Positive = Positive()
-    kappa: Positive = Positive()
-    mu1: Positive = Positive()
-    mu2: Positive = Positive()
-    mu3: Positive = Positive()
-    delta: NotNegative = NotNegative()
+    T_r: Positive = Positive("0.5")
+    T_s: Positive = Positive("0.5")
+    rho1: Positive = Positive(1)
+    rho2: Positive = Positive(1)
+    kappa: Positive = Positive(2)
+    mu1: Positive = Positive(2)
+    mu2: Positive = Positive(1)
+    mu3: Positive = Positive(1)
+    delta: NotNegative = NotNegative(1)
 
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:
@@ -80,7 +81,7 @@ class SlidingModeProtocol(ReachingProtocol):
 
     def input(
         self,
-        graph: SignedDigraph,
+        graph: Any,
         x: ca.SX | None = None,
         varsigma: ca.SX | None = None,
         t: ca.SX | None = None,
@@ -89,7 +90,7 @@ class SlidingModeProtocol(ReachingProtocol):
 
         Parameters
         ----------
-        graph : SignedDigraph
+        graph : graph-like
             N agents.
         x, varsigma : (N, 1) casadi.SX, optional
             The states and the auxiliary variables of (47); symbols ``x1 ..`` and ``varsigma1 ..`` by default.
@@ -102,13 +103,14 @@ class SlidingModeProtocol(ReachingProtocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         sigma = x + (symbols("varsigma", graph) if varsigma is None else varsigma)
         return _add_reaching_terms(
             self.nominal.input(graph, x, t), sigma, float(self.mu1), self.reaching_gain.expression(t)
         )
 
-    def closed_loop(self, graph: SignedDigraph) -> dict[str, ca.SX]:
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
         """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "p", "ode"}``.
 
         ``x`` stacks states and auxiliary variables, ``p`` holds the disturbances, and ``ode`` is ``(u + d, -u^nom)``.
@@ -123,6 +125,7 @@ class SlidingModeProtocol(ReachingProtocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, varsigma, d, t = *(symbols(name, graph) for name in ("x", "varsigma", "d")), ca.SX.sym("t")
         motion = self.input(graph, x, varsigma, t) + d
         return {
@@ -132,12 +135,12 @@ class SlidingModeProtocol(ReachingProtocol):
             "ode": ca.vertcat(motion, -self.nominal.input(graph, x, t)),
         }
 
-    def latex(self, graph: SignedDigraph | None = None) -> str:
+    def latex(self, graph: Any = None) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions; see :meth:`NominalProtocol.latex`.
 
         Parameters
         ----------
-        graph : SignedDigraph, optional
+        graph : graph-like, optional
             At most 20 nodes: the rows of every agent, with numbers. Without a graph the row of an agent k, in letters.
 
         Returns
@@ -174,7 +177,7 @@ class SlidingModeProtocol(ReachingProtocol):
             [
                 f"u_{{k}} &= {to_latex(expression)}",
                 rf"\sigma_{{k}} &= {to_latex(sigma)}, \quad \dot\varsigma_{{k}} = -{nominal}",
-                *nominal_rows(graph, r"^{\mathrm{nom}}"),
+                *nominal_rows(None if graph is None else as_graph(graph), r"^{\mathrm{nom}}"),
                 f"g &= {gain}",
                 f"h &= {reaching}",
             ]

@@ -10,3 +10,7 @@ templates of the page; :mod:`~ptcc_certify.report.statement` is the LaTeX. Both 
 :mod:`~ptcc_certify.report.notation`, which rounds what was proved to the safe side, and figures from
 :mod:`~ptcc_certify.report.figures`. This package itself loads none of them: the screen needs no template.
 """
+
+from ptcc_certify import modules_of
+
+__getattr__ = modules_of(__name__)

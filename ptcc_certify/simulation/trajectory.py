@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.display_hook import Shown, plot
+from ptcc_certify.graphs.equality import ByValue
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.tables import import_pandas
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol, ReachingProtocol
     from ptcc_certify.protocols.gain_limits import GainLimits
@@ -23,7 +28,7 @@ RESOLVED = 100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Shown):
+class Trajectory(ByValue, Shown):
     """The states of N agents at M instants.
 
     Attributes
@@ -79,7 +84,7 @@ class Trajectory(Shown):
     atol: float
     deadline_index: int | None
     deadline_residual: float | None
-    stats: Mapping[str, float]
+    stats: Mapping[str, float] = field(compare=False)
     actuator: GainLimits | None = field(default=None, kw_only=True)
     forcing: str | None = field(default=None, kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
@@ -166,17 +171,73 @@ class Trajectory(Shown):
             raise ParameterError(f"no instant of the trajectory is {fraction} T; simulate with times=[{wanted}]")
         return self.states[..., near[0]]
 
-    def to_csv(self) -> str:
-        r"""Return ``t,remaining,<label>,...`` as text, one row per instant, floats in full.
+    def __getitem__(self, label: Hashable) -> np.ndarray:
+        """(M,) or (S, M) array: the states of one agent."""
+        if str(label) not in self.graph:
+            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
+            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
+        return self.states[self.graph.index[str(label)]]
 
-        Of S initial states the columns are headed ``<label>[1] .. <label>[S]``; those of sliding variables follow,
-        headed ``sigma(<label>)``.
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.states, dtype=dtype)
+
+    def plot(self, what: str = "states", **keywords: Any) -> Any:
+        """Draw the run: its ``"states"``, ``"input"`` or ``"graph"``.
+
+        Parameters
+        ----------
+        what : str
+        **keywords : Any
+            ``ax`` and others of :func:`ptcc_certify.plot_trajectory`, ``plot_input``, ``plot_graph``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return plot(self, what, **keywords)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the states as a DataFrame: one row per instant, indexed by ``t``, one column per agent.
+
+        Of S components or initial states the columns are pairs ``(label, 1 .. S)``.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
+        >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_pandas().loc[0.0].to_dict()
+        {'a': 1.0, 'b': 0.0}
+        """
+        pandas, columns = import_pandas(), list(self.labels)
+        names: Any = pandas.Index(columns, name="node")
+        if self.states.ndim == 3:
+            numbers = range(1, self.states.shape[1] + 1)
+            names = pandas.MultiIndex.from_product([columns, numbers], names=["node", "component"])
+        return pandas.DataFrame(
+            self.states.reshape(-1, self.t.size).T, index=pandas.Index(self.t, name="t"), columns=names
+        )
+
+    def to_csv(self) -> str:
+        r"""Return ``t,remaining,<label>,...,u(<label>),...`` as text, one row per instant, floats in full.
+
+        The states, of S initial states headed ``<label>[1] .. <label>[S]``; the sliding variables, ``sigma(<label>)``;
+        the :attr:`input`, ``u(..)`` around the name of each state.
 
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
         >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_csv()
-        't,remaining,a,b\n0.0,1.0,1.0,0.0\n'
+        't,remaining,a,b,u(a),u(b)\n0.0,1.0,1.0,0.0,0.0,2.0\n'
         """
         names = list(self.labels)
         if self.states.ndim == 3:
@@ -184,9 +245,9 @@ class Trajectory(Shown):
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         more = self._more_columns()
-        writer.writerow(["t", "remaining", *names, *(name for name, _ in more)])
-        states = self.states.reshape(len(names), -1)
-        table = np.vstack([self.t, self.remaining, states, *(values for _, values in more)])
+        writer.writerow(["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)])
+        states, inputs = (values.reshape(len(names), -1) for values in (self.states, self.input + 0.0))
+        table = np.vstack([self.t, self.remaining, states, *(values for _, values in more), inputs])
         writer.writerows(table.T.tolist())
         return text.getvalue()
 

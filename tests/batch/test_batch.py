@@ -27,10 +27,11 @@ from bad_inputs import ptcc
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from lmi.child_process import apart
-from ptcc_certify import Ensemble, NominalProtocol, ParameterError, SignedDigraph, analyse, batch, certify, certify_many
+from ptcc_certify import Ensemble, NominalProtocol, SignedDigraph, analyse, batch, certify, certify_many
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
 from ptcc_certify.batch.settings import Settings
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph

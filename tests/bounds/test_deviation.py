@@ -26,7 +26,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -228,7 +228,7 @@ def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
 def test_what_a_limited_gain_leaves_is_capped_by_the_start_and_the_check_knows_it():
     """A gain that hardly acts: every agent is as far from its final state as it was, and no farther."""
     cert = slow()
-    for actuator, capped in ((Actuator(gain_cap="0.01"), True), (Actuator(stop_before="0.999"), True)):
+    for actuator, capped in ((GainLimits(gain_cap="0.01"), True), (GainLimits(stop_before="0.999"), True)):
         limited = certify(cert.graph, NOMINAL, cert.initial_state, method="full", simulation=False, limits=[actuator])
         assert limited.effort is not None and limited.verdict == "certified"
         (entry,) = limited.effort.residual
@@ -249,7 +249,7 @@ def test_a_held_input_may_leave_more_than_the_start():
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     cert = certify(
-        graph, protocol, [3, -1, 2], simulation=False, limits=[Actuator(gain_cap=3, sample_period=Fraction(1, 200))]
+        graph, protocol, [3, -1, 2], simulation=False, limits=[GainLimits(gain_cap=3, sample_period=Fraction(1, 200))]
     )
     assert cert.effort is not None and cert.effort.residual
     told = json.loads(cert.to_json())

@@ -30,7 +30,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
@@ -365,7 +365,7 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
         cert = certify(graph, protocol, x0, limits=[Limits(None, None, F(period))], simulation=False)
         assert cert.verdict == "certified" and cert.effort is not None and cert.effort.longest_period is None
         left.append(float(cert.effort.residual[0].norm))
-        run = simulate(graph, protocol, x0, actuator=Actuator(sample_period=period), past=0)
+        run = simulate(graph, protocol, x0, actuator=GainLimits(sample_period=period), past=0)
         assert np.linalg.norm(graph.laplacian() @ run.final_state) <= left[-1]
     assert size > left[0] > 100 * left[1]
     proved = certify(graph, protocol, x0, limits=[Limits(None, None, F(1, 10))], simulation=False)
@@ -491,7 +491,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
         assert [entry.limits for entry in cert.effort.residual][: len(unsampled)] == unsampled
         for entry in cert.effort.residual:
             given = entry.limits
-            actuator = Actuator(given.gain_cap, given.stop_before, given.sample_period)
+            actuator = GainLimits(given.gain_cap, given.stop_before, given.sample_period)
             clock = float(actuator.limit(protocol.gain).clock([float(protocol.T)])[0])
             assert float(entry.clock) <= clock * (1 + 1e-12)
             run = simulate(graph, protocol, x, actuator=actuator, past=0)
@@ -760,11 +760,11 @@ def test_every_example_has_its_effort(number: int):
 
 @pytest.mark.parametrize(
     ("name", "actuator"),
-    [(name, Actuator(gain_cap=15)) for name in ("fig1a", "fig3b", "fig5b")]
-    + [(name, Actuator(stop_before="0.02")) for name in ("fig1b", "fig3a")],
+    [(name, GainLimits(gain_cap=15)) for name in ("fig1a", "fig3b", "fig5b")]
+    + [(name, GainLimits(stop_before="0.02")) for name in ("fig1b", "fig3a")],
     ids=str,
 )
-def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: Actuator):
+def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: GainLimits):
     graph, protocol, nu = load_graph(name), NominalProtocol(1, 1, 1, 2), 0.05
     x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)
     cert = certify(graph, protocol, [Fraction(x) for x in x0], limits=[actuator], noise="1/20", simulation=False)
@@ -793,8 +793,8 @@ def test_noise_times_an_infinite_gain_is_not_certified():
 def test_an_envelope_is_compared_with_runs_it_speaks_of_only():
     graph, protocol = load_graph("fig1a"), NominalProtocol(1, 1, 1, 2)
     cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False)
-    capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=Actuator(gain_cap=9))
+    capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=GainLimits(gain_cap=9))
     assert not cert.envelope.compare(capped).violated
-    for more in ({"actuator": Actuator(sample_period="0.01")}, {"disturbance": "t", "delta": 2}):
+    for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": "t", "delta": 2}):
         with pytest.raises(ParameterError, match="undisturbed"):
             cert.envelope.compare(simulate(graph, protocol, [1, 2, 3, 4, 5, 6], **more))

@@ -19,8 +19,9 @@ from bad_inputs import ptcc
 import lmi
 from lmi.child_process import apart
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
-from ptcc_certify import NominalProtocol, ParameterError, SignedDigraph, certify, check, simulate
+from ptcc_certify import NominalProtocol, SignedDigraph, certify, check, simulate
 from ptcc_certify.certificate.procedure import STEPS
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem

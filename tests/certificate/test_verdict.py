@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bad_inputs import ptcc
+from bad_inputs import detailed, ptcc
 from generators import all_classes, random_graph
 
 from ptcc_certify import (
-    Actuator,
     Expectations,
+    GainLimits,
     NominalProtocol,
     SignedDigraph,
     SlidingModeProtocol,
@@ -24,15 +24,15 @@ from ptcc_certify import (
     box,
     certify,
     ellipsoid,
-    initial_set_within,
     read_certificate,
-    report_html,
-    report_latex,
 )
+from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
 from ptcc_certify.examples import load_graph
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
+from ptcc_certify.report.statement import report_latex
 
 CLASSES = dict(all_classes())
 WEAK = {"rho1": "0.1", "rho2": "0.05", "kappa": 2}
@@ -168,7 +168,7 @@ def test_codes_are_worst_first():
     ],
 )
 def test_an_expectation_that_is_not_met_is_in_the_verdict_line(options: tuple[str, ...], code: int, says: str):
-    run = ptcc("certify", "fig1a", "--no-simulation", *options)
+    run = detailed("certify", "fig1a", "--no-simulation", *options)
     assert run.code == code and run.out.splitlines()[-1].startswith(f"verdict    {says}"), run.out
     assert run.err == ""
     told = ptcc("certify", "fig1a", "--no-simulation", "--json", *options)
@@ -247,14 +247,14 @@ def limited(x0: Any = None, graph: SignedDigraph = PAIR, protocol: NominalProtoc
 
 def test_what_is_left_of_states_beyond_the_squares_of_floats_is_right():
     shares = [
-        limited(x0, limits=[Actuator(gain_cap="0.01")]) for x0 in ([1, 3], ["1e-200", "3e-200"], ["1e200", "3e200"])
+        limited(x0, limits=[GainLimits(gain_cap="0.01")]) for x0 in ([1, 3], ["1e-200", "3e-200"], ["1e200", "3e200"])
     ]
     assert len({found.remark for found in shares}) == 1
     assert shares[0].useful is False and "||E|| <= 0.99 ||E(0)|| at T" in shares[0].remark
 
 
 def test_noise_from_the_final_state_is_not_a_share_of_nothing():
-    found = limited([1, 1], limits=[Actuator(gain_cap=10)], noise="0.1")
+    found = limited([1, 1], limits=[GainLimits(gain_cap=10)], noise="0.1")
     assert found.useful is False and "||E|| <= 0.29 at T" in found.remark
 
 
@@ -262,7 +262,7 @@ def test_of_a_set_no_share_is_stated_that_single_states_exceed():
     hub = SignedDigraph.from_edges([(1, 2, 1), *((2, k, 10) for k in range(3, 103))])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa="3.3")
     found = limited(
-        None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[Actuator(gain_cap="4.5")]
+        None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[GainLimits(gain_cap="4.5")]
     )
     assert "||E(0)||" not in found.remark and "from all these initial states" in found.remark
 
@@ -270,8 +270,8 @@ def test_of_a_set_no_share_is_stated_that_single_states_exceed():
 @pytest.mark.parametrize("size", ["0.01", "1000", "1e200"])
 def test_the_verdict_on_a_set_does_not_hang_on_another_start(size: str):
     sets = initial_set_within(analyse(PAIR), size)
-    assert limited([7, 3], initial_set=sets, limits=[Actuator(gain_cap="0.01")]).useful is False
-    assert limited([7, 3], initial_set=sets, limits=[Actuator(gain_cap="100")]).useful is True
+    assert limited([7, 3], initial_set=sets, limits=[GainLimits(gain_cap="0.01")]).useful is False
+    assert limited([7, 3], initial_set=sets, limits=[GainLimits(gain_cap="100")]).useful is True
 
 
 @pytest.mark.parametrize("region", [box([1, 1], [1, 1]), ellipsoid([1, 1], [[1, 1]])])
@@ -285,10 +285,10 @@ def test_an_unbounded_input_from_a_thin_set_is_not_called_proved(region: Any):
 
 
 def test_disturbances_are_not_counted_and_it_says_so():
-    for limits in ([], [Actuator(gain_cap=20)]):
+    for limits in ([], [GainLimits(gain_cap=20)]):
         assert limited([1, 3], limits=limits, delta=1).remark.endswith(", without disturbances")
 
 
 def test_noise_that_nobody_hears_is_no_open_question():
     alone = SignedDigraph.from_edges([], nodes=["a", "b"])
-    assert limited([1, 2], alone, limits=[Actuator(gain_cap=5)], noise="0.1").exit_code == 0
+    assert limited([1, 2], alone, limits=[GainLimits(gain_cap=5)], noise="0.1").exit_code == 0

@@ -50,7 +50,7 @@ from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent
@@ -322,7 +322,7 @@ def limited(name: str, ball: bool) -> Json:
     axes = [[half * (i == j) + Fraction(1, 8) * (j == 0) for i in range(n)] for j in range(n)]
     initial_set = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
     step = Fraction(1, 10**7)
-    limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period=step)]
+    limits = [GainLimits(gain_cap=9), GainLimits(stop_before="0.01"), GainLimits(gain_cap=9, sample_period=step)]
     made = certify(graph, STRONG, initial_set=initial_set, limits=limits, delta="0.1", noise="0.01", simulation=False)
     assert made.effort is not None and len(made.effort.residual) == 3 and made.effort.disturbed is not None
     assert [entry.noise is None for entry in made.effort.residual] == [False, False, True]

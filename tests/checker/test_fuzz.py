@@ -41,7 +41,7 @@ from ptcc_certify.checker import check
 from ptcc_certify.checker import graph as checked_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 CLASSES = dict(all_classes())
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
@@ -90,7 +90,7 @@ def cases() -> list[Case]:
     some = ("1.1", "1.2", "2.1 K>=2", "2.1 K=1", "2.2", "3.1 mixed", "3.1 all single", "3.2", "disconnected 1.1 2.1")
     for k, name in enumerate(some):
         found += [(f"{name}, {'sliding' if s else 'nominal'}", made(name, 4 + k + s, s), {}) for s in (False, True)]
-    limits = [Actuator(gain_cap=9), Actuator(stop_before="0.01"), Actuator(gain_cap=9, sample_period="0.000001")]
+    limits = [GainLimits(gain_cap=9), GainLimits(stop_before="0.01"), GainLimits(gain_cap=9, sample_period="0.000001")]
     for k, name in enumerate(("1.1", "2.1 K>=2", "2.2", "3.1 mixed")):
         more: Any = {
             "limits": limits,
@@ -370,7 +370,7 @@ def test_the_oracle_finds_nothing_false_in_what_is_proved():
     ],
 )
 def test_the_oracle_sees_what_is_false(path: tuple[Any, ...], share: str):
-    data = made("2.1 K>=2", 7, limits=[Actuator(gain_cap=9), Actuator(stop_before="0.01")], noise="0.01", rho2=5)
+    data = made("2.1 K>=2", 7, limits=[GainLimits(gain_cap=9), GainLimits(stop_before="0.01")], noise="0.01", rho2=5)
     assert false_claims(data) == []
     if path == ("initial_state",):
         data = changed(data, path, dict.fromkeys(data["initial_state"], "1"))

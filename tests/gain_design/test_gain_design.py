@@ -22,7 +22,7 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bo
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.gain_limits import Actuator
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.simulation.run import simulate
 
 PAIR = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -80,7 +80,7 @@ def assert_holds_in_simulations(graph, found, R):
     )
     vertices = center[:, None] + rng.choice([-1.0, 1.0], (graph.n_nodes, 20)) * radius[:, None]
     states = np.column_stack([found.worst.x0, vertices])
-    cap = None if found.limits is None else Actuator(gain_cap=found.limits.gain_cap)
+    cap = None if found.limits is None else GainLimits(gain_cap=found.limits.gain_cap)
     run = simulate(graph, found.protocol, states, actuator=cap, past=0)
     before = np.abs(run.input[..., run.t < float(found.deadline)])
     largest = np.linalg.norm(before, axis=0).max() if found.asked.input_norm == 2 else before.max()
@@ -204,7 +204,7 @@ def test_the_lower_bound_is_nearly_reached_and_the_certificate_not_far_off(name)
 
 def test_a_residual_lifts_the_bound_of_the_start_but_not_that_of_the_way():
     strict, loose = designed("fig3b", 10, 1), designed("fig3b", 10, 1, residual="0.5")
-    assert "at the start" in strict.lower_by and "way" in loose.lower_by
+    assert "at t = 0" in strict.lower_by and "way" in loose.lower_by
     assert loose.lower_product == Fraction(1, 2)  # a stable agent goes from 1 to within 1/2 of 0
     assert designed("fig3b", 10, 1, residual="0.5", deadline="0.049").verdict == INFEASIBLE
     assert designed("fig3b", 10, 1, residual="0.5", deadline="0.051").verdict == UNPROVED
@@ -282,7 +282,7 @@ def test_bad_input_is_named_in_one_line(asked, said):
 
 def test_what_is_shown_and_written():
     met, missed = designed("fig5a", 10, 1), designed("fig5a", 10, 1, deadline=1)
-    assert missed.verdict == UNPROVED and "times max_input" in missed.binding
+    assert missed.verdict == UNPROVED and "times the limit" in missed.binding
     assert missed.peak > 10 and missed.protocol is None and missed.certificate is None and missed.worst is None
     for found in (met, missed, designed("pair", 20, 3, residual="2.9")):
         assert all(len(line) <= 120 for line in found.lines())

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify import Actuator, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
+from ptcc_certify import GainLimits, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
@@ -80,7 +80,7 @@ def made(k: int) -> Certificate:
         return certify(graph, robust, x0, sigma0=[x / 3 for x in x0], simulation=False)
     protocol = NominalProtocol(T="7/3", rho1="1/3", rho2=["1/7", "3/2", 9][k % 3], kappa=1)
     more: dict[str, Any] = {"initial_set": "1/3"} if k % 5 == 1 else {}
-    limits = [Actuator(gain_cap="100/3"), Actuator(stop_before="1/7")]
+    limits = [GainLimits(gain_cap="100/3"), GainLimits(stop_before="1/7")]
     return certify(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
 
 
@@ -227,9 +227,9 @@ def test_a_design_is_rounded_to_the_safe_side():
     found = design(load_graph("fig1a"), max_input="31/3", initial_bound="7/9")
     text = "\n".join(found.lines())
     assert found.peak is not None and found.shortest_certified is not None and found.shortest_possible is not None
-    above(re.findall(rf"^peak input +{NUMBER} at most", text, re.M), found.peak)
-    above(re.findall(rf"^shortest deadline +{NUMBER} certified", text, re.M), found.shortest_certified)
-    below(re.findall(rf"^ +{NUMBER} at least", text, re.M), found.shortest_possible)
+    above(re.findall(rf"^proved +.u_k. <= {NUMBER}, every", text, re.M), found.peak)
+    above(re.findall(rf"^deadline +{NUMBER} is met", text, re.M), found.shortest_certified)
+    below(re.findall(rf"no gains meet one below {NUMBER}$", text, re.M), found.shortest_possible)
     assert found.product is not None and found.lower_product is not None
     for T, peak, low in zip(*found.trade_off([0.1, 1 / 3, 7.7]), strict=True):
         assert Fraction(float(peak)) * Fraction(float(T)) >= found.product

@@ -18,7 +18,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import Actuator, LimitedGain
+from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.simulation.nominal import as_forcing
 from ptcc_certify.simulation.run import simulate
 
@@ -67,7 +67,7 @@ def plain_gain(t, cap=None, stop=None, p=PROTOCOL):
 
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 def test_value_and_clock_are_the_definition_and_its_integral(limits):
-    limited = Actuator(**limits).limit(GAIN)
+    limited = GainLimits(**limits).limit(GAIN)
     cap, stop = (float(limits[name]) if name in limits else None for name in ("gain_cap", "stop_before"))
     t = np.array([0, 0.05, 0.1, 0.3, 0.41, 0.5, 0.56, 0.58, 0.597, 0.6, 0.7, 3])
     np.testing.assert_allclose(limited.value(t), [plain_gain(v, cap, stop) for v in t], rtol=1e-12)
@@ -81,37 +81,37 @@ def test_value_and_clock_are_the_definition_and_its_integral(limits):
 def test_the_clock_ends_at_the_closed_form():
     T, rho1, k, cap = 0.6, 0.1, 0.3, 20.0
     expected = rho1 * T + k * (1 + math.log(T * (cap - rho1) / k))
-    assert Actuator(gain_cap=20).limit(GAIN).clock(0.6) == pytest.approx(expected, rel=1e-14)
+    assert GainLimits(gain_cap=20).limit(GAIN).clock(0.6) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("exponent", [20, 100, 290])
 def test_limits_beyond_the_resolution_of_t_act_where_they_should(exponent):
     size = Fraction(10) ** exponent
-    capped = Actuator(gain_cap=size).limit(GAIN)
+    capped = GainLimits(gain_cap=size).limit(GAIN)
     assert capped.clock(0.6) == pytest.approx(0.06 + 0.3 * (1 + math.log(2 * float(size))), rel=1e-13)
-    stopped = Actuator(stop_before=1 / size).limit(GAIN)
+    stopped = GainLimits(stop_before=1 / size).limit(GAIN)
     assert stopped.clock(0.6) == pytest.approx(0.06 + 0.3 * (math.log(0.6) + exponent * math.log(10)), rel=1e-13)
     left = np.array([3, 1, 0.3]) / (0.6 * float(size))
     np.testing.assert_array_equal(stopped.value(np.full(3, 0.6), left) > 0, [True, False, False])
 
 
 def test_without_limits_the_gain_stays_what_it_is():
-    limited, t = Actuator().limit(GAIN), np.array([0, 1e-17, 0.1, 0.5999, 0.6, 1])
+    limited, t = GainLimits().limit(GAIN), np.array([0, 1e-17, 0.1, 0.5999, 0.6, 1])
     np.testing.assert_allclose(limited.clock(t), GAIN.clock(t), rtol=1e-15)
     np.testing.assert_array_equal(limited.value(t), GAIN.value(t))
-    assert Actuator().ideal and not limited.bounded
+    assert GainLimits().ideal and not limited.bounded
 
 
 def test_without_a_deadline_only_a_cap_below_rho1_and_a_stop_act():
     baseline = Gain(1, 2, 0, 1)
-    np.testing.assert_array_equal(Actuator(gain_cap=3).limit(baseline).clock([0.5, 1, 2]), [1, 2, 4])
-    np.testing.assert_array_equal(Actuator(gain_cap=1).limit(baseline).clock([0.5, 1, 2]), [0.5, 1, 2])
-    np.testing.assert_array_equal(Actuator(stop_before="0.5").limit(baseline).clock([0.25, 1, 2]), [0.5, 1, 1])
-    assert Actuator().limit(baseline).bounded
+    np.testing.assert_array_equal(GainLimits(gain_cap=3).limit(baseline).clock([0.5, 1, 2]), [1, 2, 4])
+    np.testing.assert_array_equal(GainLimits(gain_cap=1).limit(baseline).clock([0.5, 1, 2]), [0.5, 1, 2])
+    np.testing.assert_array_equal(GainLimits(stop_before="0.5").limit(baseline).clock([0.25, 1, 2]), [0.5, 1, 1])
+    assert GainLimits().limit(baseline).bounded
 
 
 def test_a_stop_acts_from_its_instant_on():
-    limited = Actuator(stop_before="0.1").limit(Gain("0.3", 1, 1, 1))
+    limited = GainLimits(stop_before="0.1").limit(Gain("0.3", 1, 1, 1))
     t = np.array([np.nextafter(0.2, 0) - 1e-15, 0.2, np.nextafter(0.2, 1), 0.3, 9])
     np.testing.assert_array_equal(limited.value(t) > 0, [True, False, False, False, False])
 
@@ -126,7 +126,7 @@ positive = st.fractions(Fraction(1, 1000), 1000)
 def test_the_clock_increases_and_stays_below_the_cap_times_t(T, rho1, pole, cap, stop, period, seed):
     assume(stop is None or 0 < stop < 1)
     assume(period is None or 1000 * period > T)
-    actuator = Actuator(cap, None if stop is None else stop * T, period)
+    actuator = GainLimits(cap, None if stop is None else stop * T, period)
     t = np.sort(np.append(np.random.default_rng(seed).uniform(0, 2 * float(T), 50), [0, float(T)]))
     limited = actuator.limit(Gain(T, rho1, pole, 1))
     clock, gain = limited.clock(t), limited.value(t)
@@ -145,7 +145,7 @@ def test_the_state_is_the_matrix_exponential_of_the_clock(limits):
     rng = np.random.default_rng(len(str(limits)))
     for n in (2, 5, 9):
         graph, start = random_graph(rng, n), rng.normal(size=(n, 2))
-        actuator = Actuator(**limits)
+        actuator = GainLimits(**limits)
         run = simulate(graph, PROTOCOL, start, actuator=actuator, samples=21)
         L, clock = graph.laplacian().toarray(), actuator.limit(GAIN).clock(run.t, run.remaining)
         np.testing.assert_array_equal(run.clock, clock)
@@ -156,7 +156,7 @@ def test_the_state_is_the_matrix_exponential_of_the_clock(limits):
 
 
 def test_the_input_is_the_effective_one_and_the_run_names_its_actuator():
-    actuator = Actuator(gain_cap=20, stop_before="0.01")
+    actuator = GainLimits(gain_cap=20, stop_before="0.01")
     run = simulate(TRIO, PROTOCOL, X0, actuator=actuator, times=[0, "0.3", "0.588", "0.59", "0.6", 1])
     np.testing.assert_allclose(run.input, np.array([0.6, 1.1, 20, 0, 0, 0]) * run.error, rtol=1e-12)
     assert run.actuator == actuator
@@ -167,24 +167,24 @@ def test_the_input_is_the_effective_one_and_the_run_names_its_actuator():
 
 def test_a_run_long_enough_is_settled_and_a_stopped_start_is_still():
     protocol = NominalProtocol("0.6", "0.1", 9, 1)
-    run = simulate(TRIO, protocol, X0, actuator=Actuator(gain_cap=10**6))
+    run = simulate(TRIO, protocol, X0, actuator=GainLimits(gain_cap=10**6))
     assert run.deadline_resolved
     assert np.abs(run.final_state - simulate(TRIO, protocol, X0).final_state).max() < 1e-9
-    np.testing.assert_array_equal(simulate(TRIO, PROTOCOL, X0, actuator=Actuator(1), times=[0]).states[:, 0], X0)
+    np.testing.assert_array_equal(simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(1), times=[0]).states[:, 0], X0)
 
 
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 def test_a_proved_envelope_holds_on_the_clock_that_acts(limits):
     cert = certify(load_graph("fig1a"), PROTOCOL, simulation=False)
-    run = simulate(cert.graph, PROTOCOL, [5, 2, -4, 3, -2, 1], actuator=Actuator(**limits))
+    run = simulate(cert.graph, PROTOCOL, [5, 2, -4, 3, -2, 1], actuator=GainLimits(**limits))
     compared = cert.envelope.compare(run)
     assert compared.judged > 100 and not compared.violated
 
 
 def test_an_ideal_actuator_changes_nothing():
-    ideal, run = simulate(TRIO, PROTOCOL, X0, actuator=Actuator()), simulate(TRIO, PROTOCOL, X0)
+    ideal, run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits()), simulate(TRIO, PROTOCOL, X0)
     np.testing.assert_array_equal(ideal.states, run.states)
-    assert ideal.actuator is None and "Actuator" not in repr(ideal)
+    assert ideal.actuator is None and "GainLimits" not in repr(ideal)
 
 
 # ---------------------------------------------------------------------- sampled runs
@@ -211,7 +211,7 @@ def brute_force(rows, x, until, h, cap, stop, p):
 @pytest.mark.parametrize("stop", [None, "0.13"])
 @pytest.mark.parametrize("h", ["0.07", "0.2", "0.05", "0.59", "0.9"])
 def test_a_sampled_run_is_the_recursion_in_rationals(cap, stop, h):
-    actuator = Actuator(cap, stop, h)
+    actuator = GainLimits(cap, stop, h)
     times = [Fraction(i, 97) for i in range(80)] + [Fraction("0.83")]
     times = sorted({*times, Fraction("0.6"), Fraction("0.47")})
     run = simulate(TRIO, PROTOCOL, X0, actuator=actuator, times=times)
@@ -231,7 +231,7 @@ def test_a_sampled_run_is_the_recursion_in_rationals(cap, stop, h):
 
 
 def test_columns_of_a_sampled_run_evolve_apart():
-    start, actuator = np.stack([X0, 1e6 * X0[::-1]], axis=1), Actuator(sample_period="0.07")
+    start, actuator = np.stack([X0, 1e6 * X0[::-1]], axis=1), GainLimits(sample_period="0.07")
     run = simulate(TRIO, PROTOCOL, start, actuator=actuator)
     for column in range(2):
         alone = simulate(TRIO, PROTOCOL, start[:, column], actuator=actuator)
@@ -241,10 +241,10 @@ def test_columns_of_a_sampled_run_evolve_apart():
 
 @pytest.mark.parametrize("limits", [{"gain_cap": 20}, {"stop_before": "0.05"}])
 def test_sampled_runs_tend_to_the_continuous_one(limits):
-    continuous = simulate(TRIO, PROTOCOL, X0, actuator=Actuator(**limits), samples=21)
+    continuous = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(**limits), samples=21)
     gaps = []
     for h in ("1/100", "1/1000", "1/10000"):
-        run = simulate(TRIO, PROTOCOL, X0, actuator=Actuator(**limits, sample_period=h), samples=21)
+        run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(**limits, sample_period=h), samples=21)
         gaps.append(np.abs(run.states - continuous.states).max())
     assert gaps[0] / gaps[1] == pytest.approx(10, rel=0.5)
     assert gaps[1] / gaps[2] == pytest.approx(10, rel=0.2)
@@ -252,7 +252,7 @@ def test_sampled_runs_tend_to_the_continuous_one(limits):
 
 def test_a_period_may_start_closer_to_the_deadline_than_a_float_tells():
     h = Fraction("0.2") - Fraction(1, 10**40)
-    run = simulate(TRIO, PROTOCOL, X0, actuator=Actuator(sample_period=h), times=[0, "0.6", "0.7"])
+    run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(sample_period=h), times=[0, "0.6", "0.7"])
     assert np.isfinite(run.states).all()
     step = 0.1 * float(h) + 0.3 * np.array([1 / 3, 1 / 2, 1])
     x = X0
@@ -321,7 +321,7 @@ def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
 def test_a_disturbed_and_noisy_run_behind_limits_is_that_of_another_integrator(limits, noisy):
     more = {"noise": "0.1*cos(20*t + k)", "noise_bound": "0.1"} if noisy else {}
     run = simulate(
-        TRIO, PROTOCOL, X0, actuator=Actuator(**limits), disturbance="sin(9*k*t)", delta=1, times=PAST, **more
+        TRIO, PROTOCOL, X0, actuator=GainLimits(**limits), disturbance="sin(9*k*t)", delta=1, times=PAST, **more
     )
     cap, stop = (float(limits[name]) if name in limits else None for name in ("gain_cap", "stop_before"))
     cuts = [0.6, 0.6 - (stop or 0)] + ([0.6 - 0.3 / (cap - 0.1)] if cap and cap > 0.1 else [])
@@ -341,7 +341,9 @@ def test_jumping_signals_are_met_at_their_jumps():
     times = np.array([0, 0.1, 0.25, 0.4, 0.55, 0.7])
     rng = np.random.default_rng(8)
     d, n = (SampledDisturbance(times, rng.uniform(-1, 1, (3, 6)), hold=hold) for hold in (True, False))
-    run = simulate(TRIO, PROTOCOL, X0, actuator=Actuator(9), disturbance=d, delta=1, noise=n, noise_bound=1, times=PAST)
+    run = simulate(
+        TRIO, PROTOCOL, X0, actuator=GainLimits(9), disturbance=d, delta=1, noise=n, noise_bound=1, times=PAST
+    )
     expected = reference(
         TRIO,
         X0,
@@ -354,8 +356,8 @@ def test_jumping_signals_are_met_at_their_jumps():
     assert np.abs(run.states - expected).max() < 2e-8
 
 
-@pytest.mark.parametrize("limits", [Actuator("1e19"), Actuator(stop_before="1e-20")], ids=["cap", "stop"])
-def test_noise_moves_agents_as_long_as_the_gain_acts(limits: Actuator):
+@pytest.mark.parametrize("limits", [GainLimits("1e19"), GainLimits(stop_before="1e-20")], ids=["cap", "stop"])
+def test_noise_moves_agents_as_long_as_the_gain_acts(limits: GainLimits):
     """Long after a disturbance has ceased to matter: the states follow the noise, ``x -> Q (x + n) - n``."""
     times = [0, 0.5, 1 - 1e-6, 1]
     run = simulate(TRIO, PROTOCOL, X0, actuator=limits, noise="10*(k-2)", noise_bound=10, times=times)
@@ -368,7 +370,7 @@ def test_telegraph_signals_of_disturbance_and_noise_differ():
     forcing = as_forcing(TRIO, PROTOCOL.T, "telegraph", 1, "telegraph", "0.1", 1.0)
     assert not set(forcing.disturbance.breaks(1.0)) & set(forcing.noise.breaks(1.0))
     options = {"disturbance": forcing.disturbance, "delta": 1, "noise": forcing.noise, "noise_bound": "0.1"}
-    run = simulate(TRIO, PROTOCOL, X0, actuator=Actuator(9), times=UP_TO, **options)
+    run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(9), times=UP_TO, **options)
     expected = reference(
         TRIO,
         X0,
@@ -429,26 +431,26 @@ def test_a_disturbance_moves_a_start_at_rest_and_the_baseline():
 @pytest.mark.parametrize("value", [-1, 0, "0", float("nan"), float("inf"), "x", None.__class__, 10**400])
 def test_a_limit_outside_its_domain_is_refused_by_name(name, value):
     with pytest.raises(ParameterError, match=name) as caught:
-        Actuator(**{name: value})
+        GainLimits(**{name: value})
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("stop", ["0.6", 1, Fraction(3, 5)])
 def test_a_stop_is_below_the_deadline(stop):
     with pytest.raises(ParameterError, match="stop_before must be below T = 3/5"):
-        LimitedGain(GAIN, Actuator(stop_before=stop))
+        LimitedGain(GAIN, GainLimits(stop_before=stop))
     with pytest.raises(ParameterError, match="stop_before"):
-        simulate(TRIO, PROTOCOL, X0, actuator=Actuator(stop_before=stop))
+        simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(stop_before=stop))
 
 
 def test_limits_that_never_act_are_refused():
     with pytest.raises(ParameterError, match="gain_cap acts only where"):
-        Actuator(gain_cap=10**299).limit(Gain(10**5, 1, 1, 1))
+        GainLimits(gain_cap=10**299).limit(Gain(10**5, 1, 1, 1))
     with pytest.raises(ParameterError, match="stop_before acts only where"):
-        Actuator(stop_before=Fraction(1, 10**299)).limit(Gain(10**5, 1, 1, 1))
+        GainLimits(stop_before=Fraction(1, 10**299)).limit(Gain(10**5, 1, 1, 1))
 
 
-CAP, SAMPLED = Actuator(gain_cap=9), Actuator(sample_period="0.1")
+CAP, SAMPLED = GainLimits(gain_cap=9), GainLimits(sample_period="0.1")
 
 
 @pytest.mark.parametrize(
@@ -468,7 +470,7 @@ CAP, SAMPLED = Actuator(gain_cap=9), Actuator(sample_period="0.1")
         ({"noise": "t", "noise_bound": 1}, "infinite.*gain_cap or stop_before"),
         ({"noise": "t", "noise_bound": 1, "actuator": SAMPLED}, "sample_period"),
         ({"disturbance": "t", "delta": 1, "actuator": SAMPLED}, "sample_period"),
-        ({"actuator": Actuator(sample_period="1e-7")}, "more than 1,000,000 periods"),
+        ({"actuator": GainLimits(sample_period="1e-7")}, "more than 1,000,000 periods"),
         ({"actuator": CAP, "sigma0": [0, 0, 0]}, "sliding-mode"),
         ({"actuator": CAP, "boundary_layer": 0.1}, "sliding-mode"),
         (
@@ -492,4 +494,4 @@ def test_the_sliding_mode_takes_no_actuator(options):
 
 def test_a_sampled_run_that_diverges_is_a_named_failure():
     with pytest.raises(SimulationError, match="shorter sample_period"):
-        simulate(TRIO, NominalProtocol(1, 10**6, 1, 1), X0, actuator=Actuator(sample_period="1/1000"))
+        simulate(TRIO, NominalProtocol(1, 10**6, 1, 1), X0, actuator=GainLimits(sample_period="1/1000"))

@@ -469,8 +469,9 @@ def test_the_table_has_a_column_for_every_sliding_variable():
     run = simulate(six(), protocol(), X0, sigma0=SIGMA0, samples=5)
     header, *rows = csv.reader(io.StringIO(run.to_csv()))
     labels = list(six().labels)
-    assert header == ["t", "remaining", *labels, *(f"sigma({label})" for label in labels)]
-    np.testing.assert_array_equal(np.array(rows, dtype=float).T, [run.t, run.remaining, *run.states, *run.sigma])
+    assert header == ["t", "remaining", *labels, *(f"{name}({label})" for name in ("sigma", "u") for label in labels)]
+    columns = [run.t, run.remaining, *run.states, *run.sigma, *run.input]
+    np.testing.assert_array_equal(np.array(rows, dtype=float).T, columns)
 
 
 def test_a_run_says_what_it_is():
@@ -623,14 +624,14 @@ def test_a_boundary_layer_without_a_width_is_refused(width):
         ({"disturbance": lambda t, x, sigma: math.nan}, "agent 1 at t = 0 is nan, not finite"),
         ({"disturbance": [0.1, 0.2]}, "2 disturbances for 6 agents"),
         ({"disturbance": "sin(q)"}, "unknown name"),
-        ({"sigma0": [1, 2]}, "sigma0 has shape 2"),
-        ({"sigma0": 1}, "sigma0 .* single number"),
+        ({"sigma0": [1, 2]}, "sigma0 has 2 values"),
+        ({"sigma0": 1}, "sigma0 is 1; give one number"),
         ({"sigma0": [0, 0, math.nan, 0, 0, 0]}, "sigma0 of agent 3 is nan"),
         ({"sigma0": [0, 0, 0, 0, 0, math.inf]}, "sigma0 of agent 6 is inf"),
         ({"sigma0": ["a"] * 6}, "sigma0"),
         ({"sigma0": [[1, 2]] * 6}, "sigma0"),
         ({"x0": [[1, 2]] * 6}, "one initial state at a time"),
-        ({"x0": [1] * 5}, "x0 has shape 5"),
+        ({"x0": [1] * 5}, "x0 has 5 values"),
         ({"rtol": 0}, "rtol"),
         ({"samples": 1}, "samples"),
         ({"remaining": 0}, "remaining"),

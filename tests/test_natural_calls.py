@@ -1,0 +1,181 @@
+"""A hundred calls that a newcomer types, and what each gives: a result, or one line that names the mend.
+
+Five people share one small certificate: a control researcher, a network scientist with networkx and pandas, an engineer
+with limits of actuators, a student, and a reviewer.
+"""
+
+from fractions import Fraction
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import PTCCError
+
+#: What is typed, and a part of what is shown: of a refusal, the name of its class and a part of its line.
+CONTROL_RESEARCHER = {
+    "ptcc.__version__": ".",
+    "ptcc.NominalProtocol()": "NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)",
+    "ptcc.NominalProtocol(T=0.6)": "NominalProtocol(T=0.6, rho1=1",
+    "ptcc.NominalProtocol(0)": "ParameterError: T = 0 is outside its domain",
+    "ptcc.NominalProtocol('fast')": "ParameterError: T = fast is not a finite number",
+    "p.replace(T=3)": "NominalProtocol(T=3, rho1=1, rho2=2, kappa=1)",
+    "p.replace(rho=3)": "ParameterError: rho is no parameter of NominalProtocol; it has T, rho1, rho2, kappa",
+    "ptcc.SlidingModeProtocol(mu1=1, delta=2)": "ParameterError: mu1 = 1 does not exceed delta = 2",
+    "ptcc.certify(W, p)": 'GraphError: a matrix does not tell its direction: say orientation="listens"',
+    "ptcc.certify(W, p, orientation='listens', **fast)": "Certificate(bipartite consensus, Theorem 1.1",
+    "ptcc.certify(W, p, orientation='rows')": "GraphError: orientation",
+    "ptcc.certify(sparse.csr_matrix(W), p, orientation='information', **fast)": "Certificate(bipartite consensus",
+    "ptcc.analyse(W, 'listens')": "Structure(2 nodes, strong",
+    "ptcc.simulate(W, p, [3, 1], orientation='listens', times=[0, 1])": "Trajectory(2 agents, 2 instants",
+    "ptcc.simulate(g, p, [1, 2])": "ParameterError: the initial state x0 has 2 values for 3 agents; give one number",
+    "ptcc.simulate(g, p, np.ones((3, 2)), times=[0, 1]).states.shape": "(3, 2, 2)",
+    "ptcc.simulate(g, p, 'random', times=[0, 1])": "Trajectory(3 agents",
+    "ptcc.simulate(g, p, None)": "ParameterError: the initial state x0 is missing; give one number for each of ann",
+    "ptcc.simulate(g, 0.6, x0)": "ParameterError: protocol = 0.6 is none; give NominalProtocol(",
+    "ptcc.simulate(g, p, x0, sigma0=[1, 1, 1])": "ParameterError: sigma0 belongs to the sliding-mode protocol",
+    "ptcc.certify_vectors(g, p, [[5, 1], [2, 0], [-4, 2]], **fast)": "VectorCertificate(2 components",
+    "ptcc.certify(g, p, [[5, 1], [2, 0], [-4, 2]])": "certify_vectors",
+    "cert.rate > 0": "True",
+    "cert.norm_bound([0.1]) < cert.norm_bound([1.0])": "True",
+    "float(cert.norm_bound(0.1)) > 0": "True",
+    "cert.deviation_bound([0.1, 0.01]).shape": "(3, 2)",
+    "cert.envelope.compare(cert.trajectory).violated": "False",
+    "ptcc.theorems.table.theorem_for(g, p).number": "2.1",
+    "ptcc.theorems.lemmas.gauge(g).tolist()": "[1, -1, -1]",
+    "ptcc.theorems.lemmas.laplacian_spectrum(g).kernel_dimension": "1",
+}
+NETWORK_SCIENTIST = {
+    "ptcc.certify(G, p, **fast)": "Certificate(interval bipartite consensus",
+    "ptcc.analyse(G)": "Structure(3 nodes, quasi-strong",
+    "ptcc.analyse(G.to_undirected())": "GraphError: the networkx graph is undirected; give graph.to_directed()",
+    "ptcc.analyse(nx.MultiDiGraph(G))": "GraphError: the networkx graph is a multigraph",
+    "ptcc.analyse(nx.DiGraph([(1, 2)]))": 'GraphError: edge 1 -> 2 has no attribute "weight"; give each edge',
+    "ptcc.SignedDigraph.from_networkx(df)": "GraphError: a DataFrame is no networkx graph",
+    "ptcc.certify(df, p, **fast)": "Certificate(interval bipartite consensus",
+    "ptcc.analyse(df.assign(year=1999)).graph.read['notes']": 'columns ignored: "year"',
+    "ptcc.analyse(df.rename(columns={'source': 'who'}))": "GraphError: a DataFrame with the columns who",
+    "ptcc.analyse(df[['source', 'target']])": "FormatError: the DataFrame: the header names no weight",
+    "ptcc.analyse(df, orientation='listens')": "Structure(3 nodes",
+    "ptcc.as_graph(nx.to_pandas_adjacency(G))": "GraphError: a matrix does not tell its direction",
+    "ptcc.as_graph(nx.to_pandas_adjacency(G), 'information') == g": "True",
+    "ptcc.as_graph([('ann', 'bob', -1), ('bob', 'ann', -1)])": "SignedDigraph(2 nodes, 2 edges, 2 negative)",
+    "ptcc.as_graph([('ann', 'bob')])": "GraphError: edge ('ann', 'bob') is not a triple (source, target, weight)",
+    "ptcc.as_graph({'ann': {'bob': 1}})": "GraphError: {'ann': {'bob': 1}} is not read as a graph; give",
+    "g.to_networkx().edges['ann', 'bob']['weight']": "-2.0",
+    "g.to_pandas()": "source target  weight",
+    "list(g)": "['ann', 'bob', 'eve']",
+    "len(g)": "3",
+    "'ann' in g": "True",
+    "g.adjacency().toarray()[1, 0]": "-2.0",
+    "ptcc.simulate(G, p, {'ann': 5, 'bob': 2, 'eve': -4}, times=[0, 1])['eve'][0]": "-4.0",
+    "ptcc.simulate(G, p, {'ann': 5}, times=[0, 1])": "ParameterError: the initial state x0: no value for bob, eve",
+    "ptcc.simulate(G, p, pd.Series({'eve': 1, 'bob': 2, 'ann': 3}), times=[0, 1]).states[:, 0]": "[3. 2. 1.]",
+    "ptcc.final_state(G, pd.Series([1, 2, 3]))": "ParameterError: the initial state x0: no value for ann, bob, eve",
+    "cert.final_state['ann']": "8/3",
+    "cert.final_state['joe']": "ParameterError: no agent is called 'joe'; there are ann, bob, eve",
+    "dict(cert.final_state)": "{'ann': Fraction(8, 3)",
+    "cert.final_state.to_pandas()": "ann ",
+    "cert.trajectory.to_pandas().columns": "'ann', 'bob', 'eve'",
+    "ptcc.certify_many({'team': G}, p, method='perron').to_pandas()['verdict'].tolist()": "['certified']",
+    "ptcc.certify_many(G, p, method='perron')[0]['nodes']": "3",
+    "ptcc.write_graph(g, folder / 'team.csv')": "None",
+    "ptcc.read_graph('nowhere.csv')": "FormatError: nowhere.csv: no such file; check the path",
+    "ptcc.read_graph(StringIO('a,b,1'))": "SignedDigraph(2 nodes",
+}
+ENGINEER = {
+    "ptcc.design(g, max_input=10, initial_bound=1)": "Design(met",
+    "ptcc.design(W, max_input=10, initial_bound=1, orientation='listens')": "Design(met",
+    "ptcc.design(g, max_input=-1, initial_bound=1)": "ParameterError: max_input = -1 is outside its domain",
+    "ptcc.design(g, max_input=10, initial_bound=x0)": "ParameterError: the bound of initial states",
+    "ptcc.GainLimits(gain_cap=50)": "GainLimits(gain_cap=50)",
+    "ptcc.simulate(g, p, x0, actuator=ptcc.GainLimits(gain_cap=50), times=[0, 1])": "Trajectory(3 agents",
+    "ptcc.certify(g, p, x0, limits=[ptcc.GainLimits(gain_cap=50)], **fast).effort.residual[0].agents is None": "False",
+    "ptcc.certify(g, p, x0, limits=ptcc.GainLimits(gain_cap=50), **fast).effort.residual[0].agents is None": "False",
+    "ptcc.certify(g, p, initial_set=3, **fast).effort.bounded": "True",
+    "ptcc.certify(g, p, initial_set=ptcc.box([0] * 3, [1] * 3), **fast).effort.bounded": "True",
+    "ptcc.box({'ann': 0, 'bob': 0, 'eve': 0}, {'ann': 1, 'bob': 1, 'eve': 1}, g).radius[0]": "1/2",
+    "ptcc.box({'ann': 0}, {'ann': 1})": "ParameterError: low has labels",
+    "ptcc.box(0, 1)": "ParameterError: low is 0; give one number for each agent",
+    "ptcc.worst_initial_state(g, p, 1).size > 0": "True",
+    "ptcc.simulate(g, robust, x0, sigma0=[1, 0, 1], disturbance='sin(2*k*t)', times=[0, 1])": "Trajectory(3 agents",
+    "ptcc.simulate(g, robust, x0, disturbance='sin(2*k*')": "ParameterError: disturbance",
+    "ptcc.simulate(g, robust, x0, disturbance=lambda t, x, sigma: 0 * x, times=[0, 1])": "Trajectory(3 agents",
+    "ptcc.simulate(g, robust, x0, disturbance=lambda t: 0)": "give a function of (t, x, sigma)",
+    "ptcc.simulate(g, robust, x0, disturbance='2', times=[0, 1])": "beyond delta = 1.0; lower it or raise delta",
+}
+STUDENT = {
+    "ptcc.certify('fig1b', p, 'random', **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify('fig1b', p, '5,2,-4,3,-2,1', **fast).final_state": "FinalState(1=",
+    "ptcc.certify('fig9', p)": "FormatError: fig9: no such file, and no packaged graph (fig1a, fig1b",
+    "ptcc.certify(None, p)": "GraphError: None is not read as a graph; give a SignedDigraph, a path",
+    "ptcc.analyse('fig1a').claim.behaviour": "stability",
+    "cert": "Certificate(interval bipartite consensus, Theorem 2.1",
+    "cert.summary()": "verdict",
+    "cert.plot()": "Axes",
+    "cert.plot('states')": "Axes",
+    "cert.plot(what='input')": "Axes",
+    "cert.plot('graph')": "Axes",
+    "cert.plot('spectrum')": "Axes",
+    "cert.plot('pretty')": "ParameterError: what = 'pretty' is unknown; one of decay, input, graph",
+    "cert.trajectory.plot()": "Axes",
+    "ptcc.plot_graph('fig1a')": "Axes",
+}
+REVIEWER = {
+    "ptcc.check(cert).accepted": "True",
+    "ptcc.check(cert.to_dict()).accepted": "True",
+    "ptcc.check(folder / 'c.json').accepted": "True",
+    "ptcc.check('nowhere.json')": "FormatError: nowhere.json",
+    "ptcc.check(5)": "FormatError: 5 is no certificate; give its path",
+    "ptcc.check({'claim': 'all is well'}).accepted": "False",
+    "ptcc.read_certificate(folder / 'c.json') == cert": "True",
+    "ptcc.read_certificate(cert.to_dict()).verdict": "certified",
+    "ptcc.read_certificate({'claim': 'all is well'})": 'the key "schema" is missing',
+    "ptcc.write_report(cert, folder / 'c.docx')": "a report is written to .html or .tex",
+    "ptcc.write_report(cert, folder / 'c.tex', simulation=False)": "certified",
+    "cert.save(folder / 'again.json')": "None",
+    "cert.save(folder / 'nowhere' / 'c.json')": "FormatError: ",
+    "{cert: 1}[ptcc.read_certificate(folder / 'c.json')]": "1",
+}
+CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory) -> dict[str, Any]:
+    """What stands above in the notebook of all five."""
+    nx, pd = pytest.importorskip("networkx"), pytest.importorskip("pandas")
+    pytest.importorskip("matplotlib").use("Agg")
+    edges = [("ann", "bob", -2), ("bob", "ann", -1), ("bob", "eve", 1)]
+    digraph = nx.DiGraph()
+    digraph.add_weighted_edges_from(edges)
+    g, p, x0 = ptcc.as_graph(edges), ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [5, 2, -4]
+    folder = tmp_path_factory.mktemp("notebook")
+    cert = ptcc.certify(g, p, x0, method="perron")
+    cert.save(folder / "c.json")
+    return {
+        **{"ptcc": ptcc, "np": np, "nx": nx, "pd": pd, "sparse": sparse, "Fraction": Fraction, "StringIO": StringIO},
+        **{"g": g, "G": digraph, "p": p, "x0": x0, "cert": cert, "folder": folder, "Path": Path},
+        "df": pd.DataFrame(edges, columns=["source", "target", "weight"]),
+        "W": np.array([[0, -2.0], [-1, 0]]),
+        "robust": ptcc.SlidingModeProtocol(T_r="0.5", T_s="0.5", kappa=1),
+        "fast": {"method": "perron", "simulation": False},
+    }
+
+
+def test_a_hundred_calls_are_listed():
+    assert len(CALLS) >= 100
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, names, monkeypatch):
+    monkeypatch.chdir(names["folder"])
+    try:
+        shown = str(eval(call, dict(names)))  # noqa: S307 - a call of the list above
+    except PTCCError as error:
+        shown = f"{type(error).__name__}: {error}"
+        assert "\n" not in shown
+    assert CALLS[call] in shown
