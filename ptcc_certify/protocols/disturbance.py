@@ -409,7 +409,7 @@ def telegraph_noise(amplitude: float, rate: float, n: int, until: float, seed: i
     amplitude, rate, until = (
         _number(value, name) for value, name in ((amplitude, "amplitude"), (rate, "rate"), (until, "until"))
     )
-    n, seed = whole_number(n, "n (agents)", 1, MAX_SAMPLES), whole_number(seed, "seed", 0, 2**63)
+    n, seed = whole_number(n, "n", 1, MAX_SAMPLES), whole_number(seed, "seed", 0, 2**63)
     if amplitude < 0 or rate < 0 or until <= 0:
         raise ParameterError("telegraph signals need amplitude >= 0, rate >= 0 and until > 0")
     expected = n * rate * until
