@@ -22,7 +22,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.io.files import read_bytes, refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
@@ -192,6 +192,7 @@ class Certificate(Content, Shown):
         FormatError
             The file cannot be written.
         """
+        refuse_no_path(path)
         path = Path(path)
         if self.source is None:
             document, out = self._document(self.verdict)
@@ -316,6 +317,7 @@ def read_certificate(
         if not report.accepted:
             raise RejectedCertificate(file, report)
         return Certificate(**read_document(file, document, sha256, report))
+    refuse_no_path(path)
     path = Path(path)
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)

@@ -8,7 +8,7 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -95,7 +95,7 @@ def certify(
     delta: Any = None,
     noise: Any = None,
     time_limit: float | None = None,
-    expectations: Expectations | None = None,
+    expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
@@ -138,8 +138,9 @@ def certify(
         Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
         more for every 1,000 nodes.
-    expectations : Expectations, optional
-        What is asked besides: a behaviour, a rate, a bound of the input. It decides nothing but the ``assessment``.
+    expectations : Expectations or str, optional
+        What is asked besides: a behaviour (a text names one), a rate, a bound of the input. It decides nothing but the
+        ``assessment``.
     scenario : mapping, optional
         The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
     progress : callable, optional
@@ -176,7 +177,7 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
-    limits = [limits] if isinstance(limits, Limits) else list(limits)
+    limits = list(limits) if isinstance(limits, Iterable) else [limits]
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])

@@ -18,7 +18,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.structure import Structure, behaviour_name
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
@@ -43,6 +43,11 @@ class Expectations:
     max_input : Fraction or None
         A proved peak of every ``|u_k|`` of at most so much, in units of the input.
 
+    Raises
+    ------
+    ParameterError
+        No behaviour is called so, or a number is negative.
+
     References
     ----------
     Theorems 1 to 6 of [Zhu]_ say which behaviour follows.
@@ -59,6 +64,16 @@ class Expectations:
     behaviour: str | None = None
     min_rate: Fraction | None = None
     max_input: Fraction | None = None
+
+    def __post_init__(self) -> None:
+        try:
+            behaviour = None if self.behaviour is None else behaviour_name(str(self.behaviour))
+        except ValueError as error:
+            raise ParameterError(f"expected behaviour: {error}") from None
+        object.__setattr__(self, "behaviour", behaviour)
+        for name in ("min_rate", "max_input"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, parameter(name, value, zero_allowed=True))
 
 
 @dataclass(frozen=True)
@@ -123,14 +138,29 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
-        time_limit=60 + n // 1000 if seconds is None else seconds,
-        expectations=arguments["expectations"] or Expectations(),
+        time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
+        expectations=_expectations(arguments["expectations"]),
         scenario=arguments["scenario"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:
         raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
     return request
+
+
+def _seconds(time_limit: Any) -> float:
+    try:
+        return float(time_limit)
+    except (TypeError, ValueError):
+        raise ParameterError(f"time_limit = {shorten(repr(time_limit))} is not a number of seconds") from None
+
+
+def _expectations(asked: Any) -> Expectations:
+    if asked is None or isinstance(asked, str):
+        return Expectations(asked)
+    if not isinstance(asked, Expectations):
+        raise ParameterError(f"expectations = {shorten(repr(asked))} is none; give Expectations('stability'), say")
+    return asked
 
 
 def _limits(entry: Any, protocol: Protocol) -> GainLimits:

@@ -22,7 +22,7 @@ from ptcc_certify.errors import NumberError, ParameterError, PTCCError
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
-    from ptcc_certify.protocols.gain_limits import Actuator
+    from ptcc_certify.protocols.gain_limits import GainLimits
 
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]
@@ -261,11 +261,11 @@ def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph)
     }
 
 
-def actuator_of(options: Options) -> Actuator | None:
+def actuator_of(options: Options) -> GainLimits | None:
     """Return the limits of the gain; None if there are none."""
-    from ptcc_certify.protocols.gain_limits import Actuator
+    from ptcc_certify.protocols.gain_limits import GainLimits
 
-    actuator = Actuator(**{name: options[name] for name in LIMITS})
+    actuator = GainLimits(**{name: options[name] for name in LIMITS})
     return None if actuator.ideal else actuator
 
 

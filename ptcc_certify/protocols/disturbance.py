@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +19,7 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.equality import ByValue
-from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
+from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten, whole_number
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.expression import ATOMS, Program, enclosure, floats, parse, symbolic
 
@@ -160,7 +160,8 @@ class ExpressionDisturbance(Disturbance):
 
     def __init__(self, text_or_texts: str | Sequence[str]):
         common = isinstance(text_or_texts, str)
-        texts: list[Any] = [text_or_texts] if common else list(text_or_texts)
+        several = list(text_or_texts) if isinstance(text_or_texts, Iterable) else []
+        texts: list[Any] = [text_or_texts] if common else several
         if not texts or not all(isinstance(text, str) for text in texts):
             raise ParameterError("a disturbance is one text, or one text for each agent")
         programs = {" ".join(text.split()): parse(text) for text in dict.fromkeys(texts)}
@@ -408,8 +409,9 @@ def telegraph_noise(amplitude: float, rate: float, n: int, until: float, seed: i
     amplitude, rate, until = (
         _number(value, name) for value, name in ((amplitude, "amplitude"), (rate, "rate"), (until, "until"))
     )
-    if amplitude < 0 or rate < 0 or until <= 0 or n < 1 or seed < 0:
-        raise ParameterError("telegraph signals need amplitude, rate, seed >= 0, until > 0 and at least one agent")
+    n, seed = whole_number(n, "n", 1, MAX_SAMPLES), whole_number(seed, "seed", 0, 2**63)
+    if amplitude < 0 or rate < 0 or until <= 0:
+        raise ParameterError("telegraph signals need amplitude >= 0, rate >= 0 and until > 0")
     expected = n * rate * until
     if expected > MAX_SWITCHES or n * expected > MAX_SAMPLES:
         limit = f"the limits are {MAX_SWITCHES:,} switches and {MAX_SAMPLES:,} samples, one of each agent at each"

@@ -292,4 +292,4 @@ class LimitedGain:
 
 
 #: The limits, by what imposes them.
-Actuator = GainLimits
+GainLimits = GainLimits

@@ -11,6 +11,7 @@ from typing import Any
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
@@ -74,10 +75,13 @@ def write_report(
     'certified'
     ['c.html', 'c.json']
     """
+    refuse_no_path(output)
     path, suffix = Path(output), Path(output).suffix.lower()
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
-    file = None if isinstance(certificate, Certificate | Mapping) else Path(certificate)
+    if not (in_memory := isinstance(certificate, Certificate | Mapping)):
+        refuse_no_path(certificate)
+    file = None if in_memory else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")
     if not path.parent.is_dir():

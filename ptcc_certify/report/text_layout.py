@@ -127,21 +127,27 @@ def wrap_lines(lines: Iterable[str], width: int = WIDTH) -> list[str]:
 
 
 def wrap_command(words: Sequence[str], width: int = WIDTH) -> list[str]:
-    r"""Write a command on lines that a shell takes as one.
+    r"""Write a command on lines that a shell takes as one; an option stays with its value.
 
     Examples
     --------
-    >>> print("\n".join(wrap_command(["ptcc", "certify", "a.csv", "--T", "2"], 20)))
-    ptcc certify a.csv \
-        --T 2
+    >>> print("\n".join(wrap_command(["ptcc", "certify", "a.csv", "--T", "2", "--kappa", "1"], 30)))
+    ptcc certify a.csv --T 2 \
+        --kappa 1
     """
-    lines = [words[0]]
-    for word in words[1:]:
-        if columns(lines[-1]) + columns(word) + 3 > width:
-            lines[-1] += " \\"
-            lines.append(f"    {word}")
+    parts: list[str] = []
+    for word in words:
+        if parts and not word.startswith("--"):
+            parts[-1] += f" {word}"
         else:
-            lines[-1] += f" {word}"
+            parts.append(word)
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if columns(lines[-1]) + columns(part) + 3 > width:
+            lines[-1] += " \\"
+            lines.append(f"    {part}")
+        else:
+            lines[-1] += f" {part}"
     return lines
 
 

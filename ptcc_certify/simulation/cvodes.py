@@ -47,7 +47,7 @@ class Tolerances(NamedTuple):
     def check(self) -> None:
         """Refuse tolerances that CVODES cannot serve."""
         for name, tolerance in self._asdict().items():
-            if not 1e-15 <= tolerance <= 0.1:
+            if not isinstance(tolerance, int | float) or not 1e-15 <= tolerance <= 0.1:
                 raise ParameterError(
                     f"{name} = {tolerance} is outside its domain; {name} must be between 1e-15 and 0.1"
                 )

@@ -19,6 +19,7 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph, as_states
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
@@ -152,6 +153,8 @@ def simulate(
         raise ParameterError(
             "the sliding mode is simulated from one initial state at a time; give N numbers x0 and sigma0"
         )
+    if actuator is not None and not isinstance(actuator, GainLimits):
+        raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
     if boundary_layer is not None and not 1e-12 <= boundary_layer <= 1e12:
         raise ParameterError(f"boundary_layer = {boundary_layer} is outside its domain, 1e-12 to 1e12")
     if times is None:

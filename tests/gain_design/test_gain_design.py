@@ -264,7 +264,7 @@ def test_units_of_weights_and_states_do_not_matter(factor):
         ({"max_input": "x"}, "max_input"),
         ({"initial_bound": -1}, "bound of initial states"),
         ({"initial_bound": math.inf}, "bound of initial states"),
-        ({"initial_bound": InitialSet((Fraction(1),))}, "1 values for 3 agents"),
+        ({"initial_bound": InitialSet((Fraction(1),))}, "1 values? for 3 agents"),
         ({"initial_bound": box([0], [1])}, "1 entries for 3 agents"),
         ({"deadline": "-1"}, "deadline"),
         ({"deadline": math.nan}, "deadline"),

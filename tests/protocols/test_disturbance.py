@@ -520,7 +520,7 @@ def test_telegraph_signals_switch_at_their_rate():
         ((1, 20, 10**4, 1.0), "too many"),
         ((-1, 1, 1, 1.0), "amplitude"),
         ((1, -1, 1, 1.0), "rate"),
-        ((1, 1, 0, 1.0), "agent"),
+        ((1, 1, 0, 1.0), "n = 0"),
         ((1, 1, 1, 0.0), "until"),
         ((1, 1, 1, 1.0, -1), "seed"),
         ((math.nan, 1, 1, 1.0), "amplitude is nan"),

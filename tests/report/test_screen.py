@@ -128,6 +128,22 @@ def test_agents_without_edges_keep_their_state():
     assert text == "error      none: no agent listens to another, each keeps its state"
 
 
+@pytest.mark.parametrize("rho2", ["0.3", "2/3", "5/7"])
+def test_bounds_are_rounded_up(rho2: str):
+    protocol = ptcc.NominalProtocol(T="0.6", rho1="1/3", rho2=rho2, kappa=1)
+    certificate = ptcc.certify(PAIR, protocol, ["5/3", 1], simulation=False, initial_set="7/3")
+    text = " ".join(summary_lines(certificate, "pair"))
+    (error,) = re.findall(r"\|\|E\|\| <= (\S+) \|\|E\(0\)\|\|", text)
+    assert Fraction(error) >= certificate.envelope.residual(0.01)
+    for agents in re.findall(r"every agent within (\S+)", text):
+        assert Fraction(agents) >= certificate.deviation_bound([0.01]).max()
+    if certificate.effort.peak is not None:
+        (size,) = re.findall(r"\|u_k\| <= ([0-9.e+]+) for all", text)
+        assert Fraction(size) >= certificate.effort.peak.largest
+    else:
+        assert "NOT BOUNDED" in text
+
+
 def test_a_certificate_read_back_shows_the_same_screen(tmp_path):
     certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False)
     certificate.save(tmp_path / "c.json")

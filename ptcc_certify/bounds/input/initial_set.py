@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -117,6 +117,8 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: Any = None) -> InitialSet
     >>> ellipsoid([0, 0], [[1, 0], [0, 2]]).axes
     ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
     """
+    if not isinstance(axes, Iterable):
+        raise ParameterError(f"axes = {shorten(repr(axes))} is no list of vectors; give one semi-axis or more")
     if by_label(axes, "axes") is not None:
         raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
     middle = tuple(as_fraction(x, "center") for x in _without_labels(center, graph, "center"))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.input.initial_set import read_initial_set
-from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.rationals import nearest_float, whole_number
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
@@ -86,6 +86,7 @@ def worst_initial_state(
     refuse_no_protocol(protocol)
     structure = analyse(graph)
     initial_set = read_initial_set(structure, initial_set)
+    samples = whole_number(samples, "samples", 1, 10**6)
     L = structure.graph.dense_laplacian()
     center = np.array([nearest_float(x) for x in initial_set.center])
     radius = np.array([nearest_float(x) for x in initial_set.radius]) if initial_set.radius else np.zeros(len(center))

@@ -30,6 +30,19 @@ def name_and_ending(path: Source) -> tuple[str, str]:
     return shorten(text, 200), Path(re.sub(r"\.gz(ip)?$", "", text.lower())).suffix[1:]
 
 
+def refuse_no_path(path: object) -> None:
+    """Refuse what names no file.
+
+    Examples
+    --------
+    >>> refuse_no_path(5)
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: 5 names no file; give a path
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise FormatError(f"{shorten(repr(path))} names no file; give a path")
+
+
 def read_bytes(path: Source, name: str) -> bytes:
     """Read a path, standard input (``-``) or a file object, and undo gzip; text becomes UTF-8."""
     file = getattr(sys.stdin, "buffer", sys.stdin) if isinstance(path, str) and path == "-" else path

@@ -7,10 +7,10 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
-from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
-from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, write_atomically
+from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
 from ptcc_certify.graphs.io.graph_from_rows import graph_of
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gml, read_graphml, read_pajek
@@ -86,7 +86,7 @@ def read_graph(
     ptcc_certify.errors.FormatError: input, line 1: weight "nan" of edge a -> b is not a finite number; ...
     """
     name, ending = name_and_ending(path)
-    ending = ending if format is None else format.lower().lstrip(".")
+    ending = ending if format is None else str(format).lower().lstrip(".")
     _refuse_unknown("orientation", orientation or "information", ("information", "listens"))
     _refuse_unknown("duplicates", duplicates, ("refuse", "sum", "last"))
     _refuse_unknown("format", ending if format else "csv", _READERS)
@@ -174,6 +174,8 @@ def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
 
     Raises
     ------
+    GraphError
+        It is no ``SignedDigraph``.
     FormatError
         The file cannot be written, its ending belongs to another format, or a label would not be read back: it is
         empty, has blanks around it, or is no Unicode text.
@@ -186,6 +188,9 @@ def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
     ...     read_graph(f"{folder}/graph.csv") == graph
     True
     """
+    if not isinstance(graph, SignedDigraph):
+        raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; give ptcc_certify.as_graph of it")
+    refuse_no_path(path)
     name, ending = name_and_ending(path)
     if _READERS.get(ending, read_edge_list) is not read_edge_list:
         raise FormatError(f"{name}: graphs are written as edge lists; let the name end in .csv")

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
+from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import column, records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.rationals import as_fraction, parse_exact, shorten
@@ -24,7 +25,7 @@ _VALUE = ("value", "state", "x", "x0", "sigma0")
 LARGEST_STATE = Fraction(10**300)
 
 
-def as_state(values: Any, graph: SignedDigraph, name: str = "x0") -> list[Fraction]:
+def as_state(values: Any, graph: Any, name: str = "x0") -> list[Fraction]:
     """Return one exact number for each node, in node order, from whatever form a user holds them in.
 
     Every function that takes a state takes all of these.
@@ -37,8 +38,8 @@ def as_state(values: Any, graph: SignedDigraph, name: str = "x0") -> list[Fracti
         - by label, in any order: a mapping or a pandas Series, or a DataFrame of one column;
         - a text or a path as :func:`read_state` takes it: ``"5,2,-4"``, ``"b=2, a=1"``, ``"state.csv"``;
         - ``"random"``: the state that ``ptcc certify`` draws.
-    graph : SignedDigraph
-        N nodes.
+    graph : graph-like
+        N nodes; whatever :func:`ptcc_certify.as_graph` takes.
     name : str
         What messages call it.
 
@@ -65,7 +66,7 @@ def as_state(values: Any, graph: SignedDigraph, name: str = "x0") -> list[Fracti
     return [row[0] for row in rows]
 
 
-def as_states(values: Any, graph: SignedDigraph, name: str = "x0") -> list[list[Fraction]]:
+def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]:
     """Return S exact numbers for each node: what :func:`as_state` takes, or N rows of S numbers, by label or in order.
 
     Returns
@@ -83,6 +84,7 @@ def as_states(values: Any, graph: SignedDigraph, name: str = "x0") -> list[list[
     >>> as_states({"b": [3, 4], "a": [1, 2]}, graph) == as_states([[1, 2], [3, 4]], graph)
     True
     """
+    graph = as_graph(graph)
     if isinstance(values, str) and values.strip() == "random":
         return random_states([0, 1] if name == "sigma0" else 0, graph.n_nodes)  # what the command line draws
     if isinstance(values, str | os.PathLike):
