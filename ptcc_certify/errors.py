@@ -5,7 +5,10 @@ A message is one line: what is wrong, where, and how to mend it.
 """
 
 import traceback
+from collections.abc import Iterable
+from difflib import get_close_matches
 from enum import IntEnum
+from itertools import islice
 from pathlib import Path
 
 
@@ -125,6 +128,33 @@ def one_line(text: str) -> str:
     'a.csv, line 2: ?[31m'
     """
     return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return what a refusal of a name may add: the names that it may have been meant for; nothing if none is near.
+
+    Parameters
+    ----------
+    name : str
+    names : iterable of str
+        The first 5,000 count.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> did_you_mean("rh1", ["rho1", "kappa"]), did_you_mean("Fig1A", ["fig1a"]), did_you_mean("x", ["kappa"])
+    ('; did you mean rho1?', '; did you mean fig1a?', '')
+    """
+    lower: dict[str, str] = {}
+    for other in islice(names, 5000):
+        lower.setdefault(other.lower(), other)
+    if (same := lower.get(name.lower())) is not None:
+        return f"; did you mean {same}?"
+    near = [lower[match] for match in get_close_matches(name.lower()[:200], lower, n=3, cutoff=0.6)]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def explain(error: Exception) -> str:

@@ -37,7 +37,7 @@ bound of the input is compared with ``U`` exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -78,7 +78,6 @@ _NUDGES = 20
 #: How often gains are sought with the functions that certify finds for those before, until it proves its own.
 _ROUNDS = 4
 _PRODUCT_BITS = 40
-_NO_RESIDUAL = "none, every agent is at its final state"
 
 
 class TradeOff(NamedTuple):
@@ -286,27 +285,49 @@ class Design(Shown):
         middle = nearest_float(next(T for T in candidates if T))
         return np.geomspace(middle / 5, middle * 5, count)
 
+    @property
+    def request_text(self) -> str:
+        """What was asked, in one line."""
+        initial_set, deadline, residual = self.asked.initial_set, self.asked.deadline, self.asked.residual
+        R = max(initial_set.radius, default=Fraction(0))
+        box = not any(initial_set.center) and R and min(initial_set.radius) == R
+        states = f"all |x_k(0)| <= {short_exact(R)}" if box else "the given initial states"
+        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {short_exact(self.asked.max_input)}"
+        text = f"{size} from {states}, "
+        text += "shortest deadline" if deadline is None else f"deadline {short_exact(deadline)}"
+        return text + ("" if residual is None else f", deviation {short_exact(residual)}")
+
+    @property
+    def bounds_text(self) -> str:
+        """What is proved of input and deviation at the deadline, in one line; empty without gains."""
+        if self.peak is None or self.residual is None:
+            return ""
+        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {up(self.peak)}"
+        ends = f"within {up(self.residual)} of" if self.residual else "at"
+        return f"{size}, every agent {ends} its final state at T"
+
+    @property
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+        least, most = self.shortest_possible, self.shortest_certified
+        parts = [] if most is None else [f"{up(most, DIGITS)} is met"]
+        parts += [] if least is None else [f"no gains meet one below {down(least)}"]
+        return "; ".join(parts)
+
     def lines(self) -> list[str]:
-        """Return what the screen shows."""
-        request = f"{'||u||' if self.asked.input_norm == 2 else 'max |u_k|'} <= {short_exact(self.asked.max_input)}"
-        deadline, residual = self.asked.deadline, self.asked.residual
-        request += ", shortest deadline" if deadline is None else f", deadline {short_exact(deadline)}"
-        request += "" if residual is None else f", residual {short_exact(residual)}"
-        rows = [("asked", request), ("verdict", self.verdict), ("", self.binding)]
+        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines, the largest input."""
+        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
         if self.protocol is not None:
-            gains = (f"{name} = {short_exact(value)}" for name, value in self.protocol.parameters.items())
+            gains = (f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
             rows.append(("gains", ", ".join(gains)))
-        times = "" if self.ratio is None else f", {up(self.ratio, 3)} times shorter"
-        numbers: tuple[tuple[str, Fraction | None, Callable[[Fraction], str]], ...] = (
-            ("", self.gain_cap, lambda x: f"gain capped at {short_exact(x)}, which acts from 0 on"),
-            ("peak input", self.peak, lambda x: f"{up(x)} at most"),
-            ("left at the deadline", self.residual, lambda x: f"{up(x)} at most" if x else _NO_RESIDUAL),
-            ("shortest deadline", self.shortest_certified, lambda x: f"{up(x, DIGITS)} certified"),
-            ("", self.shortest_possible, lambda x: f"{down(x)} at least, whatever the gains{times}"),
-        )
-        rows += [(name, text(value)) for name, value, text in numbers if value is not None]
-        width = max(len(name) for name, _ in rows)
-        return [f"{name:<{width}}  {text}" for name, text in rows]
+        if self.gain_cap is not None:
+            rows.append(("", f"gain saturated at {short_exact(self.gain_cap)}, from t = 0 on"))
+        rows += [("proved", self.bounds_text), ("deadline", self.deadline_text)]
+        if self.ratio is not None:
+            rows.append(("", f"ratio of the two at most {up(self.ratio, 3)}"))
+        if self.worst is not None and self.protocol is not None:
+            rows.append(("numerical", f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"))
+        return [f"{name:<10} {text}" for name, text in rows if text]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
@@ -399,7 +420,7 @@ def design(
     --------
     >>> trio = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     >>> design(trio, max_input=20, initial_bound=3, deadline=1)
-    Design(infeasible: the input of agent 2 at the start: no gains meet a deadline below 1.18857, 1.18857 times the \
+    Design(infeasible: the input of agent 2 at t = 0: no gains meet a deadline below 1.18857, 1.18857 times the \
 one asked for)
     >>> answer = design(trio, max_input=20, initial_bound=3, deadline="2.5")
     >>> answer.verdict, bool(answer.peak <= 20), answer.certificate.verdict
@@ -508,7 +529,7 @@ def _lower_product(base: Certificate, request: DesignRequest) -> tuple[Fraction 
     if request.residual is None and limit and _has_inner_points(initial_set):
         for agent, weights in zip(agents, graph.exact_rows(range(graph.n_nodes)), strict=True):
             candidates.append(
-                (2 / limit * _largest_below(initial_set, weights), f"the input of agent {agent} at the start")
+                (2 / limit * _largest_below(initial_set, weights), f"the input of agent {agent} at t = 0")
             )
     best, why = max(candidates, key=lambda entry: entry[0])
     return (rounded(best, _PRODUCT_BITS) if best > 0 else None), why
@@ -667,7 +688,7 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
     if not fit.peak:
         binding = "nothing binds: no agent moves, whatever the gains"
     elif cert.limits:
-        binding = f"the capped gain times the largest error at the start, {_percent(fit.peak, limit)}"
+        binding = f"the capped gain times the largest error at t = 0, {_percent(fit.peak, limit)}"
     else:
         assert effort is not None and effort.peak is not None
         agents, by_norm = effort.peak.agents, blank.asked.input_norm == 2
@@ -690,7 +711,7 @@ def _answer_without_gains(answer: Design) -> Design:
         return answer
     if answer.peak <= U:
         return replace(answer, binding="the residual is not proved")
-    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times max_input"
+    over = f"the certified peak is {up(answer.peak)}, {up(answer.peak / U)} times the limit"
     return replace(answer, binding=f"{over}; from T = {up(answer.product / U)} on it is met")
 
 
@@ -714,4 +735,4 @@ def _decimal(x: Fraction, up: bool = False) -> Fraction:
 
 
 def _percent(part: Fraction, whole: Fraction) -> str:
-    return f"{up(100 * part / whole, 4)}% of max_input"
+    return f"{up(100 * part / whole, 4)} % of the limit"

@@ -62,6 +62,18 @@ def ptcc(*args: str, stdin: bytes = b"") -> Run:
     return Run(code, *texts)
 
 
+def detailed(*args: str) -> Run:
+    """Call ``ptcc .. -v``; of what it prints, lines that continue another are joined to it."""
+    run = ptcc(*args, "-v")
+    lines: list[str] = []
+    for line in run.out.splitlines():
+        if line.startswith(" " * 11) and lines:
+            lines[-1] += " " + line.strip()
+        else:
+            lines.append(line)
+    return Run(run.code, "\n".join(lines) + "\n", run.err)
+
+
 def write(files: Sequence[tuple[str, Content]], folder: Path) -> None:
     for name, content in files:
         path = folder / name
@@ -165,7 +177,7 @@ FILES = [
     _graph("binary file", bytes(range(256)) * 40, "line 1"),
     _graph("Latin-1 text", "é,b,1\n".encode("latin-1"), "not UTF-8"),
     _graph("UTF-16 text", "a,b,1\n".encode("utf-16"), "UTF-8"),
-    _graph("directory", _folder, "is a directory"),
+    _graph("directory", _folder, "is a folder"),
     _graph("unreadable file", _unreadable, "g.csv"),
     BadInput("missing file", ("certify", "nowhere.csv", "-o", "out.json"), "no such file"),
     BadInput("standard input empty", ("certify", "-", "-o", "out.json"), "no edge and no node"),
@@ -206,7 +218,8 @@ FILES = [
 
 
 def _option(name: str, says: str, *options: str, command: str = "certify", graph: str = "fig1b") -> BadInput:
-    return BadInput(name, (command, graph, *options, "-o", "out.csv"), says, _PAIR)
+    output = "out.csv" if command == "simulate" else "out.json"
+    return BadInput(name, (command, graph, *options, "-o", output), says, _PAIR)
 
 
 def _start(name: str, content: str, says: str) -> BadInput:
@@ -268,7 +281,7 @@ OPTIONS = [
     _option("simulated x0 of 400 digits", "x0", "--x0", "9" * 400 + ",2,3,4,5,6", command="simulate"),
     BadInput("no certificate", ("check",), "CERTIFICATE"),
     BadInput("missing certificate", ("check", "nowhere.json"), "nowhere.json: not a readable certificate"),
-    BadInput("certificate that is a folder", ("check", "c.json"), "directory", (("c.json", _folder),)),
+    BadInput("certificate that is a folder", ("check", "c.json"), "is a folder", (("c.json", _folder),)),
     BadInput("certificate cut short", ("check", "c.json"), "not a readable", (("c.json", '{"schema": "ptcc-'),)),
     BadInput("another schema", ("check", "c.json"), "ptcc-certificate/2", (("c.json", '{"schema": "x/9"}'),)),
     BadInput("a graph for a certificate", ("check", "g.csv"), "not a readable certificate", _PAIR),
@@ -279,7 +292,7 @@ OPTIONS = [
     BadInput("output into a missing folder", ("certify", "fig1b", "-o", "nowhere/out.json"), "folder"),
     BadInput("output a directory", ("certify", "fig1b", "-o", "there"), "directory", (("there", _folder),)),
     BadInput("output below a file", ("certify", "fig1b", "-o", "g.csv/out.json"), "folder", _PAIR),
-    BadInput("output over the graph", ("certify", "g.csv", "-o", "./g.csv"), "graph itself", _PAIR),
+    BadInput("output over the graph", ("certify", "g.tsv", "-o", "./g.tsv"), "graph itself", (("g.tsv", "a\tb\t1\n"),)),
     BadInput("output named -", ("certify", "fig1b", "-o", "-"), "-o names a file"),
     BadInput("CSV into a missing folder", ("simulate", "fig1b", "-o", "nowhere/out.csv"), "folder"),
     BadInput("figure of an unknown kind", ("simulate", "fig1b", "-o", "out.jpg"), "out.jpg"),
@@ -319,7 +332,7 @@ INPUT = [
     _input("design without a deadline", "--deadline", "--max-input", "1", "--initial-bound", "1", command="design"),
     _input(
         "design with both deadlines",
-        "one of the two",
+        "ask for two things",
         "--max-input",
         "1",
         "--initial-bound",

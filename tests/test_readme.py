@@ -72,26 +72,22 @@ def test_python_runs(code: str):
 
 
 def test_the_transcript_is_what_ptcc_prints():
-    """To the letter, but for lines of floating point, whose last digits depend on the machine.
-
-    These are the two lines of the simulation and the two of the search.
-    """
     (block,) = blocks("console")
-    command, *shown = block.rstrip("\n").splitlines()
+    command, shown = block.split("\n", 1)
     done = ptcc(command.removeprefix("$ "))
-    assert done.code == 0, done.err
-    printed = done.out.splitlines()
-    assert len(printed) == len(shown)
-    for said, seen in zip(shown, printed, strict=True):
-        if not re.match(r"simulated|\s+(end state|searched|used)", said):
-            assert said == seen
+    assert (done.code, done.out) == (0, shown)
 
 
-def test_the_verdict_line_is_what_ptcc_prints():
+def test_the_verdict_lines_are_what_ptcc_prints():
     """A refuted expectation, and gains with which the bound would say something."""
-    ((command, shown),) = re.findall(r"\n(ptcc certify [^\n]*)\n\.\.\.\n(verdict [^\n]*)\n", TEXT)
+    ((command, shown),) = re.findall(r"\n(ptcc certify [^\n]*)\n\.\.\.\n(verdict [^`]*)```", TEXT)
     done = ptcc(command)
-    assert done.code == 3 and done.out.splitlines()[-1] == shown
+    assert done.code == 3 and done.out.endswith(shown)
+
+
+def test_the_line_of_an_unbounded_input_is_what_ptcc_prints():
+    ((command, shown),) = re.findall(r"\n(ptcc certify [^\n]*)\n\.\.\.\n(INPUT [^\n]*\n)", TEXT)
+    assert shown in ptcc(command).out
 
 
 def test_the_set_up_commands_are_there():

@@ -121,9 +121,12 @@ class Settings:
             "x0": _as_initial_state(self.x0, "x0"),
             "sigma0": _as_initial_state(self.sigma0, "sigma0"),
         }
-        for name in ("initial_bound", "min_rate", "time_limit"):
+        for name, unit in (("initial_bound", ""), ("min_rate", ""), ("time_limit", ", in seconds")):
             if getattr(self, name) is not None:
-                values[name] = parameter(name, getattr(self, name))
+                try:
+                    values[name] = parameter(name, getattr(self, name))
+                except ParameterError as error:
+                    raise ParameterError(f"{error}{unit}") from None
         if self.expect is not None:
             try:
                 values["expect"] = behaviour_name(self.expect)

@@ -26,7 +26,7 @@ def check(
     Parameters
     ----------
     source : str, Path, mapping or Certificate
-        A path, the parsed JSON object, or a certificate as it would be written.
+        A path, ``"-"`` for standard input, the parsed JSON object, or a certificate as it would be written.
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional

@@ -422,6 +422,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
         "final_state": floats,
         "asked": _write_request(content.request),
+        "scenario": None if content.request.scenario is None else dict(content.request.scenario),
         "simulation": _write_run(content),
         "time_limit": finite(content.time_limit),
         "cut_off": list(content.cut_off),
@@ -475,6 +476,7 @@ def _write_request(request: Request) -> dict[str, Any]:
 def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
     """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
     section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
+    scenario = unverified.get("scenario")
     section = section if isinstance(section, dict) else {}
     method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:
@@ -491,6 +493,7 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
         expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
+        scenario=scenario if isinstance(scenario, dict) else None,
     )
 
 

@@ -8,7 +8,7 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -96,6 +96,7 @@ def certify(
     noise: Any = None,
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
+    scenario: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda step: None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -140,6 +141,8 @@ def certify(
     expectations : Expectations or str, optional
         What is asked besides: a behaviour (a text names one), a rate, a bound of the input. It decides nothing but the
         ``assessment``.
+    scenario : mapping, optional
+        The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -179,7 +182,8 @@ ReachingTime(0, 1 before T_r)))
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
-    request = read_request(structure, protocol, {**options, "time_limit": time_limit, "expectations": expectations})
+    options |= {"time_limit": time_limit, "expectations": expectations, "scenario": scenario}
+    request = read_request(structure, protocol, options)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)

@@ -98,6 +98,8 @@ class Request:
         Seconds that the searches were given, infinity for no limit.
     expectations : Expectations
         What is asked besides; what became of it is part of ``assessment``.
+    scenario : mapping or None
+        The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
     """
 
     method: str = "best"
@@ -108,6 +110,7 @@ class Request:
     noise: Fraction | None = None
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
+    scenario: Mapping[str, Any] | None = None
 
 
 def refuse(
@@ -135,8 +138,9 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
-        time_limit=60 + n / 1000 if seconds is None else _seconds(seconds),
+        time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
         expectations=_expectations(arguments["expectations"]),
+        scenario=arguments["scenario"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:

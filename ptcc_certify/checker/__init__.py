@@ -42,7 +42,7 @@ from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
 
-USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE [--stdlib] [--memory GB]"
+USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
 
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
@@ -99,7 +99,7 @@ def read_and_check(
     Parameters
     ----------
     source : str, Path or mapping
-        A path, or the parsed JSON object.
+        A path, ``-`` for standard input, or the parsed JSON object; side files are in the folder of the path.
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional
@@ -184,7 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if paths in (["-h"], ["--help"]):
         print(USAGE)
         return 0
-    if len(paths) != 1 or paths[0].startswith("-") or not paths[0] or not 0 < memory < math.inf:
+    if len(paths) != 1 or (paths[0].startswith("-") and paths[0] != "-") or not paths[0] or not 0 < memory < math.inf:
         print(USAGE, file=sys.stderr)
         return 2
     try:

@@ -94,5 +94,6 @@ class CheckReport:
         """Return the report as text, one line for each obligation."""
         lines = [f"verified   {o.kind} of {o.of}: {o.detail} ({o.lemma})" for o in self.obligations]
         if self.accepted:
-            return [*lines, f"accepted   {self.verdict}; {len(self.obligations)} obligation(s) by {self.arithmetic}"]
+            count = f"{len(self.obligations)} proof obligation{'s' * (len(self.obligations) != 1)}"
+            return [*lines, f"accepted   {self.verdict}; {count} by {self.arithmetic}"]
         return [*lines, f"rejected   {self.rejected}: {self.reason}"]

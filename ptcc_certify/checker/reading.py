@@ -7,6 +7,7 @@ import json
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ class UnreadableError(ValueError):
 def read(path: str | Path) -> dict[str, Any]:
     """Read the JSON of a certificate strictly: bounded size, no duplicate keys, no number that is not finite.
 
+    The path ``-`` is standard input.
+
     Raises
     ------
     UnreadableError
@@ -51,9 +54,9 @@ def read(path: str | Path) -> dict[str, Any]:
             raise ValueError(f"{shorten(text)} is not a number that is kept")
         return value
 
-    name = shorten(str(path), 200)
+    name = "standard input" if path == "-" else shorten(str(path), 200)
     try:
-        with Path(path).open("rb") as file:
+        with nullcontext(sys.stdin.buffer) if path == "-" and sys.stdin else Path(path).open("rb") as file:
             content = file.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")

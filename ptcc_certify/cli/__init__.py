@@ -11,44 +11,118 @@ of them; :mod:`~ptcc_certify.cli.terminal` prints.
 from __future__ import annotations
 
 import io
+import os
 import sys
+from typing import Any
 
 import click
 
-from ptcc_certify.cli import batch, certify, check_and_report, classify, design, examples_and_cite, simulate
-from ptcc_certify.errors import ExitCode, PTCCError, explain, one_line
+from ptcc_certify.cli import (
+    batch,
+    certify,
+    check_and_report,
+    classify,
+    completion,
+    design,
+    examples_and_cite,
+    new,
+    plot,
+    simulate,
+)
+from ptcc_certify.cli.scenario import placed
+from ptcc_certify.errors import ExitCode, PTCCError, did_you_mean, explain, one_line
+from ptcc_certify.graphs.rationals import shorten
 
 __all__ = ["cli", "main"]
 
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
-class _InOrder(click.Group):
-    """Commands in the order of their use, as they are added below."""
+#: What the help says of each command, and in which order: these words, or those of the command itself.
+GROUPS = {
+    "Ask about a graph": {
+        "classify": "Tell its structure and the theorem that applies.",
+        "certify": "Prove what the protocol does on it; write a certificate.",
+        "simulate": "Run the protocol: a table, or a figure of the states.",
+        "design": "Find gains and a deadline that keep the input within limits.",
+        "batch": "Certify many graphs: one table.",
+    },
+    "Certificates": {
+        "check": "Check a certificate exactly, without a solver.",
+        "report": "Write a page, or LaTeX, to send to somebody.",
+        "plot": "Draw a figure of a certificate or a graph.",
+    },
+    "Set up and learn": {
+        "new": "Write a commented scenario file to begin with.",
+        "examples": "Run the paper's examples, figures included.",
+        "explore": "Try graph, deadline and gains in a browser.",
+        "cite": "Print BibTeX of the theorem used.",
+        "completion": "Complete names with TAB in bash, zsh or fish.",
+    },
+}
+
+
+class _Commands(click.Group):
+    """Commands in groups, each with one plain line; near names of one that is not there."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.commands)
+        named = [name for group in GROUPS.values() for name in group if name in self.commands]
+        return [*named, *(name for name in self.commands if name not in named)]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        lines = {name: command.get_short_help_str(60) for name, command in self.commands.items()}
+        for title, group in {**GROUPS, "More": {}}.items():
+            rows = [(name, text) for name, text in group.items() if lines.pop(name, None) is not None]
+            if rows := rows if group else list(lines.items()):
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if not args[0].startswith("-") and args[0] not in self.commands:
+            hint = did_you_mean(args[0], self.commands) or "; ptcc --help lists the commands"
+            raise click.UsageError(f'there is no command "{shorten(args[0])}"{hint}', ctx)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (PTCCError, click.BadParameter) as error:
+            raise placed(ctx, error) from None
+        except click.NoSuchOption as error:
+            files = [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]  # noqa: PTH110
+            if not files:
+                raise
+            raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
 
 
-@click.group(cls=_InOrder, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(package_name="ptcc-certify", prog_name="ptcc")
 def cli() -> None:
     """Certify prescribed-time coordination control on signed digraphs.
 
-    GRAPH is a file, - for standard input, or the name of a packaged graph (fig1a, fig1b, fig3a, fig3b, fig5a, fig5b).
+    GRAPH is a file (a table source,target,weight, or any common format of graphs), - for standard input, or the name
+    of a packaged graph: fig1a, fig1b, fig3a, fig3b, fig5a, fig5b. A scenario file, SCENARIO.toml, stands for a graph
+    with all that is asked about it.
+
+    Begin with: ptcc certify fig1b
     """
 
 
 for command in (
+    new.new,
     classify.classify,
     certify.certify,
     check_and_report.check,
     check_and_report.report,
     simulate.simulate,
     design.design,
+    plot.plot,
     examples_and_cite.examples,
     batch.batch,
     examples_and_cite.cite,
+    completion.completion,
 ):
     cli.add_command(command)
 
@@ -60,6 +134,9 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a label that the terminal cannot show stops nothing
     try:
         code = cli.main(prog_name="ptcc", standalone_mode=False)
+    except click.MissingParameter as error:
+        more = f"; {error.ctx.command_path} --help tells more" if error.ctx else ""
+        code = _refuse(error.format_message().rstrip(".") + more)
     except click.ClickException as error:
         if isinstance(error, _NO_ARGUMENTS):
             click.echo(error.format_message(), err=True)

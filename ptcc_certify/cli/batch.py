@@ -11,6 +11,8 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -19,8 +21,18 @@ from ptcc_certify.errors import ExitCode, ParameterError
 _SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", "min_rate", "initial_bound")
 
 
+def _refuse_scenarios(context: click.Context, parameter: click.Parameter, pattern: tuple[str, ...]) -> tuple[str, ...]:
+    for text in pattern:
+        if kind_of(text) == "a scenario":
+            mend = f"ptcc certify {text} runs it; ptcc batch takes graphs, and the options of certify"
+            raise ParameterError(f"{text}: is a scenario, for one graph; {mend}")
+    return pattern
+
+
 @click.command()
-@click.argument("pattern", nargs=-1, required=True)
+@click.argument(
+    "pattern", nargs=-1, required=True, callback=_refuse_scenarios, shell_complete=complete(GRAPHS, PACKAGED)
+)
 @shared.reading_options
 @shared.protocol_options
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.terminal import print_json, print_lines, progress, refuse_output
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.scenario import scenario_record
+from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
+from ptcc_certify.errors import ParameterError, one_line
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
 
 
 @click.command()
-@shared.graph_options
+@shared.graph_argument
 @shared.protocol_options
+@shared.output_option
+@shared.json_option
+@screen_options
+@shared.reading_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @shared.number_option(
-    "--min-rate", metavar="R", help="Ask for a proved rate of at least R per unit of the stretched clock."
+    "--min-rate", metavar="R", help="Ask for a proved decay rate of at least R per unit of the stretched clock."
+)
+@shared.number_option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
+@shared.number_option(
+    "--at", metavar="t", help="Optimise the bound at this instant, and print it; -v: for every agent."
 )
 @shared.method_option
 @shared.limit_options
@@ -24,48 +37,79 @@ from ptcc_certify.errors import ParameterError
 @shared.number_option(
     "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
 )
-@shared.number_option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
-@shared.number_option("--at", metavar="t", help="Optimise the bound at this instant, and print it for every agent.")
 @click.option(
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
 )
 @shared.time_limit_option
-@shared.output_option
-@shared.json_option
-def certify(graph: str, output: str | None, as_json: bool, **options: Any) -> int:
-    """Certify what the protocol does on GRAPH: behaviour, rate, final state; compare with a CVODES run."""
+def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
+    """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
+
+    Prints at most 8 lines, 12 of a disconnected graph; -v tells rates, the Lyapunov functions searched and used, proof
+    obligations and the simulated run. Exit code 0: certified, and everything asked holds.
+    """
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.report.screen import certificate_lines, summary_lines
+
+    refuse_output(output, graph)
+    protocol = shared.protocol_of(options)
+    signed = shared.read(graph, options)
+    LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
+    more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
+    with progress(STEPS, screen.quiet) as begin:
+        certificate = run(signed, protocol, x0, progress=begin, **more)
+    _log_result(certificate)
+    if output:
+        certificate.save(output)
+        LOG.info("%s", one_line(f"written {output}"))
+    assessment = certificate.assessment
+    if as_json:
+        print_json(certificate.to_dict())
+        if assessment.exit_code and not screen.quiet:
+            click.echo(f"verdict    {assessment.text}", err=True)
+        return assessment.exit_code
+    case = certificate, graph, _origins(options)
+    screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))
+    if output:
+        screen.note(f"written    {output}")
+    return assessment.exit_code
+
+
+def _requests(options: shared.Options) -> dict[str, Any]:
+    """Return what is asked besides graph, protocol and initial state, as the library takes it."""
     from ptcc_certify.certificate.request import Expectations
-    from ptcc_certify.report.screen import certificate_lines
 
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
-    refuse_output(output, graph)
-    protocol = shared.protocol_of(options)
-    signed = shared.read(graph, options)
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    more = shared.sliding_keywords(protocol, options, signed)
+    more: dict[str, Any] = {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
+    more |= {"initial_set": options["initial_bound"]}
+    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
-        more = {"limits": [] if actuator is None else [actuator], "delta": options["delta"], "noise": options["noise"]}
-    elif options["noise"] is not None:
+        limits = [] if actuator is None else [actuator]
+        return more | {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
+    if options["noise"] is not None:
         raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
-    more |= {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
-    more |= {"initial_set": options["initial_bound"]}
-    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most)}
-    with progress(STEPS) as begin:
-        certificate = run(signed, protocol, x0, progress=begin, **more)
-    if output:
-        certificate.save(output)
-    assessment = certificate.assessment
-    if as_json:
-        print_json(certificate.to_dict())
-        if assessment.exit_code:
-            click.echo(f"verdict    {assessment.text}", err=True)
-    else:
-        print_lines(certificate_lines(certificate, graph))
-        if output:
-            click.echo(f"written    {output}")
-    return assessment.exit_code
+    return more
+
+
+def _origins(options: shared.Options) -> dict[str, str]:
+    """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed."""
+    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
+    return {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
+
+
+def _log_result(certificate: Certificate) -> None:
+    """Log what was searched, what the time limit cut off, and what was decided."""
+    search = certificate.search
+    for kind, rate in search.searched.items():
+        LOG.info("searched %s: numerical decay rate %.6g", kind, rate)
+    for V in certificate.functions:
+        LOG.info("proved %s: decay rate %s", V.kind, down(V.proved_rate))
+    for part in certificate.cut_off:
+        LOG.warning("cut off by the time limit of %g s: %s", certificate.time_limit, part)
+    for note in certificate.notes:
+        LOG.info("note: %s", one_line(note))
+    LOG.info("verdict %s; exit code %d", one_line(certificate.assessment.text), certificate.assessment.exit_code)

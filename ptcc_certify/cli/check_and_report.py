@@ -10,30 +10,39 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.terminal import print_json, print_lines, progress
-from ptcc_certify.errors import ExitCode
+from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.terminal import Screen, print_json, progress, screen_options
+from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
 
 
 @click.command()
-@click.argument("certificate")
-@click.argument("graph", required=False)
+@shared.certificate_argument
+@click.argument("graph", required=False, shell_complete=complete(GRAPHS, PACKAGED))
 @shared.reading_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
 @shared.memory_option
 @shared.json_option
-def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, **options: Any) -> int:
+@screen_options
+def check(
+    certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, screen: Screen, **options: Any
+) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
-    GRAPH is read as the certificate says that it was read, which is printed; the options about reading override that.
-    Prints every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected, 4 if the
-    certificate itself says undecided. `python -m ptcc_certify.checker` does the same without any other package.
+    CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
+    certificate says that it was read, which is printed; the options about reading override that. Prints claim and
+    verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected,
+    4 if the certificate itself says undecided. `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
+    from ptcc_certify.report.screen import check_summary
+    from ptcc_certify.report.text_layout import wrap_lines
 
-    with progress(("independent check",)) as begin:
+    if certificate == graph == "-":
+        raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
+    with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")
         document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
     how: dict[str, str] = {}
@@ -42,7 +51,8 @@ def check(certificate: str, graph: str | None, stdlib: bool, memory: float, as_j
     if as_json:
         print_json(report.to_dict() | how)
     else:
-        print_lines([*(f"graph      {how[key]}" for key in how), *report.lines()])
+        lines = [f"graph      {how[key]}" for key in how]
+        screen.show(lambda: wrap_lines(lines) + check_summary(document, report), lambda: lines + report.lines())
     if not report.accepted:
         return ExitCode.VIOLATED
     return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED
@@ -69,7 +79,7 @@ def _same_graph(
 
 
 @click.command()
-@click.argument("certificate")
+@shared.certificate_argument
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False), required=True, help="A page, .html, or a statement, .tex"
 )

@@ -6,19 +6,21 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.options import expect_option, graph_options, json_option, read
-from ptcc_certify.cli.terminal import print_json, print_lines
+from ptcc_certify.cli.options import expect_option, graph_argument, json_option, read, reading_options
+from ptcc_certify.cli.terminal import Screen, print_json, screen_options
 from ptcc_certify.errors import ExitCode
 
 
 @click.command()
-@graph_options
+@graph_argument
 @expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @json_option
-def classify(graph: str, expect: str | None, as_json: bool, **options: Any) -> int:
+@screen_options
+@reading_options
+def classify(graph: str, expect: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Tell the structure of GRAPH and the theorem that applies; no computation in floating point."""
     from ptcc_certify.graphs.structure import analyse
-    from ptcc_certify.report.screen import structure_lines
+    from ptcc_certify.report.screen import structure_lines, structure_summary
 
     structure = analyse(read(graph, options))
     if as_json:
@@ -26,7 +28,7 @@ def classify(graph: str, expect: str | None, as_json: bool, **options: Any) -> i
 
         print_json(structure_document(structure))
     else:
-        print_lines(structure_lines(structure, graph))
+        screen.show(lambda: structure_summary(structure, graph), lambda: structure_lines(structure, graph))
     if expect is None:
         return ExitCode.OK
     from ptcc_certify.certificate.verdict import MET, judge_behaviour

@@ -8,65 +8,95 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.cli.options import Options, flag_of, graph_options, json_option, number_option, output_option, read
-from ptcc_certify.cli.terminal import FIGURES, print_json, print_lines, refuse_output
-from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.cli.options import (
+    Options,
+    flag_of,
+    graph_argument,
+    json_option,
+    number_option,
+    output_option,
+    read,
+    reading_options,
+)
+from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
+from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
     from ptcc_certify.gain_design import Design
 
+_EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadline"
+
 
 @click.command()
-@graph_options
-@number_option("--max-input", metavar="U", required=True, help="Every |u_k| at all times, from all initial states.")
-@number_option("--initial-bound", metavar="R", required=True, help="All initial states with |x_k(0)| <= R.")
-@number_option("--deadline", metavar="T", help="Ask for this deadline.")
-@click.option("--shortest-deadline", is_flag=True, help="Ask for the shortest deadline.")
+@graph_argument
+@number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
+@number_option("--initial-bound", metavar="R", help="Needed. All initial states with |x_k(0)| <= R.")
+@number_option("--deadline", metavar="T", help="Ask for this deadline ..")
+@click.option("--shortest-deadline", is_flag=True, help=".. or for the shortest one.")
 @number_option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
 @click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
-@click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
 @output_option
 @json_option
-def design(graph: str, curve: str | None, output: str | None, as_json: bool, **options: Any) -> int:
+@click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
+@screen_options
+@reading_options
+def design(graph: str, curve: str | None, output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
-    The numbers printed are exact, and the last line is the command that proves them again with exit code 0.
+    The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
 
-    Exit code 0: found, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
+    Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
     from ptcc_certify.gain_design import INFEASIBLE, MET
     from ptcc_certify.gain_design import design as run
+    from ptcc_certify.report.design_screen import design_lines, design_summary
 
-    if (options["deadline"] is None) != options["shortest_deadline"]:
-        raise ParameterError("give --deadline T, or ask for the --shortest-deadline: one of the two")
+    _refuse_incomplete(options)
     for path in (output, curve):
         refuse_output(path, graph)
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
     request: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}
-    answer = run(read(graph, options), input_norm=2 if options["input_norm"] else None, **request)
+    signed = read(graph, options)
+    with progress(("search of gains",), screen.quiet) as begin:
+        begin("search of gains")
+        answer = run(signed, input_norm=2 if options["input_norm"] else None, **request)
+    LOG.info("%s", one_line(f"{answer.verdict}: {answer.binding}"))
     if output and answer.certificate is not None:
         answer.certificate.save(output)
     if curve:
         _save_curve(answer, curve)
     command = _certify_command(answer, graph, options)
     if as_json:
-        print_json(answer.to_dict() | {"command": command})
+        print_json(answer.to_dict() | {"command": None if command is None else " ".join(command)})
     else:
-        print_lines(answer.lines())
+        screen.show(lambda: design_summary(answer, signed, graph), lambda: design_lines(answer, signed, graph))
         if output and answer.certificate is not None:
-            click.echo(f"written    {output}")
+            screen.note(f"written    {output}")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
-            click.echo(f"to prove it again{again}:\n{command}")
-        elif answer.protocol is not None:
+            screen.note("\n".join([f"to prove it again{again}:", *wrap_command(command)]))
+        elif answer.protocol is not None and not screen.quiet:
             why = "certify finds other functions for these gains, which prove less"
             click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
     return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 
-def _certify_command(answer: Design, graph: str, options: Options) -> str | None:
-    """Return the command that certifies the gains of a design again, as a shell takes it; None if there is none."""
+def _refuse_incomplete(options: Options) -> None:
+    """Name everything that is missing, at once."""
+    names = {"max_input": "--max-input U", "initial_bound": "--initial-bound R"}
+    missing = [flag for name, flag in names.items() if options[name] is None]
+    if options["deadline"] is None and not options["shortest_deadline"]:
+        missing.append("--deadline T or --shortest-deadline")
+    if missing:
+        raise ParameterError(f"design needs {', '.join(missing)}; e.g. {_EXAMPLE}")
+    if options["deadline"] is not None and options["shortest_deadline"]:
+        raise ParameterError("--deadline and --shortest-deadline ask for two things; leave one out")
+
+
+def _certify_command(answer: Design, graph: str, options: Options) -> list[str] | None:
+    """Return the words of the command that certifies the gains of a design again, quoted for a shell; None if none."""
     if answer.certify_options is None:
         return None
     flags = [] if options["edges"] is None else ["--edges", options["edges"]]
@@ -74,7 +104,7 @@ def _certify_command(answer: Design, graph: str, options: Options) -> str | None
     flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
     flags += answer.certify_options
     words = [*flags, "--", graph] if graph.startswith("-") and graph != "-" else [graph, *flags]
-    return shlex.join(["ptcc", "certify", *words])
+    return [shlex.quote(word) for word in ("ptcc", "certify", *words)]
 
 
 def _save_curve(answer: Design, path: str) -> None:

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.cli.completion import PACKAGED, THEOREMS, complete
+from ptcc_certify.errors import ParameterError, did_you_mean
 
 
 @click.command()
-@click.argument("name", default="all")
+@click.argument("name", default="all", shell_complete=complete((), ("all", *"123456", *PACKAGED)))
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 @click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:
@@ -48,7 +49,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 
 
 @click.command()
-@click.argument("theorem", required=False)
+@click.argument("theorem", required=False, shell_complete=complete((), THEOREMS))
 def cite(theorem: str | None) -> int:
     """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
     from ptcc_certify.theorems.table import THEOREMS
@@ -57,7 +58,8 @@ def cite(theorem: str | None) -> int:
     if theorem is not None:
         statements = {t.number: t.statement for t in THEOREMS}
         if theorem not in statements:
-            raise ParameterError(f'no theorem "{theorem}"; one of ' + ", ".join(statements))
+            hint = did_you_mean(theorem, statements)
+            raise ParameterError(f'no theorem "{theorem}"{hint}; one of {", ".join(statements)}')
         note += f"; Theorem {theorem}: {statements[theorem]}"
     click.echo(
         "@unpublished{zhu_prescribed_time_coordination,\n"

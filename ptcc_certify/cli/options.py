@@ -9,11 +9,14 @@ import sys
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import partial
-from pathlib import Path
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
+from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
+from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario
 from ptcc_certify.errors import NumberError, ParameterError, PTCCError
 
 if TYPE_CHECKING:
@@ -44,7 +47,7 @@ def flag_of(name: str) -> str:
 
 def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
     """Return the exact number that an option gives, None if it was not given."""
-    return None if text is None else exact_number(text, parameter.opts[0])
+    return None if text is None or context.resilient_parsing else exact_number(text, parameter.opts[0])
 
 
 def exact_number(text: str, flag: str) -> Fraction:
@@ -59,12 +62,38 @@ def exact_number(text: str, flag: str) -> Fraction:
 
 def _behaviour(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
     """Return the behaviour that ``--expect`` names."""
+    if text is None or context.resilient_parsing:
+        return text
     from ptcc_certify.graphs.structure import behaviour_name
 
     try:
-        return None if text is None else behaviour_name(text)
+        return behaviour_name(text)
     except ValueError as error:
         raise ParameterError(f"--expect: {error}") from None
+
+
+def _certificate(context: click.Context, parameter: click.Parameter, path: str) -> str:
+    """Return the path of a certificate, or refuse what is none."""
+    if not context.resilient_parsing:
+        refuse_as_certificate(path)
+    return path
+
+
+#: What is asked of ``-o`` where a certificate is written, and which command writes that.
+_OTHER_OUTPUTS = {
+    **dict.fromkeys((".html", ".htm", ".tex"), "save it as FILE.json, then ptcc report FILE.json -o {}"),
+    **dict.fromkeys((".png", ".pdf", ".svg"), "save it as FILE.json, then ptcc plot FILE.json -o {}"),
+    ".csv": "the run as a table: ptcc simulate GRAPH -o {}",
+    ".toml": "a scenario: ptcc new GRAPH -o {}",
+}
+
+
+def _certificate_output(context: click.Context, parameter: click.Parameter, output: str | None) -> str | None:
+    """Return the file for a certificate, or refuse what another command writes."""
+    mend = _OTHER_OUTPUTS.get(PurePath(output or "").suffix.lower())
+    if output and mend and not context.resilient_parsing:
+        raise ParameterError(f"{output}: -o writes the certificate, which is JSON; {mend.format(shell_word(output))}")
+    return output
 
 
 def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -82,7 +111,9 @@ number_option = partial(click.option, callback=_exact)
 
 def expect_option(text: str) -> Callable[[Any], Any]:
     """Return the option that names the behaviour that is asked for."""
-    return click.option("--expect", metavar="BEHAVIOUR", callback=_behaviour, help=text)
+    return click.option(
+        "--expect", metavar="BEHAVIOUR", callback=_behaviour, shell_complete=complete_behaviours, help=text
+    )
 
 
 reading_options = _options(
@@ -91,26 +122,49 @@ reading_options = _options(
         type=click.Choice(["information", "listens"]),
         help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
     ),
-    click.option("--duplicates", type=click.Choice(["refuse", "sum", "last"]), default="refuse"),
+    click.option(
+        "--duplicates",
+        type=click.Choice(["refuse", "sum", "last"]),
+        default="refuse",
+        help="What becomes of two rows for one ordered pair.",
+    ),
     click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
     click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
 )
-graph_options = _options(click.argument("graph"), reading_options)
+#: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
+graph_argument = click.argument("graph", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED))
+graph_options = _options(graph_argument, reading_options)
+certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
 protocol_options = _options(
-    click.option("--protocol", "kind", type=click.Choice(["nominal", "sliding-mode"]), default="nominal"),
-    click.option("--T", "T", show_default="1", help="Deadline (nominal)."),
-    click.option("--rho1", default="1", help="Constant part of the gain."),
-    click.option("--rho2", default="1", help="Factor of the growing part of the gain."),
-    click.option("--kappa", default="2", help="Exponent of the time scaling."),
-    *(click.option(flag_of(name), name, show_default=value, help=text) for name, (value, text) in _SLIDING.items()),
+    click.option(
+        "--protocol",
+        "kind",
+        type=click.Choice(["nominal", "sliding-mode"]),
+        default="nominal",
+        is_eager=True,
+        callback=kind_of_protocol,
+        help="Nominal, or sliding mode, which disturbances within delta do not move.",
+    ),
+    click.option("--T", "T", metavar="NUMBER", help="Nominal: the deadline.  [default: 1]"),
+    click.option("--rho1", metavar="NUMBER", default="1", help="Constant part of the gain."),
+    click.option("--rho2", metavar="NUMBER", default="1", help="Factor of the growing part of the gain."),
+    click.option("--kappa", metavar="NUMBER", default="2", help="Exponent of the time scaling."),
+    *(
+        click.option(flag_of(name), name, metavar="NUMBER", help=f"{text}  [default: {value}]")
+        for name, (value, text) in _SLIDING.items()
+    ),
     click.option(
         "--disturbance",
         metavar="EXPR",
-        show_default="worst-case",
-        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none.",
+        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none."
+        "  [default: worst-case]",
     ),
-    click.option("--sigma0", show_default="0", help="Sliding mode: like --x0; 0 leaves no reaching phase."),
-    click.option("--x0", default="random", help="5,2,-4 | label=value,... | FILE.csv | random"),
+    click.option(
+        "--sigma0", metavar="STATE", help="Sliding mode: like --x0; 0 leaves no reaching phase.  [default: 0]"
+    ),
+    click.option(
+        "--x0", metavar="STATE", default="random", help="Initial state: 5,2,-4 | label=value,... | FILE.csv | random"
+    ),
     click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of random initial states."),
 )
 limit_options = _options(
@@ -141,19 +195,27 @@ time_limit_option = click.option(
     help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
 )
 output_option = click.option(
-    "-o", "--output", type=click.Path(dir_okay=False), help="Write the certificate to this file."
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False),
+    callback=_certificate_output,
+    help="Write the certificate to this file, such as FILE.json.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 
 def graph_file(graph: str) -> Any:
-    """Return the file of a graph, of a packaged one where no such file exists."""
+    """Return the file of a graph, of a packaged one where no such file exists, of a scenario that of its graph."""
     from ptcc_certify.examples import GRAPHS, graph_path
 
     if graph == "-" and sys.stdin is None:
         raise ParameterError("standard input is closed; name a file")
-    is_packaged = graph in GRAPHS and (Path(graph).is_dir() or not Path(graph).exists())
-    return graph_path(graph) if is_packaged else graph
+    if is_scenario(graph) and kind_of(graph) in TOML:
+        graph = read_scenario(graph).graph
+    if graph in GRAPHS and kind_of(graph) in ("missing", "a folder"):
+        return graph_path(graph)
+    refuse_as_graph(graph)
+    return graph
 
 
 def read(graph: str, options: Options) -> SignedDigraph:
@@ -213,19 +275,16 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
             return [Fraction(0)] * graph.n_nodes
     except NumberError:
         pass
-    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: ")
+    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: sigma(0)")
 
 
-def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, option: str = "") -> list[Fraction]:
-    """Return the initial state that ``--x0`` gives, or draw one."""
+def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:
+    """Return the initial state that ``--x0`` gives, or ``sigma(0)`` that ``--sigma0`` gives, or draw one."""
     from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 == "random":
         return [x for (x,) in random_states(seed, graph.n_nodes)]
-    try:
-        return read_state(x0, graph)
-    except PTCCError as error:
-        raise type(error)(f"{option}{error}") from None
+    return read_state(x0, graph, name)
 
 
 def read_initial_states(options: Options, graph: SignedDigraph) -> Any:

@@ -26,8 +26,12 @@ _TABLES = ("", ".csv", ".txt")
 def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
     """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
 
+    The columns are t, remaining (1 - t/T, accurate near the deadline), the state of every agent headed by its label,
+    under the sliding-mode protocol sigma(<label>), and the input u(<label>). Near the deadline the infinite gain
+    multiplies what the integrator leaves of the error: there u is rounding, which `ptcc plot --what input` leaves out.
+
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
-    numbers, agent after agent. Under the sliding-mode protocol columns sigma(<label>) follow the states.
+    numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
     """
     from ptcc_certify.graphs.io import write_atomically
     from ptcc_certify.simulation.run import simulate as run

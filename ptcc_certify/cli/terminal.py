@@ -1,21 +1,74 @@
-"""What the commands print, and refuse to write to."""
+"""What the commands print, log and refuse to write to."""
 
 from __future__ import annotations
 
+import functools
 import json
+import logging
+import shutil
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, PTCCError, one_line
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")
+#: Seconds after which a command that writes to no terminal tells where it is, and between two such lines.
+FIRST_WORD, NEXT_WORD = 10, 30
+
+#: What the commands do, step by step; ``--log`` writes it to a file.
+LOG = logging.getLogger("ptcc_certify")
+LOG.addHandler(logging.NullHandler())  # nothing of it goes to a terminal
+
+
+# ---------------------------------------------------------------------- how much is printed
+
+
+@dataclass(frozen=True)
+class Screen:
+    """How much a command prints: a short screen, everything (``-v``), or nothing but errors (``-q``)."""
+
+    verbose: bool = False
+    quiet: bool = False
+
+    def show(self, short: Callable[[], Sequence[str]], long: Callable[[], Sequence[str]]) -> None:
+        """Print the short or the long lines; long ones are wrapped to the terminal, without one to 80 columns."""
+        from ptcc_certify.report.text_layout import WIDTH, wrap_lines
+
+        if not self.quiet:
+            width = shutil.get_terminal_size((WIDTH, 24)).columns if sys.stdout.isatty() else WIDTH
+            print_lines(wrap_lines(long(), width) if self.verbose else short())
+
+    def note(self, text: str) -> None:
+        """Print one more line on standard output."""
+        if not self.quiet:
+            click.echo(text)
+
+
+def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``-v``, ``-q`` and ``--log``; the command is given its :class:`Screen` as the keyword ``screen``."""
+
+    @click.option("-v", "--verbose", is_flag=True, help="Print everything that is known, not the short screen alone.")
+    @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors; the exit code tells.")
+    @click.option("--log", metavar="FILE", help="Append to FILE what is done, step by step, with the seconds it takes.")
+    @functools.wraps(command)
+    def wrapped(*args: Any, verbose: bool, quiet: bool, log: str | None, **options: Any) -> Any:
+        if verbose and quiet:
+            raise ParameterError("-v asks for more and -q for nothing; leave one out")
+        inputs = [options.get(name) for name in ("graph", "certificate", "output")]
+        with log_to(log, [path for path in inputs if path]):
+            return command(*args, screen=Screen(verbose, quiet), **options)
+
+    return wrapped
 
 
 def print_lines(lines: Sequence[str]) -> None:
@@ -40,34 +93,97 @@ def refuse_output(output: str | None, graph: str = "") -> None:
         raise ParameterError(f"{output}: is the graph itself; name another file")
 
 
+# ---------------------------------------------------------------------- the log
+
+
 @contextmanager
-def progress(steps: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal which of some steps is at work; the line goes when they are done."""
-    with _bar("TimeElapsedColumn") as add:
+def log_to(path: str | None, others: Sequence[str] = ()) -> Iterator[None]:
+    """Append to a file what is logged inside: the command, its steps, and how it ended."""
+    if path is None:
+        yield
+        return
+    for other in others:
+        if Path(path) == Path(other) or (Path(path).exists() and Path(other).exists() and Path(path).samefile(other)):
+            raise ParameterError(f"--log {path}: is a file of the command itself; name another file")
+    try:
+        handler = logging.FileHandler(path, encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        raise ParameterError(f"--log {path}: cannot be written ({error.strerror}); name another file") from None
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    level = LOG.level
+    LOG.addHandler(handler)
+    LOG.setLevel(logging.INFO)
+    began = time.monotonic()
+    try:
+        LOG.info("%s", one_line(f"ptcc {' '.join(sys.argv[1:])}"))
+        yield
+        LOG.info("ended after %.3f s", time.monotonic() - began)
+    except (Exception, KeyboardInterrupt) as error:
+        why = one_line(str(error)) if isinstance(error, PTCCError) else type(error).__name__
+        LOG.error("ended after %.3f s: %s", time.monotonic() - began, why)
+        raise
+    finally:
+        LOG.setLevel(level)
+        LOG.removeHandler(handler)
+        handler.close()
+
+
+# ---------------------------------------------------------------------- progress
+
+
+@contextmanager
+def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Show which of some steps is at work, and log each with its seconds; on a terminal the line goes at the end."""
+    clock = _StepClock()
+    with _bar("TimeElapsedColumn", quiet=quiet) as add:
         update = add("", total=len(steps))
-        yield lambda step: update(completed=steps.index(step), description=step)
+
+        def begin(step: str) -> None:
+            clock.begin(step)
+            update(completed=steps.index(step), description=step)
+
+        yield begin
+        clock.begin("")
+
+
+class _StepClock:
+    """Logs each step, when it is done, with the seconds that it took."""
+
+    def __init__(self) -> None:
+        self.step, self.began = "", time.monotonic()
+
+    def begin(self, step: str) -> None:
+        """End the step at work, and begin another, or none."""
+        now = time.monotonic()
+        if self.step:
+            LOG.info("%s: %.3f s", self.step, now - self.began)
+        self.step, self.began = step, now
 
 
 @contextmanager
 def counting() -> Iterator[Callable[[int, int, int], None]]:
-    """Show on a terminal how many of many rows are done, how many have an error, and how long the rest will take."""
+    """Show how many of many rows are done, how many have an error, and on a terminal how long the rest will take."""
     with _bar("MofNCompleteColumn", "TimeRemainingColumn") as add:
         update: Callable[..., None] | None = None
 
         def show(done: int, total: int, errors: int) -> None:
             nonlocal update
             if update is None:  # rows that were there already do not count for the speed
-                update = add("left", total=total, completed=done)
-            update(completed=done, description=f"left ({errors} with an error)" if errors else "left")
+                update = add("rows", total=total, completed=done)
+            update(completed=done, description=f"rows ({errors} with an error)" if errors else "rows")
 
         yield show
 
 
 @contextmanager
-def _bar(*columns: str) -> Iterator[Callable[..., Callable[..., None]]]:
-    """Yield what adds a task to a bar and returns what updates it; without a terminal nothing is shown."""
-    if not sys.stderr.isatty():
+def _bar(*columns: str, quiet: bool = False) -> Iterator[Callable[..., Callable[..., None]]]:
+    """Yield what adds a task to a bar and returns what updates it; without a terminal, to lines now and then."""
+    if quiet:
         yield lambda description, **task: lambda **now: None
+        return
+    if not sys.stderr.isatty():
+        with _plain_lines() as add:
+            yield add
         return
     from rich import progress as rich
     from rich.console import Console
@@ -75,3 +191,30 @@ def _bar(*columns: str) -> Iterator[Callable[..., Callable[..., None]]]:
     layout = (rich.BarColumn(), *(getattr(rich, name)() for name in columns), rich.TextColumn("{task.description}"))
     with rich.Progress(*layout, console=Console(stderr=True), transient=True) as bar:
         yield lambda description, **task: partial(bar.update, bar.add_task(description, **task))
+
+
+@contextmanager
+def _plain_lines() -> Iterator[Callable[..., Callable[..., None]]]:
+    """Write where the work is to standard error, after 10 s and then every 30 s."""
+    state: dict[str, Any] = {}
+    done, began = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        pause = FIRST_WORD
+        while not done.wait(pause):
+            pause = NEXT_WORD
+            if state:
+                where = f"{state.get('completed', 0)} of {state['total']} done, {state['description']}"
+                click.echo(f"ptcc: after {time.monotonic() - began:.0f} s: {where}", err=True)
+
+    def add(description: str, **task: Any) -> Callable[..., None]:
+        state.update(description=description, **task)
+        return state.update
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield add
+    finally:
+        done.set()
+        teller.join()

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
@@ -103,5 +103,7 @@ def select(name: str) -> list[tuple[Example, str, str]]:
     selection = [run for run in runs if name in ("all", str(run[0].number), run[1])]
     if not selection:
         numbers = ", ".join(map(str, EXAMPLES))
-        raise ParameterError(f'no example "{name}"; use all, {numbers} or ' + ", ".join(GRAPHS))
+        raise ParameterError(
+            f'no example "{name}"{did_you_mean(name, GRAPHS)}; use all, {numbers} or {", ".join(GRAPHS)}'
+        )
     return selection

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.errors import did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.io import as_graph
@@ -92,7 +93,8 @@ def behaviour_name(text: str) -> str:
     for name in BEHAVIOURS:
         if text.replace("-", " ") == name.replace("-", " "):
             return name
-    raise ValueError(f'unknown behaviour "{text}"; one of ' + ", ".join(b.replace(" ", "-") for b in BEHAVIOURS))
+    names = [name.replace(" ", "-") for name in BEHAVIOURS]
+    raise ValueError(f'unknown behaviour "{text}"{did_you_mean(text, names)}; one of {", ".join(names)}')
 
 
 @dataclass(frozen=True)

@@ -4,25 +4,54 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import chain, repeat
-from typing import TYPE_CHECKING
+from pathlib import PurePath
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.report.input_lines import initial_states_text, input_lines, limits_text
+from ptcc_certify.report.text_layout import (
+    TEXT,
+    WIDTH,
+    columns,
+    counted,
+    five_digits,
+    format_lines,
+    printable,
+    shorten_list,
+    shorten_text,
+    value_list,
+    wrap_lines,
+    wrap_text,
+)
 from ptcc_certify.theorems.claims import Claim
 
 if TYPE_CHECKING:
+    from ptcc_certify.bounds.final_state import FinalState
     from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.verdict import Answer
+    from ptcc_certify.checker import CheckReport
 
 _ORIENTATION = {
     "information": "a row a,b: information flows a -> b, b listens",
     "listens": "a row a,b: a listens to b",
     "matrix": "row = listener",
 }
+
+_SHORT_ORIENTATION = _ORIENTATION | {
+    "information": "row a,b: information flows a -> b",
+    "listens": "row a,b: a listens to b",
+}
+#: Remarks for the long screen alone: "(0 negative)" tells the one, and the other is about pairs of edges.
+_LONG_REMARKS = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
+#: Lines of a short screen of a connected graph, at most.
+SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
@@ -32,27 +61,293 @@ _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)
 Lines = Iterator[tuple[str, str]]
 
 
+def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
+    r"""Return the short screen of ``ptcc certify``: at most 8 lines of 80 columns, 12 of a disconnected graph.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    name : str
+        What the graph is called.
+    origins : mapping of str to str, optional
+        Where ``x(0)`` and ``sigma(0)`` come from, by these names; ``given`` unless told.
+
+    Returns
+    -------
+    list of str
+        Graph, how it was read, protocol, claim, final state, error bound, input, verdict. Where that takes too many
+        lines, error bound and input share one, and tell less.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], simulation=False)
+    >>> print("\n".join(summary_lines(cert, "foes")))
+    graph      foes: 2 nodes, 2 edges (2 negative), strongly connected
+    read       row a,b: information flows a -> b; undirected
+    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; x(0) given
+    claim      signed-average consensus at T = 1 (Theorem 1.1, Corollary 1.1)
+    x(T)       a=-1, b=1 (exact)
+    error      at 0.99 T: ||E|| <= 1.4e-09 ||E(0)||, every agent within 5.6e-09
+    input      bounded; |u_k| <= 24.01, the largest of agent a
+    verdict    certified; checked without a solver
+    """
+    claims = _component_claims(certificate)
+    room = SHORT + len(claims) - 1
+    for bounds, verdict in ((_bounds, _full_verdict), (_brief_bounds, _full_verdict), (_brief_bounds, _brief_verdict)):
+        entries = [
+            *graph_entries(certificate.structure, name),
+            ("protocol", _protocol_text(certificate, origins)),
+            *zip(chain(["claim"], repeat("")), claims, strict=False),
+            *_short_final_state(certificate),
+            *bounds(certificate),
+            ("verdict", verdict(certificate)),
+        ]
+        lines = wrap_lines(format_lines(entries))
+        if len(lines) <= room:
+            return lines
+    return [*lines[: room - 1], shorten_text(f"{lines[room - 1]} ...", WIDTH)]
+
+
+def structure_summary(structure: Structure, name: str) -> list[str]:
+    """Return the short screen of ``ptcc classify``: at most 8 lines of 80 columns, 12 of a disconnected graph."""
+    labels, closed = structure.graph.labels, structure.closed_components
+
+    def lines() -> Lines:
+        yield from graph_entries(structure, name)
+        for number, component in enumerate(closed[:3], start=1):
+            head = "leaders" if len(closed) == 1 else f"leaders {number}"
+            yield head, shorten_text(_leaders_text(component, labels, 20), TEXT)
+        if len(closed) > 3:
+            yield "", f"... {len(closed)} leader groups in all, {sum(c.balanced for c in closed)} balanced"
+        if structure.followers.size:
+            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()], TEXT)
+        claims = [component.claim for component in structure.components]
+        yield from zip(chain(["claim"], repeat("")), _claim_texts(structure, claims), strict=False)
+
+    return format_lines(lines())
+
+
+def check_summary(document: Mapping[str, Any], report: CheckReport) -> list[str]:
+    """Return the short screen of ``ptcc check``: what is claimed, and whether all of it was verified."""
+    entries = []
+    if report.accepted:
+        claims = [part["claim"] for part in document.get("components") or [document]]
+        texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
+        entries = [("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))]
+    return wrap_lines([*format_lines(entries), report.lines()[-1]])
+
+
+def graph_entries(structure: Structure, name: str) -> list[tuple[str, str]]:
+    """Return the first two lines of every short screen: which graph, and how its rows were read."""
+    return [("graph", _graph_text(structure, name)), ("read", _reading_text(structure))]
+
+
+def _graph_text(structure: Structure, name: str) -> str:
+    """Tell the size and the connectivity of a graph, its name as long as fits beside them."""
+    graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
+    size = f"{counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')} ({negative} negative)"
+    rest = f": {size}, {_connectivity(structure)}"
+    if len(rest) + columns(name) > TEXT:
+        rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
+    return shorten_text(printable(name), max(TEXT - len(rest), 8)) + rest
+
+
+def _connectivity(structure: Structure) -> str:
+    words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
+    return words.get(structure.connectivity, f"disconnected, {len(structure.components)} components")
+
+
+def _reading_text(structure: Structure) -> str:
+    """Tell how the rows were read, and what is particular about the graph, as far as it fits."""
+    text = _SHORT_ORIENTATION[structure.graph.read["orientation"]]
+    remarks = [remark for remark in remarks_on(structure) if remark not in _LONG_REMARKS]
+    return shorten_text("; ".join([text, *remarks]), TEXT)
+
+
+def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
+    """Tell the protocol with its parameters, and where the initial state comes from."""
+    p = certificate.protocol
+    names = [name for name in p.to_dict() if name != "kind"]
+    begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
+    if certificate.sigma0 is not None:
+        begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
+    text = f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
+    lines = wrap_text("; ".join([text, ", ".join(begin) or "no x(0)"]))
+    return " ".join(lines[:2]) if len(lines) <= 2 else f"{lines[0]} {shorten_text(f'{lines[1]} ...', TEXT)}"
+
+
+def _component_claims(certificate: Certificate) -> list[str]:
+    """Tell what is claimed, of each of the largest components if there are several."""
+    p = certificate.protocol
+    whatever = "" if p.reaching is None else f", any |d_k| <= {near(p.reaching.delta)}"
+    return _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
+
+
+def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> list[str]:
+    """Name the sharpest behaviour of every component, of the largest four of many; ``also`` where there is room."""
+    sharpest = [claim.special[-1] if claim.special else claim.behaviour for claim in claims]
+    if len(claims) == 1:
+        (claim,) = claims
+        corollary = f", Corollary {claim.corollaries[-1]}" if claim.special else ""
+        texts = [f"{sharpest[0]}{when}{also} (Theorem {claim.theorem}{more})" for more in (corollary, "")]
+        return [texts[0] if len(texts[0]) <= TEXT else shorten_text(texts[1], TEXT)]
+    components, labels, lines = structure.components, structure.graph.labels, []
+    for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:4]:
+        text = shorten_text(f"{sharpest[k]}{when} (Theorem {claims[k].theorem})", TEXT - 16)
+        nodes = components[k].nodes
+        names = [printable(labels[v]) for v in nodes[:TEXT]]
+        lines.append(f"{shorten_list(names, TEXT - len(text) - 2, len(nodes))}: {text}")
+    return lines + [f"... {len(claims)} components in all"] * (len(claims) > 4)
+
+
+def _short_final_state(certificate: Certificate) -> Lines:
+    result = certificate.final_state
+    if result is not None:
+        kind = f"({_accuracy(result)}{'; degenerate x(0)' if result.degenerate else ''})"
+        values = value_list(certificate.graph.labels, result.states, TEXT - len(kind) - 1)
+        if len(result.states) > 1 and len(set(result.states)) == 1:
+            values = f"every agent at {five_digits(result.states[0])}"
+        yield "x(T)", f"{values} {kind}"
+
+
+def _bounds(certificate: Certificate) -> Lines:
+    """Tell how near the agents are by when, and how large the input gets."""
+    if certificate.constant:
+        invariant = "its state" if certificate.direct else "x - sigma"
+        yield "error", f"none: no agent listens to another, each keeps {invariant}"
+        return
+    norm, agents = _error_texts(certificate)
+    if norm:
+        yield "error", norm + agents
+    if certificate.effort is not None:
+        bounded, size = _input_texts(certificate, certificate.effort)
+        yield "INPUT" if certificate.effort.bounded is False else "input", "; ".join(filter(None, (bounded, size)))
+
+
+def _brief_bounds(certificate: Certificate) -> Lines:
+    """Tell the same in one line."""
+    if certificate.constant or certificate.effort is None:
+        yield from _bounds(certificate)
+        return
+    bounded, size = _input_texts(certificate, certificate.effort)
+    second = (
+        size.partition(", the")[0] if certificate.effort.bounded and size else f"input {bounded}".partition(" from")[0]
+    )
+    yield "bounds", shorten_text(f"{_error_texts(certificate)[0]}; {second}", TEXT)
+
+
+def _error_texts(certificate: Certificate) -> tuple[str, str]:
+    """Return bounds of the error and of every agent's deviation at 0.99 T, at the instant asked for, or under limits.
+
+    Empty texts where nothing is proved.
+    """
+    if certificate.effort is not None and certificate.effort.residual:
+        entry, *others = certificate.effort.residual
+        noise = "" if entry.noise is None else f", |n_k| <= {near(entry.noise)}"
+        norm = f"{limits_text(entry)}{noise}: at T ||E|| <= {up(entry.noisy_norm or entry.norm, 2)}"
+        agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
+        return norm, agents + f"; ... {len(others) + 1} limits in all" * bool(others)
+    if certificate.rate is None:
+        return "", ""
+    remaining, when = _instant(certificate)
+    z = certificate.envelope.coordinates
+    if certificate.direct:
+        norm = f"||{z}|| <= {up(certificate.envelope.residual(remaining), 2)} ||{z}(0)||"
+    elif certificate.initial_state is not None:
+        norm = f"||{z}|| <= {up(float(certificate.norm_bound([remaining])[0]), 2)}"
+    else:
+        return "", ""
+    agents = ""
+    if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
+        agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
+    return f"at {when}: {norm}", agents
+
+
+def _instant(certificate: Certificate) -> tuple[float, str]:
+    """Return ``1 - t/T`` where the short screen tells the error, and the name of that instant."""
+    if certificate.at is not None:
+        return float(1 - certificate.at / certificate.protocol.T), f"t = {near(certificate.at)}"
+    if certificate.direct:
+        return 0.01, "0.99 T"
+    return 0.01 * _sliding_share(certificate), "T_r + 0.99 T_s"
+
+
+def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
+    """Return whether the input is bounded, and its proved size, empty if none is proved."""
+    if effort.residual:
+        entry = effort.residual[0]
+        largest = entry.noisy_largest if entry.noise is not None else entry.largest
+        text, size = "bounded under these limits", "" if largest is None else f"|u_k| <= {up(largest, 4)}"
+    else:
+        states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "bounded or not is undecided"}
+        text, size = states[effort.bounded], ""
+        if effort.bounded is False and certificate.rate is not None:
+            text += f"; rho2 kappa >= {up(2 / certificate.rate, 4)} bounds it"
+        if effort.peak is not None:
+            agents = effort.peak.agents
+            label = certificate.graph.labels[max(range(len(agents)), key=agents.__getitem__)]
+            states_text = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
+            size = f"|u_k| <= {up(effort.peak.largest, 4)}{states_text}, the largest of agent {shorten_text(label, 20)}"
+    if effort.disturbed is not None:
+        size += f"; |d_k| <= {near(effort.disturbed.delta)} adds {up(max(effort.disturbed.inputs), 4)} at most"
+    return text, size
+
+
+def _full_verdict(certificate: Certificate) -> str:
+    """Tell the verdict; what is not as one would wish comes first, and agrees with the exit code."""
+    cut_off = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
+    return _verdict_text(certificate, str, cut_off)
+
+
+def _brief_verdict(certificate: Certificate) -> str:
+    """Tell the same without reasons."""
+    return _verdict_text(certificate, lambda answer: answer.what, "time limit reached")
+
+
+def _verdict_text(certificate: Certificate, tell: Callable[[Answer], str], cut_off: str) -> str:
+    from ptcc_certify.certificate.verdict import CERTIFIED, MET, OPEN, REFUTED
+
+    assessment = certificate.assessment
+    parts = ["VIOLATED: the simulated run exceeds the proved bound; please report this graph"] * assessment.violated
+    for status in (REFUTED, OPEN):
+        unmet = [tell(answer) for answer in assessment.answers if answer.status == status]
+        parts += [f"{status}: {', '.join(unmet)}"] * bool(unmet)
+    if assessment.verdict != CERTIFIED:
+        parts.append(f"{assessment.verdict}: {assessment.remark}")
+    elif assessment.useful is False:
+        option = assessment.advice.partition(" (")[0]
+        parts.append(f"{CERTIFIED}, but says little by T" + (f"; {option} leaves 1 %" if option else ""))
+    else:
+        parts.append(CERTIFIED if parts else f"{CERTIFIED}; checked without a solver")
+    parts += [cut_off] * bool(certificate.cut_off and assessment.verdict == CERTIFIED)
+    met = [answer.what for answer in assessment.answers if answer.status == MET]
+    return "; ".join([*parts, *[f"{MET}: {', '.join(met)}"] * bool(met)])
+
+
 def structure_lines(structure: Structure, name: str) -> list[str]:
     """Return the lines of ``ptcc classify``."""
     labels = structure.graph.labels
 
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
-        yield "nodes", _shorten_list(labels)
+        yield "nodes", shorten_list(labels)
         yield "structure", structure_text(structure)
         for number, component in enumerate(structure.closed_components[:4], start=1):
             yield f"leaders {number}", _leaders_text(component, labels)
         if len(structure.closed_components) > 4:
             yield "", f"... {len(structure.closed_components)} closed components in all"
         if structure.followers.size:
-            yield "followers", _shorten_list([labels[v] for v in structure.followers.tolist()])
+            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()])
         yield from _claim_lines([component.claim for component in structure.components])
 
-    return _format_lines(lines())
+    return format_lines(lines())
 
 
-def certificate_lines(certificate: Certificate, name: str) -> list[str]:
-    """Return the lines of ``ptcc certify``: at most 28 for a connected graph."""
+def certificate_lines(
+    certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})
+) -> list[str]:
+    """Return the lines of ``ptcc certify -v``, as long as they are: at most 28 for a connected graph."""
     structure, p = certificate.structure, certificate.protocol
     when = f"at T = {near(p.T)}" if p.reaching is None else f"at T_r + T_s = {near(p.T)} whatever the disturbance"
 
@@ -61,10 +356,11 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         yield "structure", structure_text(structure)
         yield from _claim_lines(certificate.claims, f" {when}")
         names = [name for name in p.to_dict() if name != "kind"]
-        yield "protocol", f"{p.kind}: {', '.join(f'{name} {near(getattr(p, name), 12)}' for name in names)}"
+        yield "protocol", f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
         if certificate.initial_state is not None:
-            yield "x(0)", _pairs(structure.graph.labels, certificate.initial_state)
-        for part in (_sliding_lines, _final_state_lines, _rate_lines, _effort_lines):
+            drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
+            yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn
+        for part in (_sliding_lines, _final_state_lines, _rate_lines, input_lines):
             yield from part(certificate)
         yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
         if certificate.cut_off:
@@ -73,24 +369,24 @@ def certificate_lines(certificate: Certificate, name: str) -> list[str]:
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 
-    return _format_lines(lines())
+    return format_lines(lines())
 
 
 def _graph_lines(structure: Structure, name: str) -> Lines:
     graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
-    yield "graph", f"{name}: {graph.n_nodes} nodes, {graph.n_edges} edges, {negative} negative"
+    yield "graph", f"{name}: {counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')}, {negative} negative"
     yield "read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])
 
 
-def _leaders_text(component: ClosedComponent, labels: Sequence[str]) -> str:
+def _leaders_text(component: ClosedComponent, labels: Sequence[str], width: int = 40) -> str:
     """Tell how a group of leaders splits, or why it does not."""
     nodes = [labels[v] for v in component.nodes]
     if component.negative_cycle is not None:
         steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
         more = " ..." if len(component.negative_cycle) > 12 else ""
-        return f"{_shorten_list(nodes)}: unbalanced, negative cycle {steps}{more}"
+        return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
     sides = camps(component)
-    text = " against ".join("{" + _shorten_list([labels[v] for v in camp], 40) + "}" for camp in sides)
+    text = " against ".join("{" + shorten_list([labels[v] for v in camp], width) + "}" for camp in sides)
     return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{text}"
 
 
@@ -106,16 +402,21 @@ def _final_state_lines(certificate: Certificate) -> Lines:
     result = certificate.final_state
     if result is None:
         return
-    kind = "exact" if result.exact else "floating point"
-    if result.radius is not None:
-        widest = max(result.radius)
-        kind = f"to within {up(widest, 2)}, proved" if widest else "exact"
-    if kind != "floating point" and any(Fraction(_digits(x)) != x for x in result.states[:100]):
+    kind = _accuracy(result)
+    if kind != "floating point" and any(Fraction(five_digits(x)) != x for x in result.states[:100]):
         kind += "; here to 5 digits"
-    yield "x(T)", f"{_pairs(certificate.graph.labels, result.states)} ({kind})"
+    yield "x(T)", f"{value_list(certificate.graph.labels, result.states)} ({kind})"
     if result.degenerate:
         groups = ", ".join(map(str, result.degenerate))
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
+
+
+def _accuracy(result: FinalState) -> str:
+    """Tell how exactly a final state is known."""
+    if result.radius is not None:
+        widest = max(result.radius)
+        return f"to within {up(widest, 2)}, proved" if widest else "exact"
+    return "exact" if result.exact else "floating point"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:
@@ -132,7 +433,7 @@ def _rate_lines(certificate: Certificate) -> Lines:
         yield "rate", f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}"
         return
     ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
-    yield "rate", f"{down(rate)} per unit of s, proved: V <= e^(-rate s) V(0){best}{ratio}"
+    yield "rate", f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
     yield from _class_lines(certificate)
     yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     yield from _deviation_lines(certificate)
@@ -177,73 +478,7 @@ def _deviation_lines(certificate: Certificate) -> Lines:
     if certificate.at is not None:
         each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
         entries = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
-        yield "", f"at t = {near(certificate.at, 12)}: {_shorten_list(entries)}"
-
-
-def _effort_lines(certificate: Certificate) -> Lines:
-    """Tell whether the input stays finite, and how large it gets."""
-    effort = certificate.effort
-    if effort is None or certificate.constant:
-        return
-    lower, upper = effort.threshold
-    product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
-    if effort.bounded:
-        how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
-        yield "input", f"bounded up to the deadline for every initial state: {how}"
-    elif effort.bounded is False:
-        below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
-        yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
-        enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
-        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: raise rho2 * kappa{enough}"
-    else:
-        yield "input", f"bounded or not is undecided: {product}, it takes 1"
-    sizes = []
-    if effort.peak is not None:
-        most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
-        label = certificate.graph.labels[most]
-        sizes = [f"|u_k| <= {up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {up(effort.peak.norm, 4)}"]
-    sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
-    sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
-    if sizes:
-        whom = "" if effort.initial_set is None else " for all these initial states"
-        part = " (integrals of the nominal part)" if effort.sliding is not None else ""
-        yield "effort", ", ".join(sizes) + whom + part
-    other = bool(certificate.limits) or not certificate.direct  # the initial state that is found is of neither
-    worst = None if effort.peak is None or other else certificate.worst_initial_state
-    if worst is not None and math.isfinite(worst.size):
-        labels = certificate.graph.labels
-        where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
-        yield "", f"largest found (numerical) {where} from {_pairs(labels, worst.x0.tolist())}"
-    if effort.sliding is not None and not effort.sliding.bounded:
-        yield "", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"
-    yield from _limited_lines(certificate, effort)
-    if effort.disturbed is not None:
-        d, drift = effort.disturbed, effort.disturbed.drift
-        ends = "" if drift is None else ", and all end where they would without"
-        if drift is not None and any(drift):
-            ends = f", every agent ends within {up(max(drift), 4)} of its final state"
-        yield "disturbed", f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|{ends}"
-    elif certificate.delta is not None:
-        yield "disturbed", "nothing is certified: the rate proves no bounded input"
-
-
-def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
-    """Tell what is proved under limits of the gain, and under noise with them."""
-    for entry in effort.residual:
-        names = (("gain <= ", entry.limits.gain_cap), ("switched off at T - ", entry.limits.stop_before))
-        limits = [f"{what}{near(x)}" for what, x in (*names, ("zero-order hold ", entry.limits.sample_period)) if x]
-        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
-        largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
-        yield "limited", f"{', '.join(limits)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
-        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
-            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
-            yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
-    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
-        yield "noise", "not certified: noise times an infinite gain; saturate the gain, or switch it off before T"
-    if effort.longest_period is not None:
-        yield "limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"
-    elif len(effort.residual) < len(certificate.limits):
-        yield "limited", "nothing is certified under these limits"
+        yield "", f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
 
 
 def _sliding_share(certificate: Certificate) -> float:
@@ -315,7 +550,7 @@ def _sliding_lines(certificate: Certificate) -> Lines:
     if certificate.direct:
         yield "sigma(0)", "0: no reaching phase, the agents slide from the beginning"
     else:
-        yield "sigma(0)", _pairs(labels, certificate.sigma0)
+        yield "sigma(0)", value_list(labels, certificate.sigma0)
         late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
         last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
         clauses = []
@@ -332,7 +567,7 @@ def _sliding_lines(certificate: Certificate) -> Lines:
                 why = "mu3 kappa < 1 and sigma(0) is large"
             if push + pole > LARGEST_PUSH:
                 why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
-            clauses.append(f"reaching time T_r for {_shorten_list(late, 40)}: {why}")
+            clauses.append(f"reaching time T_r for {shorten_list(late, 40)}: {why}")
         yield "sliding", "; ".join(clauses)
     if run is not None and (slid := run.sliding) is not None:
         yield "disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"
@@ -348,13 +583,11 @@ def _claim_text(claim: Claim, when: str) -> str:
 
 def structure_text(structure: Structure) -> str:
     """Return connectivity, closed components, leaders and followers, and balance in one line."""
-    words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
-    connectivity = words.get(structure.connectivity, f"disconnected, {len(structure.components)} components")
     closed = structure.closed_components
-    balanced = sum(c.balanced for c in closed)
-    groups = f"{len(closed)} closed component{'s' if len(closed) > 1 else ''} ({balanced} balanced)"
-    followers = f"{structure.leaders.size} leaders, {structure.followers.size} followers"
-    return f"{connectivity}; {groups}; {followers}; whole graph {'balanced' if structure.balanced else 'unbalanced'}"
+    groups = f"{counted(len(closed), 'closed component')} ({sum(c.balanced for c in closed)} balanced)"
+    followers = f"{counted(structure.leaders.size, 'leader')}, {counted(structure.followers.size, 'follower')}"
+    whole = f"whole graph {'balanced' if structure.balanced else 'unbalanced'}"
+    return f"{_connectivity(structure)}; {groups}; {followers}; {whole}"
 
 
 def remarks_on(structure: Structure) -> list[str]:
@@ -362,32 +595,10 @@ def remarks_on(structure: Structure) -> list[str]:
     read, some = structure.graph.read, structure.graph.n_edges > 0
     remarks = (
         (structure.undirected and some, "undirected"),
-        (structure.all_positive and some, "all weights positive"),
-        (not structure.sign_symmetric, "sign-asymmetric"),
+        (structure.all_positive and some, _POSITIVE),
+        (not structure.sign_symmetric, _ASYMMETRIC),
         (not some, "no edges, is this the right file?"),
         (read["duplicates"] != "refused", f"duplicates {read['duplicates']}"),
         (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
     )
     return [*(text for holds, text in remarks if holds), *read["notes"]]
-
-
-def _pairs(labels: Sequence[str], values: Iterable[object]) -> str:
-    return _shorten_list([f"{label}={_digits(value)}" for label, value in zip(labels, values, strict=True)])
-
-
-def _digits(value: object) -> str:
-    """Write a number with five digits, to nearest."""
-    return f"{float(value):.5g}"  # type: ignore[arg-type]
-
-
-def _shorten_list(words: Sequence[str], width: int = 90) -> str:
-    text = ""
-    for word in words:
-        if len(text) + len(word) > width:
-            return f"{text}, ... ({len(words)} in all)" if text else f"{word[:width]}..."
-        text += (", " if text else "") + word
-    return text
-
-
-def _format_lines(lines: Lines) -> list[str]:
-    return [f"{head:<10} {''.join(c if c.isprintable() else '?' for c in text)}" for head, text in lines]

@@ -228,16 +228,16 @@ class Trajectory(ByValue, Shown):
         )
 
     def to_csv(self) -> str:
-        r"""Return ``t,remaining,<label>,...`` as text, one row per instant, floats in full.
+        r"""Return ``t,remaining,<label>,...,u(<label>),...`` as text, one row per instant, floats in full.
 
-        Of S initial states the columns are headed ``<label>[1] .. <label>[S]``; those of sliding variables follow,
-        headed ``sigma(<label>)``.
+        The states, of S initial states headed ``<label>[1] .. <label>[S]``; the sliding variables, ``sigma(<label>)``;
+        the :attr:`input`, ``u(..)`` around the name of each state.
 
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
         >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_csv()
-        't,remaining,a,b\n0.0,1.0,1.0,0.0\n'
+        't,remaining,a,b,u(a),u(b)\n0.0,1.0,1.0,0.0,0.0,2.0\n'
         """
         names = list(self.labels)
         if self.states.ndim == 3:
@@ -245,9 +245,9 @@ class Trajectory(ByValue, Shown):
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         more = self._more_columns()
-        writer.writerow(["t", "remaining", *names, *(name for name, _ in more)])
-        states = self.states.reshape(len(names), -1)
-        table = np.vstack([self.t, self.remaining, states, *(values for _, values in more)])
+        writer.writerow(["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)])
+        states, inputs = (values.reshape(len(names), -1) for values in (self.states, self.input + 0.0))
+        table = np.vstack([self.t, self.remaining, states, *(values for _, values in more), inputs])
         writer.writerows(table.T.tolist())
         return text.getvalue()
 

@@ -204,7 +204,7 @@ def test_the_lower_bound_is_nearly_reached_and_the_certificate_not_far_off(name)
 
 def test_a_residual_lifts_the_bound_of_the_start_but_not_that_of_the_way():
     strict, loose = designed("fig3b", 10, 1), designed("fig3b", 10, 1, residual="0.5")
-    assert "at the start" in strict.lower_by and "way" in loose.lower_by
+    assert "at t = 0" in strict.lower_by and "way" in loose.lower_by
     assert loose.lower_product == Fraction(1, 2)  # a stable agent goes from 1 to within 1/2 of 0
     assert designed("fig3b", 10, 1, residual="0.5", deadline="0.049").verdict == INFEASIBLE
     assert designed("fig3b", 10, 1, residual="0.5", deadline="0.051").verdict == UNPROVED
@@ -282,7 +282,7 @@ def test_bad_input_is_named_in_one_line(asked, said):
 
 def test_what_is_shown_and_written():
     met, missed = designed("fig5a", 10, 1), designed("fig5a", 10, 1, deadline=1)
-    assert missed.verdict == UNPROVED and "times max_input" in missed.binding
+    assert missed.verdict == UNPROVED and "times the limit" in missed.binding
     assert missed.peak > 10 and missed.protocol is None and missed.certificate is None and missed.worst is None
     for found in (met, missed, designed("pair", 20, 3, residual="2.9")):
         assert all(len(line) <= 120 for line in found.lines())

@@ -227,9 +227,9 @@ def test_a_design_is_rounded_to_the_safe_side():
     found = design(load_graph("fig1a"), max_input="31/3", initial_bound="7/9")
     text = "\n".join(found.lines())
     assert found.peak is not None and found.shortest_certified is not None and found.shortest_possible is not None
-    above(re.findall(rf"^peak input +{NUMBER} at most", text, re.M), found.peak)
-    above(re.findall(rf"^shortest deadline +{NUMBER} certified", text, re.M), found.shortest_certified)
-    below(re.findall(rf"^ +{NUMBER} at least", text, re.M), found.shortest_possible)
+    above(re.findall(rf"^proved +.u_k. <= {NUMBER}, every", text, re.M), found.peak)
+    above(re.findall(rf"^deadline +{NUMBER} is met", text, re.M), found.shortest_certified)
+    below(re.findall(rf"no gains meet one below {NUMBER}$", text, re.M), found.shortest_possible)
     assert found.product is not None and found.lower_product is not None
     for T, peak, low in zip(*found.trade_off([0.1, 1 / 3, 7.7]), strict=True):
         assert Fraction(float(peak)) * Fraction(float(T)) >= found.product

@@ -71,7 +71,7 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
         (analyse(graph), "interval bipartite consensus"),
         (cert, "interval bipartite consensus at T = 2"),
         (cert.trajectory, "6 agents"),
-        (design(graph, max_input=10, initial_bound=1, deadline=5), "max"),
+        (design(graph, max_input=10, initial_bound=1, deadline=5), "|u_k| <= 10 from all |x_k(0)| <= 1"),
         (simulate(graph, SLIDING, x0, sigma0=[1, 2, 3, 4, 5, 6]), "6 agents"),
         (certify(graph, SLIDING, x0, sigma0=[1, 2, 3, 4, 5, 6]), "sliding"),
     ):
@@ -89,7 +89,7 @@ def test_what_cannot_be_drawn_is_told_in_words() -> None:
     for value in (many, analyse(many), certify(pair, PROTOCOL, simulation=False), columns):
         page = shown(value)
         assert not page.images and page.text.strip()
-    assert "1 nodes, 0 edges" in shown(certify(still, PROTOCOL, [3])).text
+    assert "1 node, 0 edges" in shown(certify(still, PROTOCOL, [3])).text
 
 
 @pytest.mark.parametrize("label", ["<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "&lt;b&gt;", "$x$"])

@@ -299,10 +299,13 @@ def test_the_table_reads_back_with_every_label_and_digit():
     graph = SignedDigraph.from_edges([("a, b", 'say "c"', -1), ('say "c"', "a, b", 2)])
     run = simulate(graph, EXAMPLE_1, [1, 2], samples=5)
     header, *rows = csv.reader(io.StringIO(run.to_csv()))
-    assert header == ["t", "remaining", "a, b", 'say "c"']
-    np.testing.assert_array_equal(np.array(rows, dtype=float).T, [run.t, run.remaining, *run.states])
+    assert header == ["t", "remaining", "a, b", 'say "c"', "u(a, b)", 'u(say "c")']
+    np.testing.assert_array_equal(np.array(rows, dtype=float).T, [run.t, run.remaining, *run.states, *run.input])
     wide = simulate(graph, EXAMPLE_1, [[1, 2], [3, 4]], times=[0])
-    assert list(csv.reader(io.StringIO(wide.to_csv())))[1] == ["0.0", "1.0", "1.0", "2.0", "3.0", "4.0"]
+    header, first = csv.reader(io.StringIO(wide.to_csv()))
+    assert first[:6] == ["0.0", "1.0", "1.0", "2.0", "3.0", "4.0"]
+    assert header[6:] == [f"u({name})" for name in header[2:6]]
+    assert list(map(float, first[6:])) == wide.input[..., 0].ravel().tolist()
 
 
 def test_a_trajectory_cannot_be_changed():

@@ -469,8 +469,9 @@ def test_the_table_has_a_column_for_every_sliding_variable():
     run = simulate(six(), protocol(), X0, sigma0=SIGMA0, samples=5)
     header, *rows = csv.reader(io.StringIO(run.to_csv()))
     labels = list(six().labels)
-    assert header == ["t", "remaining", *labels, *(f"sigma({label})" for label in labels)]
-    np.testing.assert_array_equal(np.array(rows, dtype=float).T, [run.t, run.remaining, *run.states, *run.sigma])
+    assert header == ["t", "remaining", *labels, *(f"{name}({label})" for name in ("sigma", "u") for label in labels)]
+    columns = [run.t, run.remaining, *run.states, *run.sigma, *run.input]
+    np.testing.assert_array_equal(np.array(rows, dtype=float).T, columns)
 
 
 def test_a_run_says_what_it_is():

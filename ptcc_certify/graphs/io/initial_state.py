@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import column, records
@@ -126,7 +126,9 @@ def _checked(value: Any, label: str, name: str) -> Fraction:
     return value
 
 
-def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
+def read_state(
+    text_or_path: str | os.PathLike[str], graph: SignedDigraph, name: str = "initial state"
+) -> list[Fraction]:
     """Read one exact number for each node of a graph.
 
     Parameters
@@ -136,6 +138,8 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
         whole (``"a,b=1"``); or the path of a file with rows ``node,value`` (header optional, separators, comments
         and quotes as in an edge list).
     graph : SignedDigraph
+    name : str
+        What messages call it.
 
     Returns
     -------
@@ -157,7 +161,7 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
     """
     if not isinstance(text_or_path, str) or os.path.isfile(text_or_path):  # noqa: PTH113 - Path.is_file may raise
         return _state_of_file(text_or_path, graph)
-    place = f'initial state "{shorten(text_or_path)}"'
+    place = f'{name} "{shorten(text_or_path)}"'
     try:
         items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
     except csv.Error as error:
@@ -297,8 +301,8 @@ def _in_node_order(
     state: dict[str, Fraction] = {}
     for label, text, place in pairs:
         if label not in graph.index:
-            nodes = _some(graph.labels)
-            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph; its nodes are {nodes}')
+            hint = did_you_mean(label, graph.labels) or f"; its nodes are {_some(graph.labels)}"
+            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph{hint}')
         if label in state:
             raise refusal(f"{place}: node {shorten(label)} has two values; keep one")
         try:

@@ -6,7 +6,7 @@ import os
 from importlib import resources
 from pathlib import Path
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, did_you_mean
 
 #: Names of the packaged graphs.
 GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
@@ -26,7 +26,7 @@ def graph_path(name: str) -> Path:
     'fig1a.csv'
     """
     if name not in GRAPHS:
-        raise ParameterError(f'no packaged graph "{name}"; there are ' + ", ".join(GRAPHS))
+        raise ParameterError(f'no packaged graph "{name}"{did_you_mean(name, GRAPHS)}; there are {", ".join(GRAPHS)}')
     return Path(str(resources.files("ptcc_certify") / "examples" / f"{name}.csv"))
 
 

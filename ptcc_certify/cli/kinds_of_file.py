@@ -1,0 +1,152 @@
+"""What a file is, told from its first bytes, so that the wrong kind of thing is refused with what to do with it."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from itertools import islice
+from pathlib import Path
+
+from ptcc_certify.errors import FormatError, did_you_mean
+from ptcc_certify.graphs.rationals import shorten
+
+#: Bytes that are looked at.
+FIRST = 4096
+_SIGNATURES = {
+    b"%PDF": "a PDF",
+    b"\x89PNG": "an image",
+    b"\xff\xd8\xff": "an image",
+    b"GIF8": "an image",
+    b"<svg": "an image",
+    b"<!doctype html": "a page",
+    b"<html": "a page",
+    b"PK\x03\x04": "a zip archive",
+    b"PK\x05\x06": "a zip archive",
+}
+#: What graphs are kept in that begins like an archive.
+_PACKED = (".npz",)
+#: What a TOML file is.
+TOML = ("a scenario", "TOML")
+
+
+def kind_of(path: str) -> str:
+    """Return what a path is.
+
+    Returns
+    -------
+    str
+        "missing", "a folder", "empty", "a certificate", "a notebook", "JSON", "a PDF", "an image", "a page", "a zip
+        archive", "a scenario", "TOML" of another kind, and "" for all else, as graphs are.
+
+    Examples
+    --------
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder, "c.json")
+    ...     _ = file.write_text('{"schema": "ptcc-certificate/2"}')
+    ...     kind_of(str(file)), kind_of(folder), kind_of(f"{folder}/d.json")
+    ('a certificate', 'a folder', 'missing')
+    """
+    if path == "-":
+        return ""
+    if os.path.isdir(path):  # noqa: PTH112 - Path.is_dir may raise
+        return "a folder"
+    if not os.path.exists(path):  # noqa: PTH110
+        return "missing"
+    if not os.path.isfile(path):  # noqa: PTH113 - a pipe is read once
+        return ""
+    try:
+        with Path(path).open("rb") as file:
+            first = file.read(FIRST)
+    except OSError:
+        return ""  # whoever reads it tells why it cannot be
+    ending = Path(path).suffix.lower()
+    if not first:
+        return "empty"
+    if ending == ".toml":
+        return TOML[0] if re.search(rb"^\s*\[graph\]", first, re.MULTILINE) else TOML[1]
+    start = first.removeprefix(b"\xef\xbb\xbf").lstrip()
+    for signature, kind in _SIGNATURES.items():
+        if start[: len(signature)].lower() == signature.lower() and not (kind == "a zip archive" and ending in _PACKED):
+            return kind
+    if b"<svg" in start.lower() and start.startswith(b"<?xml"):
+        return "an image"
+    if start.startswith((b"{", b"[")):
+        return _kind_of_json(start, ending)
+    return ""
+
+
+def _kind_of_json(start: bytes, ending: str) -> str:
+    if b'"ptcc-certificate/' in start:
+        return "a certificate"
+    if ending == ".ipynb" or b'"cell_type"' in start:
+        return "a notebook"
+    return "JSON" if ending == ".json" or re.match(rb'\{\s*["}]', start) else ""
+
+
+def refuse_as_graph(path: str) -> None:
+    """Refuse what is no graph.
+
+    Raises
+    ------
+    FormatError
+        Tells what the file is and what to do with it.
+    """
+    from ptcc_certify.examples import GRAPHS
+
+    name, kind, word = shorten(path, 200), kind_of(path), shell_word(path)
+    mends = {
+        "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(path, '*.csv')))}",
+        "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it",
+        "a scenario": f"ptcc certify {word} runs it",
+        "a zip archive": "unpack it, or save a spreadsheet as CSV",
+    }
+    if kind == "missing":
+        raise FormatError(f"{name}: no such file; check the path{near_files(path, GRAPHS)}")
+    if kind == "empty":
+        raise FormatError(f"{name}: is empty: no edge and no node in this file; give rows source,target,weight")
+    if kind:
+        raise FormatError(f"{name}: is {kind}, not a graph; {mends.get(kind, 'write rows source,target,weight')}")
+
+
+def refuse_as_certificate(path: str) -> None:
+    """Refuse what is no certificate.
+
+    Raises
+    ------
+    FormatError
+        Tells what the file is and which command makes a certificate.
+    """
+    from ptcc_certify.examples import GRAPHS
+
+    name, kind = shorten(path, 200), kind_of(path)
+    if path == "-" or kind in ("a certificate", "JSON"):
+        return
+    made = f"ptcc certify {shell_word(path)} -o {shell_word(Path(path).stem + '.json')} makes one"
+    if path in GRAPHS and kind in ("missing", "a folder"):
+        raise FormatError(f"{name}: is a packaged graph, not a certificate; {made}")
+    if kind == "missing":
+        raise FormatError(f"{name}: not a readable certificate (no such file); check the path{near_files(path)}")
+    if kind == "a folder":
+        raise FormatError(f"{name}: is a folder, not a certificate; name a file in it")
+    if kind == "a scenario":
+        raise FormatError(f"{name}: is a scenario, not a certificate; {made}")
+    if kind:
+        raise FormatError(f"{name}: is {kind}, not a certificate; name the file that ptcc certify -o wrote")
+    if Path(path).suffix.lower() != ".json":
+        raise FormatError(f"{name}: not a readable certificate; if it is a graph, {made}")
+
+
+def near_files(path: str, names: tuple[str, ...] = ()) -> str:
+    """Return near names of files in the folder of a path that does not exist, and of ``names``."""
+    try:
+        with os.scandir(Path(path).parent) as entries:
+            files = [entry.name for entry in islice(entries, 5000)]
+    except (OSError, ValueError):
+        files = []
+    return did_you_mean(Path(path).name, [*names, *files])
+
+
+def shell_word(text: str) -> str:
+    """Return a text as one word of a shell."""
+    return shlex.quote(text) if text.isprintable() else "FILE"

@@ -1,0 +1,113 @@
+"""``ptcc new``: a commented scenario file."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import click
+
+from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.kinds_of_file import kind_of, shell_word
+from ptcc_certify.cli.options import graph_file
+from ptcc_certify.cli.scenario import SECTIONS, is_scenario
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+
+#: What is written as it is; the rest are comments.
+_WRITTEN = ("graph", "kind", "T", "rho1", "rho2", "kappa", "x0", "seed")
+
+
+@click.command()
+@click.argument("graph", required=False, shell_complete=complete(GRAPHS, PACKAGED))
+@click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write it to this file, such as scenario.toml.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@click.pass_context
+def new(context: click.Context, graph: str | None, output: str | None, force: bool) -> int:
+    """Write a commented scenario file, with GRAPH in it if one is given.
+
+    A scenario holds all that a run needs - graph, protocol, initial state, limits, expectations - in one file that
+    `ptcc certify`, `simulate`, `design` and `plot` take in place of GRAPH. Flags override it. Without -o it is printed.
+    """
+    from ptcc_certify.examples import GRAPHS
+    from ptcc_certify.graphs.io import read_graph, write_atomically
+
+    labels: tuple[str, ...] = ()
+    if graph == "-":
+        raise ParameterError("a scenario names the file of its graph; save the graph first")
+    if graph is not None and is_scenario(graph):
+        raise ParameterError(f"{shorten(graph, 200)}: is a scenario itself; copy it, or name a graph")
+    if graph is not None:
+        labels = read_graph(graph_file(graph)).labels
+    if graph is not None and not (graph in GRAPHS and kind_of(graph) == "missing"):
+        graph = _relative(graph, Path(output or "").parent)
+    root = context.find_root().command
+    commands = root.commands.values() if isinstance(root, click.Group) else ()
+    text = template({p.name: p for command in reversed([*commands]) for p in command.params if p.name}, graph, labels)
+    if output is None:
+        click.echo(text, nl=False)
+        return 0
+    if not is_scenario(output):
+        raise ParameterError(f"{output}: a scenario is written to a file that ends in .toml")
+    if os.path.exists(output) and not force:  # noqa: PTH110 - Path.exists may raise
+        raise ParameterError(f"{output}: is there already; name another file, or replace it with --force")
+    write_atomically(output, text)
+    click.echo(f"written    {output}; now: ptcc certify {shell_word(output)}")
+    return 0
+
+
+def template(options: Mapping[str, click.Parameter], graph: str | None = None, labels: Sequence[str] = ()) -> str:
+    """Return a commented scenario: every key with its meaning and its default.
+
+    Parameters
+    ----------
+    options : mapping of str to click.Parameter
+        What the keys stand for, by name.
+    graph : str, optional
+        What it is about.
+    labels : sequence of str
+        The nodes of the graph; those of a small one are shown where their values go.
+
+    Returns
+    -------
+    str
+        TOML that :func:`~ptcc_certify.cli.scenario.read_scenario` reads, with or without the ``#`` of its keys.
+    """
+    lines = ["# A scenario: ptcc certify, simulate, design and plot take this file in place of a graph."]
+    lines += ["# Lines that begin with # are left out; remove the # to give the key a value. Flags override it."]
+    for section, (title, keys) in SECTIONS.items():
+        lines += ["", f"[{section}]  # {title}"]
+        for key, (option, example) in keys.items():
+            if key == "file" and graph is not None:
+                example = json.dumps(graph, ensure_ascii=False).replace("\x7f", "\\u007f")
+            line = f"{'' if option in _WRITTEN else '# '}{key} = {example}"
+            lines.append(f"{line:<32}  # {_meaning(options.get(option))}")
+            if key == "x0" and 0 < len(labels) <= 12:
+                values = ", ".join(f"{json.dumps(label, ensure_ascii=False)} = 1" for label in labels)
+                lines.append(f"# x0 = {{ {values} }}")
+    return "\n".join(lines) + "\n"
+
+
+def _meaning(option: click.Parameter | None) -> str:
+    """Return what an option means, its values and its default."""
+    if not isinstance(option, click.Option):
+        return "A file, relative to the folder of this one, or a packaged graph: fig1a .. fig5b."
+    text, _, default = (option.help or "").partition("  [default: ")
+    if isinstance(option.type, click.Choice) and len(option.type.choices) > 1:
+        text += f" One of {', '.join(map(str, option.type.choices))}."
+    if not default:
+        shown = option.show_default if isinstance(option.show_default, str) else option.default
+        shown = False if option.is_flag and not option.secondary_opts else shown
+        known = isinstance(shown, bool | int | str)
+        default = f"{str(shown).lower() if isinstance(shown, bool) else shown if known else 'none'}]"
+    return f"{text}  [default: {default}"
+
+
+def _relative(path: str, folder: Path) -> str:
+    """Return a path as seen from a folder, with slashes."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive
+        return Path(path).resolve().as_posix()

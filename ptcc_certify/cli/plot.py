@@ -1,0 +1,147 @@
+"""``ptcc plot``: one figure of a certificate, a graph or a scenario."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.kinds_of_file import kind_of
+from ptcc_certify.cli.scenario import graph_of
+from ptcc_certify.cli.terminal import FIGURES, progress, refuse_output
+from ptcc_certify.errors import ExitCode, ParameterError, PTCCError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.graphs.structure import Structure
+    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.simulation.trajectory import Trajectory
+
+#: Figures of a simulated run.
+OF_A_RUN = ("states", "input", "decay")
+
+
+@click.command()
+@click.argument(
+    "graph",
+    metavar="CERT|GRAPH",
+    is_eager=True,
+    callback=graph_of,
+    shell_complete=complete((*CERTIFICATES, *GRAPHS), PACKAGED),
+)
+@click.option(
+    "--what",
+    type=click.Choice([*OF_A_RUN, "graph", "spectrum"]),
+    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues."
+    "  [default: of a certificate decay, else graph]",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False),
+    help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png, in this folder]",
+)
+@shared.reading_options
+@shared.protocol_options
+@shared.limit_options
+@shared.method_option
+@shared.time_limit_option
+@shared.memory_option
+def plot(graph: str, what: str | None, output: str | None, **options: Any) -> int:
+    """Draw one figure of a certificate, a graph or a scenario.
+
+    A certificate is checked first, and its run is repeated. A graph is simulated, for its decay certified, with the
+    options about protocol and initial state that `certify` has too.
+    """
+    from ptcc_certify.certificate.certificate import RejectedCertificate
+    from ptcc_certify.report.plots.style import save_figure
+
+    certified = kind_of(graph) == "a certificate"
+    what = what or ("decay" if certified else "graph")
+    output = output or f"{PurePath(graph).stem.lstrip('-') or 'graph'}-{what}.png"
+    if PurePath(output).suffix.lower() not in FIGURES:
+        raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
+    refuse_output(output, graph)
+    try:
+        drawn: Any = _of_certificate(graph, what, options["memory"]) if certified else _of_graph(graph, what, options)
+    except RejectedCertificate as error:
+        click.echo(f"rejected: {error}", err=True)
+        return ExitCode.VIOLATED
+    except PTCCError:
+        raise
+    except ValueError as error:  # of a figure that has nothing to show
+        raise ParameterError(f"{graph}: no figure of its {what} ({error}); --what names others") from None
+    save_figure(drawn.figure, output)
+    click.echo(f"written    {output}")
+    return ExitCode.OK
+
+
+def _of_certificate(path: str, what: str, memory: float) -> Axes:
+    """Draw a figure of a certificate's file."""
+    from ptcc_certify.certificate.certificate import read_certificate
+
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+        if given and parameter.name not in ("graph", "what", "output", "memory"):
+            raise ParameterError(f"{parameter.opts[0]} is for a graph; the certificate {path} has its own")
+    with progress(("independent check", "simulation")) as begin:
+        begin("independent check")
+        certificate = read_certificate(path, memory=memory)
+        if what in OF_A_RUN:
+            begin("simulation")
+            certificate = certificate.with_simulation()
+    return _drawn(what, certificate.structure, certificate.protocol, certificate.trajectory, certificate)
+
+
+def _of_graph(path: str, what: str, options: shared.Options) -> Axes:
+    """Draw a figure of a graph: as it is, simulated, or for its decay certified."""
+    from ptcc_certify.certificate.procedure import STEPS, certify
+    from ptcc_certify.graphs.structure import analyse
+    from ptcc_certify.simulation.run import simulate
+
+    signed, protocol = shared.read(path, options), shared.protocol_of(options, ("delta", "disturbance"))
+    if what not in OF_A_RUN:
+        return _drawn(what, analyse(signed), protocol)
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
+    more = shared.sliding_keywords(protocol, options, signed)
+    if what == "decay":
+        search = {name: options[name] for name in ("method", "time_limit")}
+        with progress(STEPS) as begin:
+            certificate = certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
+        return _drawn(what, certificate.structure, protocol, certificate.trajectory, certificate)
+    if options["kind"] == "nominal":
+        more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
+    return _drawn(what, analyse(signed), protocol, simulate(signed, protocol, x0, **more))
+
+
+def _drawn(
+    what: str,
+    structure: Structure,
+    protocol: Protocol,
+    run: Trajectory | None = None,
+    certificate: Certificate | None = None,
+) -> Axes:
+    from ptcc_certify.report.plots.decay import plot_decay
+    from ptcc_certify.report.plots.graph import plot_graph
+    from ptcc_certify.report.plots.input import plot_input
+    from ptcc_certify.report.plots.spectrum import plot_spectrum
+    from ptcc_certify.report.plots.trajectory import plot_trajectory
+
+    if what == "graph":
+        return plot_graph(structure)
+    if what == "spectrum":
+        return plot_spectrum(structure, protocol)
+    assert run is not None
+    if what == "states":
+        return plot_trajectory(run, structure)
+    if what == "input":
+        return plot_input(run, structure, certificate)
+    assert certificate is not None
+    return plot_decay(certificate)

@@ -1,0 +1,357 @@
+"""Scenario files: graph, protocol, initial state, limits and expectations in one TOML file.
+
+Every key is an option of some command, in a section of its own kind (:data:`SECTIONS`); a command takes those that are
+its options and leaves the others to the commands that have them. Flags override the file.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_graph
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
+from ptcc_certify.graphs.rationals import shorten
+
+#: Largest file, in bytes.
+MAX_BYTES = 1_000_000
+#: Where the scenario of a call is kept: ``context.meta[MEMORY]``.
+MEMORY = "ptcc_certify.scenario"
+#: Where the context of its command is kept.
+COMMAND = "ptcc_certify.command"
+
+#: The sections: what they are about, and of each key the option that it stands for, and an example of its value.
+SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
+    "graph": (
+        "Who listens to whom.",
+        {
+            "file": ("graph", '"fig1b"'),
+            "edges": ("edges", '"information"'),
+            "duplicates": ("duplicates", '"refuse"'),
+            "drop_self_loops": ("drop_self_loops", "false"),
+            "undirected": ("undirected", "false"),
+        },
+    ),
+    "protocol": (
+        "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
+        {
+            "kind": ("kind", '"nominal"'),
+            "T": ("T", "1"),
+            "rho1": ("rho1", "1"),
+            "rho2": ("rho2", "1"),
+            "kappa": ("kappa", "2"),
+            "T_r": ("T_r", "0.5"),
+            "T_s": ("T_s", "0.5"),
+            "mu1": ("mu1", "2"),
+            "mu2": ("mu2", "1"),
+            "mu3": ("mu3", "1"),
+        },
+    ),
+    "initial_state": (
+        "Where the agents begin: a list in node order, { label = value }, a CSV file, or random.",
+        {
+            "x0": ("x0", '"random"'),
+            "sigma0": ("sigma0", "0"),
+            "seed": ("seed", "0"),
+            "initial_bound": ("initial_bound", "10"),
+            "dimension": ("dimension", "1"),
+        },
+    ),
+    "disturbance": (
+        "What disturbs the agents.",
+        {"delta": ("delta", "1"), "signal": ("disturbance", '"worst-case"'), "noise": ("noise", "0.01")},
+    ),
+    "limits": (
+        "Limits of the gain (nominal protocol).",
+        {
+            "gain_cap": ("gain_cap", "100"),
+            "stop_before": ("stop_before", "0.01"),
+            "sample_period": ("sample_period", "0.001"),
+        },
+    ),
+    "expectations": (
+        "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
+        {
+            "behaviour": ("expect", '"bipartite-consensus"'),
+            "min_rate": ("min_rate", "1"),
+            "max_input": ("max_input", "100"),
+        },
+    ),
+    "certificate": (
+        "How it is proved.",
+        {
+            "method": ("method", '"best"'),
+            "at": ("at", "0.5"),
+            "time_limit": ("time_limit", "60"),
+            "simulation": ("simulation", "true"),
+        },
+    ),
+    "simulation": (
+        "How ptcc simulate runs it.",
+        {"samples": ("samples", "201"), "boundary_layer": ("boundary_layer", "0.01")},
+    ),
+    "design": (
+        "What ptcc design asks, beside max_input and initial_bound.",
+        {
+            "deadline": ("deadline", "1"),
+            "shortest_deadline": ("shortest_deadline", "true"),
+            "residual": ("residual", "0.01"),
+            "input_norm": ("input_norm", '"2"'),
+        },
+    ),
+}
+_STATES = ("x0", "sigma0")
+#: What does not count where a flag chooses the protocol: keys of the other one.
+_OTHERS = {
+    "nominal": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
+    "sliding-mode": ("T", "gain_cap", "stop_before", "sample_period", "noise"),
+}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario file.
+
+    Attributes
+    ----------
+    path : str
+        As it was named.
+    sections : mapping
+        As the file has them: numbers that are no integers are texts.
+    options : mapping of str to Any
+        What it gives, by the names of the commands' parameters; ``graph`` is found from here.
+    """
+
+    path: str
+    sections: Mapping[str, Mapping[str, Any]]
+    options: Mapping[str, Any]
+
+    @property
+    def graph(self) -> str:
+        """The graph, as a command takes it."""
+        return str(self.options["graph"])
+
+    def place(self, option: str) -> str:
+        """Return where an option stands in the file: ``scenario.toml: [protocol] T``."""
+        for section, (_, keys) in SECTIONS.items():
+            for key, (name, _) in keys.items():
+                if name == option:
+                    return f"{self.path}: [{section}] {key}"
+        return self.path
+
+    def document(self) -> dict[str, Any]:
+        """Return what a certificate records of it, as JSON: numbers as texts, exact."""
+        return {"file": Path(self.path).name, **_texts(self.sections)}
+
+
+def read_scenario(path: str) -> Scenario:
+    r"""Read a scenario file.
+
+    Parameters
+    ----------
+    path : str
+        A TOML file of at most :data:`MAX_BYTES`; paths in it are relative to its folder.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    FormatError
+        No file, too large, no TOML, or no scenario.
+    ParameterError
+        A section or a key is unknown, or a value is of another kind; the message names file, section and key.
+
+    Examples
+    --------
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder, "team.toml")
+    ...     _ = file.write_text('[graph]\nfile = "fig1a"\n[protocol]\nT = 0.6\n[initial_state]\nx0 = [1, 2.5, -3]')
+    ...     scenario = read_scenario(str(file))
+    >>> scenario.graph, scenario.options["T"], scenario.options["x0"]
+    ('fig1a', '0.6', '1,2.5,-3')
+    """
+    name, folder = shorten(path, 200), Path(path).parent
+    sections = _parsed(path, name)
+    options: dict[str, Any] = {}
+    for section, keys in sections.items():
+        known = SECTIONS[section][1]
+        for key, value in keys.items():
+            place = f"{name}: [{section}] {shorten(key)}"
+            if key not in known:
+                raise ParameterError(f"{place}: no such key{_where(key) or did_you_mean(key, known)}")
+            option = known[key][0]
+            options[option] = _state(value, folder, place) if option in _STATES else _value(value, known[key][1], place)
+    if not isinstance(options.get("graph"), str):
+        raise ParameterError(
+            f'{name}: [graph] file: names no graph; write file = "graph.csv" or a packaged one, "fig1a"'
+        )
+    options["graph"] = _beside(options["graph"], folder)
+    return Scenario(name, sections, options)
+
+
+def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
+    """Return the sections of a file, or refuse it."""
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise FormatError(f"{name}: cannot be read ({(error.strerror or str(error)).lower()})") from None
+    if len(data) > MAX_BYTES:
+        raise FormatError(f"{name}: more than {MAX_BYTES} bytes; give a long initial state as a CSV file")
+    try:
+        sections = tomllib.loads(data.decode("utf-8").removeprefix("\ufeff"), parse_float=str)
+    except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
+        reason = shorten(" ".join(str(error).split()), 160)
+        raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
+    if {"count", "nodes"} <= set(sections):
+        raise FormatError(f"{name}: describes random graphs, not a scenario; ptcc batch takes it")
+    if not any(isinstance(sections.get(section), dict) for section in SECTIONS):
+        raise FormatError(f"{name}: TOML, but not a scenario: it has none of the sections; ptcc new writes a scenario")
+    for section, keys in sections.items():
+        if section not in SECTIONS:
+            what = "section" if isinstance(keys, dict) else "key outside of a section"
+            hint = did_you_mean(section, SECTIONS) if isinstance(keys, dict) else _where(section)
+            raise ParameterError(f"{name}: [{shorten(section)}]: no such {what}{hint or '; ' + _list(SECTIONS)}")
+        if not isinstance(keys, dict):
+            raise ParameterError(f"{name}: [{section}]: is a section; write its keys below [{section}]")
+    return sections
+
+
+def _texts(value: Any) -> Any:
+    """Return TOML with its integers as texts."""
+    if isinstance(value, dict):
+        return {key: _texts(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_texts(part) for part in value]
+    return value if isinstance(value, bool) else str(value)
+
+
+def _list(names: Mapping[str, Any]) -> str:
+    return f"there are {', '.join(names)}"
+
+
+def _where(key: str) -> str:
+    """Return in which section a key is, for one that stands in another; nothing if there is no such key."""
+    homes = [section for section, (_, keys) in SECTIONS.items() if key in keys]
+    return f"; it belongs to [{homes[0]}]" if homes else ""
+
+
+def _value(value: Any, example: str, place: str) -> Any:
+    """Return a value as an option takes it: true or false, or a text."""
+    wanted = example in ("true", "false")
+    if isinstance(value, bool) != wanted or not isinstance(value, bool | int | str):
+        kind = "true or false" if wanted else "a text" if example.startswith('"') else "a number"
+        raise ParameterError(f"{place}: write {kind}, such as {example}")
+    return value if isinstance(value, bool) else str(value)
+
+
+def _state(value: Any, folder: Path, place: str) -> str:
+    """Return an initial state as ``--x0`` takes it."""
+    if isinstance(value, str):
+        path = folder / value
+        return str(path) if os.path.isfile(path) else value  # noqa: PTH113 - Path.is_file may raise
+    entries = list(value.items()) if isinstance(value, dict) else value if isinstance(value, list) else [value]
+    texts = []
+    for entry in entries:
+        label, number = entry if isinstance(entry, tuple) else (None, entry)
+        if isinstance(number, bool) or not isinstance(number, int | str):
+            raise ParameterError(f"{place}: write a list of numbers, {{ label = value, .. }}, a CSV file or random")
+        texts.append(str(number) if label is None else f"{label}={number}")
+    row = io.StringIO()
+    csv.writer(row, lineterminator="").writerow(texts)
+    return row.getvalue()
+
+
+def _beside(text: str, folder: Path) -> str:
+    """Return a path relative to the folder of the scenario; a packaged graph, and standard input, by name."""
+    from ptcc_certify.examples import GRAPHS
+
+    path = folder / text
+    return text if text == "-" or (text in GRAPHS and not path.is_file()) else str(path)
+
+
+# ---------------------------------------------------------------------- in a command
+
+
+def is_scenario(graph: str) -> bool:
+    """Tell whether what is given for a graph is a scenario file: a name that ends in .toml."""
+    return graph.lower().endswith(".toml")
+
+
+def graph_of(context: click.Context, parameter: click.Parameter, graph: str) -> str:
+    """Return the graph of a command; of a scenario its graph, after the command has the options that it gives.
+
+    The callback of every GRAPH; these are eager, so that options find their defaults here.
+    """
+    if context.resilient_parsing or not is_scenario(graph):
+        return graph
+    from ptcc_certify.examples import GRAPHS
+
+    if kind_of(graph) not in TOML:
+        refuse_as_graph(graph)
+    scenario = read_scenario(graph)
+    if scenario.graph not in ("-", *GRAPHS):
+        try:
+            refuse_as_graph(scenario.graph)
+        except FormatError as error:
+            raise FormatError(f"{scenario.place('graph')}: {error}") from None
+    context.meta.update({MEMORY: scenario, COMMAND: context})
+    own = {parameter.name for parameter in context.command.params}
+    context.default_map = {name: value for name, value in scenario.options.items() if name in own}
+    kind_of_protocol(context, None, context.params.get("kind"))
+    return scenario.graph
+
+
+def kind_of_protocol(context: click.Context, parameter: click.Parameter | None, kind: str | None) -> str | None:
+    """Return the protocol; one that a flag chooses leaves the scenario's keys of the other one out.
+
+    The callback of ``--protocol``; eager, as GRAPH is, in whichever order they are given.
+    """
+    if kind is not None and context.get_parameter_source("kind") is ParameterSource.COMMANDLINE:
+        context.default_map = {k: v for k, v in (context.default_map or {}).items() if k not in _OTHERS[kind]}
+    return kind
+
+
+def scenario_record() -> dict[str, Any] | None:
+    """Return what the certificate of this call records of its scenario, with the flags that override it."""
+    context = click.get_current_context()
+    scenario: Scenario | None = context.meta.get(MEMORY)
+    if scenario is None:
+        return None
+    given = [name for name in scenario.options if name in context.params and name != "graph"]
+    flags = [name for name in given if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    return scenario.document() | {"overridden": {name: str(context.params[name]) for name in flags}}
+
+
+def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exception:
+    """Return an error with the place in the scenario from which the value came, if it is of one."""
+    scenario: Scenario | None = context.meta.get(MEMORY)
+    if scenario is None:
+        return error
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        mend = f"write it, or give {error.param.opts[0]}"
+        return ParameterError(f"{scenario.place(error.param.name or '')}: is missing; {mend}")
+    if isinstance(error, click.BadParameter):
+        option, text = (error.param.name if error.param else None) or "", error.message
+    else:
+        text = str(error)
+        match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
+        option = match[1].replace("-", "_") if match else ""
+        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect"}.get(option, option)
+        if match and match[0].startswith("--"):
+            text = text[match.end() :]
+    if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:
+        return ParameterError(f"{scenario.place(option)}: {text}")
+    return error

@@ -1,0 +1,97 @@
+"""What the long screen tells of the input: bounded or not, how large, under limits and disturbances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.report.text_layout import value_list
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.input.effort import Effort, Limited
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.checker.input_formulas import InitialSet
+
+#: The head of a line, and its text; a line without a head belongs to the one before.
+Lines = Iterator[tuple[str, str]]
+
+
+def input_lines(certificate: Certificate) -> Lines:
+    """Tell whether the input stays finite, and how large it gets."""
+    effort = certificate.effort
+    if effort is None or certificate.constant:
+        return
+    lower, upper = effort.threshold
+    product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
+    if effort.bounded:
+        how = {"rate": f"{product}, 1 is enough", "spectrum": "by the exact spectrum"}[effort.by or "rate"]
+        yield "input", f"bounded up to the deadline for every initial state: {how}"
+    elif effort.bounded is False:
+        below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
+        yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
+        enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
+        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: raise rho2 * kappa{enough}"
+    else:
+        yield "input", f"bounded or not is undecided: {product}, it takes 1"
+    sizes = []
+    if effort.peak is not None:
+        most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
+        label = certificate.graph.labels[most]
+        sizes = [f"|u_k| <= {up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {up(effort.peak.norm, 4)}"]
+    sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
+    sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
+    if sizes:
+        whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
+        part = " (integrals of the nominal part)" if effort.sliding is not None else ""
+        yield "effort", ", ".join(sizes) + whom + part
+    other = bool(certificate.limits) or not certificate.direct  # the initial state that is found is of neither
+    worst = None if effort.peak is None or other else certificate.worst_initial_state
+    if worst is not None and math.isfinite(worst.size):
+        labels = certificate.graph.labels
+        where = f"|u_{labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
+        yield "", f"largest found (numerical) {where} from {value_list(labels, worst.x0.tolist())}"
+    if effort.sliding is not None and not effort.sliding.bounded:
+        yield "", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"
+    yield from _limited_lines(certificate, effort)
+    if effort.disturbed is not None:
+        d, drift = effort.disturbed, effort.disturbed.drift
+        ends = "" if drift is None else ", and all end where they would without"
+        if drift is not None and any(drift):
+            ends = f", every agent ends within {up(max(drift), 4)} of its final state"
+        yield "disturbed", f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|{ends}"
+    elif certificate.delta is not None:
+        yield "disturbed", "nothing is certified: the rate proves no bounded input"
+
+
+def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
+    """Tell what is proved under limits of the gain, and under noise with them."""
+    for entry in effort.residual:
+        agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
+        largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
+        yield "limited", f"{limits_text(entry)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
+        if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
+            noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
+            yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
+    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
+        yield "noise", "not certified: noise times an infinite gain; saturate the gain, or switch it off before T"
+    if effort.longest_period is not None:
+        yield "limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"
+    elif len(effort.residual) < len(certificate.limits):
+        yield "limited", "nothing is certified under these limits"
+
+
+def limits_text(entry: Limited) -> str:
+    """Name the limits of the gain."""
+    limits = entry.limits
+    names = (("gain <= ", limits.gain_cap), ("switched off at T - ", limits.stop_before))
+    return ", ".join(f"{what}{near(x)}" for what, x in (*names, ("zero-order hold ", limits.sample_period)) if x)
+
+
+def initial_states_text(initial_set: InitialSet) -> str:
+    """Name a set of initial states."""
+    R = max(initial_set.radius, default=0)
+    cube = R and not initial_set.axes and not any(initial_set.center) and min(initial_set.radius) == R
+    return f"all |x_k(0)| <= {near(Fraction(R))}" if cube else "the initial states asked about"

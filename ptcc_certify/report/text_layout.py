@@ -1,0 +1,158 @@
+"""Text for a terminal: how many columns it takes, lists and names shortened to fit, long lines wrapped."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Sequence
+
+#: Columns of a screen, and of the head of a line on it, blank included.
+WIDTH, HEAD = 80, 11
+#: Columns of the text beside the head.
+TEXT = WIDTH - HEAD
+
+
+def columns(text: str) -> int:
+    """Return the columns that a text takes at most: 2 for a wide letter, 1 for any other.
+
+    Examples
+    --------
+    >>> columns("abc"), columns("日本")
+    (3, 4)
+    """
+    return len(text) if text.isascii() else sum(1 + (unicodedata.east_asian_width(c) in "WF") for c in text)
+
+
+def printable(text: str) -> str:
+    r"""Return a text with ``?`` for what would steer a terminal.
+
+    Examples
+    --------
+    >>> printable("a\x1b[31m")
+    'a?[31m'
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else "?" for c in text)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    Examples
+    --------
+    >>> counted(1, "edge"), counted(0, "edge")
+    ('1 edge', '0 edges')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def shorten_text(text: str, width: int) -> str:
+    """Cut the end of a text that takes more columns than ``width``, and mark the cut.
+
+    Examples
+    --------
+    >>> shorten_text("abcdefgh", 6), shorten_text("abc", 6)
+    ('abc...', 'abc')
+    """
+    return text if columns(text) <= width else _cut(text, width - 3) + "..."
+
+
+def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
+    """List as many words as fit, and tell how many there are: ``total``, if these are the first of more.
+
+    Examples
+    --------
+    >>> shorten_list(["ann", "bob", "eve", "daniel", "zoe"], 25), shorten_list(["ann"], 25)
+    ('ann, ... (5 in all)', 'ann')
+    """
+    rest = f", ... ({max(total, len(words))} in all)"
+    room, used, fitting = width - columns(rest), 0, 0
+    for number, word in enumerate(words, start=1):
+        used += columns(word) + 2 * (number > 1)
+        if used > width:
+            break
+        fitting = number if used <= room else fitting
+    if used <= width and total <= len(words):
+        return ", ".join(words)
+    if fitting:
+        return ", ".join(words[:fitting]) + rest
+    return shorten_text(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
+
+
+def value_list(labels: Sequence[str], values: Iterable[object], width: int = 90) -> str:
+    """List the value of every node, long labels shortened."""
+    entries = (f"{shorten_text(label, 24)}={five_digits(value)}" for label, value in zip(labels, values, strict=True))
+    return shorten_list([printable(entry) for entry in entries], width)
+
+
+def five_digits(value: object) -> str:
+    """Write a number with five digits, to nearest."""
+    return f"{float(value):.5g}"  # type: ignore[arg-type]
+
+
+def wrap_text(text: str, width: int = TEXT) -> list[str]:
+    """Break a text into lines of at most ``width`` columns, at blanks where there are any.
+
+    Examples
+    --------
+    >>> wrap_text("the state of every agent", 10)
+    ['the state', 'of every', 'agent']
+    """
+    lines, line = [], ""
+    for word in text.split(" "):
+        longer = f"{line} {word}" if line else word
+        if columns(longer) <= width:
+            line = longer
+            continue
+        lines += [line] if line else []
+        while columns(word) > width:
+            head = _cut(word, width)
+            lines.append(head)
+            word = word[len(head) :]
+        line = word
+    return [*lines, line]
+
+
+def wrap_lines(lines: Iterable[str], width: int = WIDTH) -> list[str]:
+    """Wrap the lines of a screen, each a head of 11 columns and a text; what continues a text is indented.
+
+    Examples
+    --------
+    >>> wrap_lines(["verdict    certified, and checked"], 25)
+    ['verdict    certified, and', '           checked']
+    """
+    return [
+        (line[:HEAD] if number == 0 else " " * HEAD) + part
+        for line in lines
+        for number, part in enumerate(wrap_text(line[HEAD:], max(width - HEAD, 20)))
+    ]
+
+
+def wrap_command(words: Sequence[str], width: int = WIDTH) -> list[str]:
+    r"""Write a command on lines that a shell takes as one.
+
+    Examples
+    --------
+    >>> print("\n".join(wrap_command(["ptcc", "certify", "a.csv", "--T", "2"], 20)))
+    ptcc certify a.csv \
+        --T 2
+    """
+    lines = [words[0]]
+    for word in words[1:]:
+        if columns(lines[-1]) + columns(word) + 3 > width:
+            lines[-1] += " \\"
+            lines.append(f"    {word}")
+        else:
+            lines[-1] += f" {word}"
+    return lines
+
+
+def format_lines(entries: Iterable[tuple[str, str]]) -> list[str]:
+    """Write each head with its text as one line, whatever its length."""
+    return [f"{head:<{HEAD - 1}} {printable(text)}" for head, text in entries]
+
+
+def _cut(text: str, width: int) -> str:
+    """Return as much of the beginning of a text as takes so many columns."""
+    end, used = 0, 0
+    while end < len(text) and (used := used + columns(text[end])) <= width:
+        end += 1
+    return text[:end]

@@ -1,0 +1,243 @@
+"""Around the commands: help, near names, wrong kinds of file, completion, standard input, ``ptcc plot``."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from bad_inputs import Run, ptcc
+from click.shell_completion import BashComplete, ShellComplete
+
+import ptcc_certify
+from ptcc_certify.cli import GROUPS, cli
+from ptcc_certify.cli.completion import PACKAGED, THEOREMS
+from ptcc_certify.examples import GRAPHS
+from ptcc_certify.theorems.table import THEOREMS as TABLE
+
+TEAM = "ann,bob,1\nbob,ann,1\nbob,eve,-2\neve,dan,1\ndan,eve,1\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("team.csv").write_text(TEAM)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("made") / "c.json"
+    assert ptcc("certify", "fig1b", "--no-simulation", "-o", str(path)).code == 0
+    return str(path)
+
+
+def process(*words: str, stdin: bytes = b"") -> Run:
+    env = {"PYTHONPATH": str(Path(ptcc_certify.__file__).parents[1])}
+    done = subprocess.run([sys.executable, *words], input=stdin, capture_output=True, timeout=60, env=os.environ | env)
+    return Run(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+# ---------------------------------------------------------------------- help
+
+
+def test_the_help_names_every_command_once_in_one_plain_line():
+    lines = ptcc("--help").out.splitlines()
+    for name in cli.commands:
+        (line,) = (line for line in lines if line.startswith(f"  {name} "))
+        assert not line.endswith("...")
+    assert {name for group in GROUPS.values() for name in group} >= set(cli.commands)
+
+
+@pytest.mark.parametrize("name", ["", *cli.commands])
+def test_every_help_fits_80_columns(name: str):
+    run = ptcc(*filter(None, [name]), "--help")
+    assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
+
+
+def test_the_package_runs_as_the_command():
+    assert process("-m", "ptcc_certify", "cite", "2.1").out == ptcc("cite", "2.1").out
+
+
+# ---------------------------------------------------------------------- near names
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (("certfy", "fig1a"), "did you mean certify?"),
+        (("certify", "Fig1A"), "did you mean fig1a?"),
+        (("certify", "teem.csv"), "did you mean team.csv?"),
+        (("check", "teem.csv"), "did you mean team.csv?"),
+        (("certify", "team.csv", "--rh1", "2"), "--rho1"),
+        (("certify", "team.csv", "--expect", "bipartit-consensus"), "did you mean bipartite-consensus"),
+        (("certify", "team.csv", "--x0", "anne=1,bob=2,eve=3,dan=4"), "did you mean ann?"),
+        (("certify", "team.csv", "--protocol", "slidingmode"), "sliding-mode"),
+        (("examples", "fig1A"), "did you mean fig1a?"),
+        (("cite", "2,1"), "did you mean 2.1"),
+    ],
+)
+def test_a_wrong_name_is_answered_with_near_ones(words: tuple[str, ...], near: str):
+    run = ptcc(*words)
+    assert run.code == 2 and len(run.err.splitlines()) == 1 and near in run.err, run.err
+
+
+# ---------------------------------------------------------------------- wrong kinds of file
+
+KINDS = {
+    "x.pdf": (b"%PDF-1.7 ...", "is a PDF"),
+    "x.png": (b"\x89PNG\r\n\x1a\n", "is an image"),
+    "x.svg": (b'<?xml version="1.0"?>\n<svg/>', "is an image"),
+    "x.html": (b"<!DOCTYPE html>\n<html></html>", "is a page"),
+    "x.xlsx": (b"PK\x03\x04 sheet", "is a zip archive"),
+    "x.ipynb": (b'{"cells": [{"cell_type": "code"}]}', "is a notebook"),
+    "x.csv": (b"", "is empty"),
+    "x.toml": (b'[graph]\nfile = "fig1a"\n', "is a scenario"),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_what_is_neither_graph_nor_certificate_is_named(name: str):
+    content, says = KINDS[name]
+    Path(name).write_bytes(content)
+    for words in (("certify", name), ("check", name), ("report", name, "-o", "r.html"), ("plot", name)):
+        if (words[0], name) in (("certify", "x.toml"), ("plot", "x.toml")):
+            continue  # where it belongs
+        run = ptcc(*words)
+        assert run.code == 2 and len(run.err.splitlines()) == 1 and says in run.err, run.err
+        assert not Path("r.html").exists()
+
+
+def test_a_graph_and_a_certificate_in_the_place_of_the_other_are_told_with_the_command(certificate: str):
+    for command in ("certify", "classify", "simulate", "new"):
+        run = ptcc(command, certificate)
+        assert run.code == 2 and f"is a certificate, not a graph; ptcc check {certificate}" in run.err
+    for graph in ("team.csv", "fig1a"):
+        for words in (("check", graph), ("report", graph, "-o", "r.html")):
+            run = ptcc(*words)
+            assert run.code == 2 and f"ptcc certify {graph} -o {graph.removesuffix('.csv')}.json makes one" in run.err
+    run = ptcc("certify", ".")
+    assert run.code == 2 and "is a folder, not a graph" in run.err and "ptcc batch '*.csv'" in run.err
+    Path("odd.csv").write_text("{a,b,1\nb,{a,1\n")  # begins like JSON
+    assert ptcc("classify", "odd.csv").code == 0
+
+
+def test_a_matrix_that_is_an_archive_is_a_graph():
+    np.savez("w.npz", np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    assert ptcc("classify", "w.npz").code == 0
+
+
+@pytest.mark.parametrize("output", ["x.html", "x.png", "x.csv", "x.toml"])
+def test_another_kind_of_output_is_sent_to_its_command(output: str):
+    run = ptcc("certify", "fig1a", "-o", output)
+    command = {".html": "report", ".png": "plot", ".csv": "simulate", ".toml": "new"}[Path(output).suffix]
+    assert run.code == 2 and f"ptcc {command} " in run.err and not Path(output).exists()
+
+
+# ---------------------------------------------------------------------- standard input
+
+
+def test_a_certificate_is_checked_from_standard_input(certificate: str):
+    content = Path(certificate).read_bytes()
+    assert ptcc("check", "-", stdin=content).out == ptcc("check", certificate).out
+    run = process("-m", "ptcc_certify.checker", "-", stdin=content)
+    assert run.code == 0 and run.out.splitlines()[-1].startswith("accepted")
+    assert ptcc("check", "-", "fig1b", stdin=content).code == 0
+    for stdin in (b"", b"a,b,1\n", b"\xff"):
+        assert ptcc("check", "-", stdin=stdin).code == 2
+    tight = ptcc("check", "-", "--memory", "0.00001", stdin=content)
+    assert tight.code == 2 and "--memory" in tight.err
+
+
+# ---------------------------------------------------------------------- plot
+
+
+def test_every_figure_of_a_certificate_a_graph_and_a_scenario_is_drawn(certificate: str):
+    Path("s.toml").write_text('[graph]\nfile = "team.csv"\n')
+    for what in ("states", "input", "decay", "graph", "spectrum"):
+        assert ptcc("plot", certificate, "--what", what, "-o", f"{what}.svg").out == f"written    {what}.svg\n"
+        assert Path(f"{what}.svg").read_bytes().startswith(b"<?xml")
+    for what in ("states", "graph"):
+        assert ptcc("plot", "team.csv", "--what", what, "--x0", "1,2,3,4").out == f"written    team-{what}.png\n"
+    assert ptcc("plot", "s.toml").code == 0 and Path("team-graph.png").exists()
+
+
+def test_what_cannot_be_drawn_is_refused_in_one_line(certificate: str):
+    for words, says in (
+        ((certificate, "--T", "2"), "--T is for a graph"),
+        (("fig1a", "-o", "x.jpg"), "figures are written to"),
+        (("fig1a", "-o", "nowhere/x.png"), "the folder does not exist"),
+        (("fig1b", "--what", "decay", "--x0", "0,0,0,0,0,0"), "no figure of its decay"),
+    ):
+        run = ptcc("plot", *words)
+        assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1) and says in run.err, run
+    changed = Path(certificate).read_text().replace('"verdict": "certified"', '"verdict": "undecided"')
+    Path("bad.json").write_text(changed)
+    run = ptcc("plot", "bad.json")
+    assert run.code == 1 and run.err.startswith("rejected: ") and not list(Path().glob("*.png"))
+
+
+# ---------------------------------------------------------------------- completion
+
+
+def completions(line: str) -> list[str]:
+    words = line.split(" ")
+    complete = ShellComplete(cli, {}, "ptcc", "_PTCC_COMPLETE")
+    return [item.value for item in complete.get_completions(words[1:-1], words[-1])]
+
+
+def test_names_are_completed():
+    assert completions("ptcc ce") == ["certify"]
+    assert completions("ptcc certify fig1") == ["fig1a", "fig1b"]
+    assert completions("ptcc certify fig1a --expect bipartite-con") == ["bipartite-consensus", "bipartite-containment"]
+    assert completions("ptcc certify fig1a --method p") == ["paper", "perron"]
+    assert completions("ptcc examples 1") == ["1"]
+    assert completions("ptcc cite 2.") == ["2.1", "2.2"]
+
+
+def test_files_of_the_right_kind_and_folders_are_completed():
+    for name in ("c.json", "s.toml", "notes.md", ".hidden.csv", "team one.csv"):
+        Path(name).touch()
+    Path("tea").mkdir()
+    Path("tea/deep.csv").touch()
+    assert completions("ptcc check ") == ["c.json", f"tea{os.sep}"]
+    assert completions("ptcc certify te") == [f"tea{os.sep}", "team one.csv", "team.csv"]
+    assert completions("ptcc certify tea/") == ["tea/deep.csv"]
+    assert completions("ptcc certify s") == ["s.toml"]
+    assert completions("ptcc plot c") == ["c.json"]
+    assert completions("ptcc certify nowhere/") == []
+
+
+def test_what_is_half_typed_is_completed_without_complaint():
+    Path("broken.toml").write_text("not toml")
+    assert completions("ptcc certify broken.toml --max-i") == ["--max-input"]
+    assert completions("ptcc check team.csv --std") == ["--stdlib"]
+    assert completions("ptcc certify fig1a --expect war --T x --ed") == ["--edges"]
+
+
+def test_completion_knows_the_names_of_the_package():
+    assert PACKAGED == GRAPHS
+    assert tuple(theorem.number for theorem in TABLE) == THEOREMS
+
+
+def test_completion_imports_nothing_that_computes():
+    code = (
+        "import sys; from ptcc_certify.cli import cli; from click.shell_completion import ShellComplete as S\n"
+        "assert S(cli, {}, 'ptcc', '_PTCC_COMPLETE').get_completions(['certify'], 'fig1')\n"
+        "print({'numpy', 'scipy', 'casadi', 'cvxpy', 'matplotlib', 'networkx', 'rich'} & set(sys.modules))"
+    )
+    assert process("-c", code).out == "set()\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_of_each_shell_is_printed(shell: str):
+    run = ptcc("completion", shell)
+    assert run.code == 0 and f"{shell}_complete" in run.out
+    if shell == "bash":
+        assert '"${value%/}"' in run.out and "compopt -o filenames" in run.out
+        assert "COMPREPLY+=($value)" in BashComplete.source_template
+    assert isinstance(cli, click.Group)

@@ -1,0 +1,121 @@
+"""How much the commands print, what they log, and what they say while they work."""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+from pathlib import Path
+
+import pytest
+from bad_inputs import ptcc
+from rich.cells import cell_len
+
+from ptcc_certify.cli import terminal
+from ptcc_certify.examples import GRAPHS
+
+FAST = ("--no-simulation", "--method", "paper")
+DESIGN = ("design", "fig1a", "--max-input", "10", "--initial-bound", "1")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", [*GRAPHS][::2])
+def test_short_screens_fit_8_lines_of_80_columns_and_long_ones_80_columns(name: str):
+    ptcc("certify", name, *FAST, "-o", "c.json", "-q")
+    for words in (("classify", name), ("certify", name, *FAST), ("check", "c.json", name)):
+        short, long = ptcc(*words), ptcc(*words, "-v")
+        assert short.code == long.code == 0
+        assert len(short.out.splitlines()) <= 8 and len(long.out) > len(short.out)
+        assert max(cell_len(line) for line in (short.out + long.out).splitlines()) <= 80
+
+
+def test_design_says_what_was_asked_what_is_met_and_how_to_prove_it_again():
+    for task, code in (("--shortest-deadline",), 0), (("--deadline", "0.7"), 3), (("--deadline", "0.9"), 4):
+        short, long = ptcc(*DESIGN, *task), ptcc(*DESIGN, *task, "-v")
+        assert short.code == long.code == code
+        assert len(short.out.splitlines()) <= 8 and long.out != short.out
+        assert max(map(len, (short.out + long.out).splitlines())) <= 80
+        assert ("to prove it again:" in short.out) == (code == 0)
+
+
+def test_design_names_everything_that_is_missing_at_once():
+    assert (
+        "needs --max-input U, --initial-bound R, --deadline T or --shortest-deadline; e.g."
+        in ptcc("design", "fig1a").err
+    )
+    assert "needs --deadline T or --shortest-deadline;" in ptcc(*DESIGN).err
+    both = ptcc(*DESIGN, "--deadline", "1", "--shortest-deadline")
+    assert both.code == 2 and "leave one out" in both.err
+
+
+def test_a_drawn_initial_state_is_told_with_its_seed_and_a_given_one_as_given():
+    assert "; x(0) random, seed 7\n" in ptcc("certify", "fig1b", "--seed", "7", *FAST).out
+    assert "; x(0) given\n" in ptcc("certify", "fig1b", "--x0", "1,2,3,4,5,6", *FAST).out
+    sliding = ("certify", "fig1b", "--protocol", "sliding-mode", *FAST)
+    assert "x(0) random, seed 0, sigma(0) 0" in ptcc(*sliding).out.replace("\n           ", " ")
+    assert "sigma(0) random, seed 0" in ptcc(*sliding, "--sigma0", "random").out.replace("\n           ", " ")
+
+
+def test_quiet_prints_nothing_and_the_exit_code_tells():
+    run = ptcc("certify", "fig1a", "-q", "--expect", "bipartite-consensus", *FAST, "-o", "c.json")
+    assert (run.code, run.out, run.err) == (3, "", "")
+    assert Path("c.json").exists()
+    for words in (("check", "c.json"), ("classify", "fig1a"), (*DESIGN, "--deadline", "2")):
+        run = ptcc(*words, "-q")
+        assert (run.code, run.out, run.err) == (0, "", "")
+    assert json.loads(ptcc("certify", "fig1a", "-q", "--json", *FAST).out)["verdict"] == "certified"
+    refused = ptcc("certify", "fig1a", "-q", "--T", "0")
+    assert refused.code == 2 and "T = 0" in refused.err
+    assert ptcc("certify", "fig1a", "-q", "-v").code == 2
+
+
+def test_the_log_tells_steps_with_seconds_what_was_searched_and_decided_and_is_appended():
+    words = ("certify", "fig1a", "--log", "run.log", "--no-simulation")
+    assert ptcc(*words, "-q").code == 0
+    text = Path("run.log").read_text()
+    for pattern in (
+        r"independent check: \d+\.\d{3} s",
+        "searched lmi: numerical",
+        "proved paper: decay",
+        "verdict certified",
+    ):
+        assert re.search(pattern, text), pattern
+    assert all(
+        re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} (INFO|WARNING|ERROR) ", line) for line in text.splitlines()
+    )
+    assert ptcc(*words, "--T", "0").code == 2 and ptcc(*words, "--time-limit", "1e-9").code == 4
+    longer = Path("run.log").read_text()
+    assert longer.startswith(text) and "T = 0 is outside its domain" in longer and "cut off by the time limit" in longer
+
+
+def test_a_log_that_cannot_be_written_is_refused_in_one_line():
+    Path("g.csv").write_text("a,b,1\n")
+    for path in ("no/such/folder/a.log", ".", "g.csv"):
+        run = ptcc("certify", "g.csv", "--log", path)
+        assert run.code == 2 and run.out == "" and len(run.err.splitlines()) == 1 and "--log" in run.err
+    assert Path("g.csv").read_text() == "a,b,1\n"
+
+
+def test_work_that_lasts_says_where_it_is_without_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    monkeypatch.setattr(terminal, "FIRST_WORD", 0.01)
+    monkeypatch.setattr(terminal, "NEXT_WORD", 0.01)
+    threads = threading.active_count()
+    with terminal.progress(("one step", "another step")) as begin:
+        begin("another step")
+        for _ in range(100):
+            threading.Event().wait(0.02)
+            if (printed := capsys.readouterr()).err:
+                break
+    assert printed.out == "" and re.search(r"ptcc: after 0 s: 1 of 2 done, another step\n", printed.err)
+    assert threading.active_count() == threads
+    with terminal.progress(("one step",), quiet=True) as begin:
+        begin("one step")
+        threading.Event().wait(0.05)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,151 @@
+"""The short screens: at most 8 lines of 80 columns whatever the graph, and a verdict that the exit code agrees with."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from generators import KINDS, all_classes, random_graph, smallest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+import ptcc_certify as ptcc
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.errors import ExitCode
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.report.screen import certificate_lines, structure_summary, summary_lines
+from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines
+
+NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.1", rho2="0.6", kappa=1)
+SLIDING = ptcc.SlidingModeProtocol(T_r="0.5", T_s=1, rho1="0.1", rho2="0.3", kappa=2, mu1="1.2", mu2=1, mu3=1, delta=1)
+PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+LABELS = (str, lambda k: f"agent number {k} of a rather long list of agents", lambda k: f"日本語の節点{k}" * 5)
+HEADS = ["graph", "read", "protocol", "claim", "x(T)", "error", "input", "verdict"]
+#: The beginning of the verdict line by exit code.
+VERDICTS = {
+    ExitCode.OK: "certified",
+    ExitCode.VIOLATED: "VIOLATED",
+    ExitCode.REFUTED: "refuted",
+    ExitCode.UNDECIDED: "(undecided|left open)",
+}
+
+
+def assert_short(lines: list[str], most: int) -> None:
+    assert len(lines) <= most, "\n".join(lines)
+    for line in lines:
+        assert cell_len(line) <= 80 and line.isprintable() and line == line.rstrip(), (cell_len(line), line)
+
+
+def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[str]:
+    """The screen is short, and its verdict is that of the exit code."""
+    lines = summary_lines(certificate, name)
+    assert_short(lines, 8 if len(certificate.claims) == 1 else 12)
+    (verdict,) = [line for line in lines if line.startswith("verdict ")]
+    assert re.match(rf"verdict    {VERDICTS[certificate.assessment.exit_code]}\b", verdict), verdict
+    return lines
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
+    kwargs = dict(all_classes())[kind]
+    rng = np.random.default_rng(KINDS.index(kind))
+    fixed = "n" in kwargs or (kwargs.get("isolated") and not kwargs["parts"])
+    n = smallest(**kwargs) if fixed else smallest(**kwargs) + 2
+    made = random_graph(rng, **dict(kwargs, n=n))
+    label = LABELS[KINDS.index(kind) % len(LABELS)]
+    graph = SignedDigraph.from_edges(
+        [(label(s), label(t), w) for s, t, w in made.graph.edges], [label(v) for v in made.graph.labels]
+    )
+    x0 = [Fraction(int(x), 7) for x in rng.integers(-9_999, 10_000, n)]
+    assert_short(structure_summary(analyse(graph), "a graph of a long name" * 4), 8 if len(made.parts) == 1 else 12)
+    for protocol, sigma in ((NOMINAL, {}), (SLIDING, {"sigma0": x0[::-1]})):
+        certificate = ptcc.certify(graph, protocol, x0, simulation=False, method="paper", **sigma)
+        assert_screen(certificate, "/a/long/path/of/some/folders/to/the/file/of/the/graph/graph_5.csv")
+        for line in wrap_lines(certificate_lines(certificate, "g" * 100)):
+            assert cell_len(line) <= 80
+
+
+REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
+    (NOMINAL, {"expectations": Expectations("stability")}, 3, "refuted: stability"),
+    (NOMINAL, {"expectations": Expectations("bipartite consensus", Fraction(1), Fraction(10**6))}, 0, "met: bipartite"),
+    (NOMINAL, {"expectations": Expectations(max_input=Fraction(1, 10**6))}, 3, "refuted: |u_k|"),
+    (SLIDING, {"expectations": Expectations("stability", Fraction(9), Fraction(1, 10**6))}, 3, "refuted: stability"),
+    (NOMINAL, {"limits": [GainLimits(gain_cap=30)]}, 0, "gain <= 30: at T ||E||"),
+    (
+        NOMINAL,
+        {"limits": [GainLimits(gain_cap=30)], "noise": "0.1", "delta": "0.1"},
+        0,
+        "gain <= 30, |n_k| <= 0.1: at T",
+    ),
+    (NOMINAL, {"noise": "0.1"}, 4, "left open: noise"),
+    (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "zero-order hold 0.1: at T ||E||"),
+    (
+        ptcc.NominalProtocol(T=1, rho1=9, rho2=9, kappa=1),
+        {"limits": [GainLimits(sample_period="0.9")]},
+        4,
+        "left open: limits",
+    ),
+    (NOMINAL, {"initial_set": 3}, 0, "for all |x_k(0)| <= 3"),
+    (NOMINAL, {"at": "0.3"}, 0, "at t = 0.3: ||E|| <="),
+    (NOMINAL, {"time_limit": 1e-9}, 4, "1e-09 s ended"),
+    (ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), {}, 0, "NOT BOUNDED"),
+    (ptcc.NominalProtocol(T="1/7", rho1="1/30011", rho2="1/40009", kappa="100003/7"), {}, 0, "kappa="),
+]
+
+
+@pytest.mark.parametrize(("protocol", "request_", "code", "says"), REQUESTS, ids=str)
+def test_whatever_is_asked_the_screen_is_short_and_agrees_with_the_exit_code(protocol, request_, code, says):
+    certificate = ptcc.certify(PAIR, protocol, [5, 1], simulation=False, **request_)
+    assert certificate.assessment.exit_code == code
+    lines = assert_screen(certificate)
+    assert says in " ".join(line.strip() for line in lines), lines
+
+
+def test_without_particulars_there_is_one_line_for_each_thing():
+    lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False))
+    assert [line.split()[0] for line in lines] == HEADS
+    assert [line.split()[0] for line in assert_screen(ptcc.certify(PAIR, NOMINAL))] == [h for h in HEADS if h != "x(T)"]
+
+
+def test_of_many_components_the_largest_four_are_told():
+    edges = [(f"{k}a{i}", f"{k}a{i + 1}", 1) for k in range(6) for i in range(k)]
+    lines = assert_screen(ptcc.certify(SignedDigraph.from_edges(edges, ["0a0"]), NOMINAL, [1] * 21, simulation=False))
+    claims = [line for line in lines if "at T = 0.6" in line]
+    assert len(claims) == 4 and claims[0].startswith("claim      5a0, 5a1")
+    assert any("... 6 components in all" in line for line in lines)
+
+
+def test_agents_without_edges_keep_their_state():
+    (text,) = [
+        x for x in assert_screen(ptcc.certify(SignedDigraph.from_edges([], ["a"]), NOMINAL, [5])) if "keeps" in x
+    ]
+    assert text == "error      none: no agent listens to another, each keeps its state"
+
+
+def test_a_certificate_read_back_shows_the_same_screen(tmp_path):
+    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False)
+    certificate.save(tmp_path / "c.json")
+    assert summary_lines(ptcc.read_certificate(tmp_path / "c.json"), "pair") == summary_lines(certificate, "pair")
+
+
+@given(st.lists(st.text(max_size=30), min_size=1, max_size=12), st.integers(30, 90))
+@settings(max_examples=60, deadline=None)
+def test_a_list_is_shortened_to_its_width(words: list[str], width: int):
+    text = shorten_list(words, width)
+    assert columns(text) <= width
+    if columns(", ".join(words)) <= width:
+        assert text == ", ".join(words)
+
+
+@given(st.text(max_size=300), st.integers(31, 90))
+@settings(max_examples=60, deadline=None)
+def test_wrapping_loses_nothing_and_keeps_to_the_width(text: str, width: int):
+    lines = wrap_lines([f"{'head':<11}{text}"], width)
+    assert all(columns(line) <= width for line in lines)
+    assert "".join(line[11:] for line in lines).replace(" ", "") == text.replace(" ", "")
