@@ -289,7 +289,3 @@ class LimitedGain:
         q, stopped = np.maximum(1 - t / float(self.gain.T), 0), self._stopped_share
         late = t >= float(self.gain.T * (1 - stopped)) if stopped else False
         return t, np.where(late, np.minimum(q, float(stopped)), q)
-
-
-#: The limits, by what imposes them.
-GainLimits = GainLimits

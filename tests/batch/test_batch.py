@@ -641,7 +641,7 @@ def test_what_cannot_be_done_is_refused_before_the_work(args: tuple[str, ...], s
         ({"seed": 10**5000}, "seed = a number of thousands of digits"),
         ({"workers": 0}, "workers = 0"),
         ({"protocol": None}, "protocol = None"),
-        ({"sources": None}, "None is no graph"),
+        ({"sources": None}, "None is not read as a graph"),
     ],
 )
 def test_settings_are_refused_with_and_without_a_table(more: dict[str, Any], says: str):

@@ -22,7 +22,7 @@ _VALUE = ("value", "state", "x", "x0", "sigma0")
 
 
 #: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
-LARGEST_STATE = Fraction(10**300)
+LARGEST_STATE = Fraction(1e300)  # the float, which exceeds 10^300 a little
 
 
 def as_state(values: Any, graph: Any, name: str = "x0") -> list[Fraction]:
