@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import same_color, to_rgb
+from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
@@ -310,11 +310,14 @@ def test_large_graphs_are_drawn_as_matrices_camp_by_camp() -> None:
     assert len(plot_graph(ring(LABELLED_NODES)).texts) == LABELLED_NODES
     camp = [(f"a{j}", f"a{(j + 1) % 30}", 1) for j in range(30)] + [(f"b{j}", f"b{(j + 1) % 30}", 1) for j in range(30)]
     ax = drawn(plot_graph([*camp, ("a0", "b0", -1), ("b3", "a3", -1), ("a5", "z", 1)]))
-    (image,) = ax.images
-    cells = np.asarray(image.get_array())
-    ally, opponent = (np.all(np.isclose(cells, to_rgb(EDGE_STYLES[sign][0])), axis=-1) for sign in (1, -1))
-    assert ally.sum() == 61 and opponent.sum() == 2
-    assert opponent[30:60, :30].sum() == opponent[:30, 30:60].sum() == 1  # between the camps
+    cells: dict[int, set[tuple[int, int]]] = {1: set(), -1: set()}  # of allies and opponents, by listener and source
+    for patch in ax.patches:
+        for corners in np.asarray(patch.get_path().vertices).reshape(-1, 5, 2)[:, :4]:
+            column, row = corners.min(axis=0).round().astype(int).tolist()
+            cells[int(str(patch.get_gid()).split()[1])].add((row, column))
+    assert len(cells[1]) == 61 and len(cells[-1]) == 2
+    assert {(row < 30, column < 30) for row, column in cells[-1]} == {(True, False), (False, True)}
+    assert all((row < 30) == (column < 30) for row, column in cells[1] if row < 60)
     assert {"first camp (30)", "second camp (30)", "followers (1)"} <= set(labelled(ax))
 
 
