@@ -42,7 +42,7 @@ def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
             corners = np.stack([column, row], axis=1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
             squares = Path.make_compound_path_from_polys(side * corners)
             looks = {"facecolor": EDGE_STYLES[sign][0], "alpha": 0.4 + 0.6 * level / DEPTHS, "linewidth": 0}
-            ax.add_patch(PathPatch(squares, gid=f"cells {sign}", **looks))
+            ax.add_patch(PathPatch(squares, **looks))
     ends = np.cumsum([(group == name).sum() for name in parts])
     for end in ends[:-1]:
         ax.axhline(end, color="black", linewidth=0.7)
