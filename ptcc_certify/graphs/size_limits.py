@@ -18,8 +18,8 @@ SIMULATED_NODES = 10_000
 
 #: Agents up to which a report repeats the run unasked, and of every one of which it shows the input.
 REPEATED_NODES, INPUT_NODES = 1000, 100
-#: Nodes of a graph that is drawn, that is labelled, and whose layout is that of Kamada and Kawai.
-DRAWN_NODES, LABELLED_NODES, KAMADA_NODES = 300, 40, 60
+#: Nodes of a graph that a report draws, and up to which it is drawn with nodes and arrows, above as a matrix.
+DRAWN_NODES, LABELLED_NODES = 300, 40
 #: Nodes of a graph that a notebook draws unasked: a layout takes seconds above.
 SHOWN_NODES = 120
 #: Nodes of a graph that is explored, and up to which its certificate is checked unasked.

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import same_color, to_rgb
+from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
@@ -33,7 +33,7 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.nominal import NominalProtocol
-from ptcc_certify.report.plots.agents import AGENT, CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
@@ -110,7 +110,9 @@ def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
 
 
 def agent_lines(ax: Axes) -> list[Line2D]:
-    return [line for line in ax.lines if line.get_gid() == AGENT]
+    """The lines of single agents: those of medians are thicker."""
+    camp_colours = {colour for colour, _ in CAMP_STYLES.values()}
+    return [line for line in ax.lines if line.get_color() in camp_colours and line.get_linewidth() < 2]
 
 
 def peak_of(ax: Axes) -> Annotation | None:
@@ -246,7 +248,7 @@ def arrows_in(ax: Axes) -> list[FancyArrowPatch]:
 
 def nodes_in(ax: Axes) -> dict[tuple[float, float], Line2D]:
     """The marks of the nodes by their places."""
-    marks = [line for line in ax.lines if line.get_gid() == "nodes"]
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
     return {(x, y): line for line in marks for x, y in line.get_xydata()}  # type: ignore[misc]
 
 
@@ -310,11 +312,15 @@ def test_large_graphs_are_drawn_as_matrices_camp_by_camp() -> None:
     assert len(plot_graph(ring(LABELLED_NODES)).texts) == LABELLED_NODES
     camp = [(f"a{j}", f"a{(j + 1) % 30}", 1) for j in range(30)] + [(f"b{j}", f"b{(j + 1) % 30}", 1) for j in range(30)]
     ax = drawn(plot_graph([*camp, ("a0", "b0", -1), ("b3", "a3", -1), ("a5", "z", 1)]))
-    (image,) = ax.images
-    cells = np.asarray(image.get_array())
-    ally, opponent = (np.all(np.isclose(cells, to_rgb(EDGE_STYLES[sign][0])), axis=-1) for sign in (1, -1))
-    assert ally.sum() == 61 and opponent.sum() == 2
-    assert opponent[30:60, :30].sum() == opponent[:30, 30:60].sum() == 1  # between the camps
+    cells: dict[int, set[tuple[int, int]]] = {1: set(), -1: set()}  # of allies and opponents, by listener and source
+    for patch in ax.patches:
+        sign = next(sign for sign in (1, -1) if same_color(patch.get_facecolor()[:3], EDGE_STYLES[sign][0]))
+        for corners in np.asarray(patch.get_path().vertices).reshape(-1, 5, 2)[:, :4]:
+            column, row = corners.min(axis=0).round().astype(int).tolist()
+            cells[sign].add((row, column))
+    assert len(cells[1]) == 61 and len(cells[-1]) == 2
+    assert {(row < 30, column < 30) for row, column in cells[-1]} == {(True, False), (False, True)}
+    assert all((row < 30) == (column < 30) for row, column in cells[1] if row < 60)
     assert {"first camp (30)", "second camp (30)", "followers (1)"} <= set(labelled(ax))
 
 
@@ -327,7 +333,7 @@ def test_labels_are_drawn_as_they_are() -> None:
 def test_the_ground_of_a_leader_group_has_no_hole() -> None:
     def grounds(name: str) -> list[Polygon]:
         ax = drawn(plot_graph(graph_of(name)))
-        return [patch for patch in ax.patches if isinstance(patch, Polygon) and patch.get_gid() == "ground"]
+        return [patch for patch in ax.patches if isinstance(patch, Polygon) and len(patch.get_xy())]
 
     structure = analyse(graph_of("fig5b"))
     middles = 0

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
 from ptcc_certify.report.plots.style import EDGE_STYLES, finished
 
-#: Cells of the picture in each direction.
-CELLS = 150
+#: Cells of the picture in each direction, and depths of their colours.
+CELLS, DEPTHS = 120, 4
 
 
 def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
@@ -31,13 +32,17 @@ def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
     place = rank * cells // graph.n_nodes
     counts = np.zeros((2, cells, cells))
     np.add.at(counts, ((graph.sign < 0).astype(int), place[graph.target], place[graph.source]), 1)
-    image, total = np.ones((cells, cells, 3)), counts.sum(axis=0)
-    depth = 0.35 + 0.65 * np.log1p(total) / np.log1p(max(total.max(initial=0), 1))
+    n, total = graph.n_nodes, counts.sum(axis=0)
+    depth = np.ceil(DEPTHS * np.log1p(total) / np.log1p(max(total.max(initial=0), 1)))
+    side = n / cells
     for number, sign in enumerate((1, -1)):
         own = (counts[number] > 0) & (counts[number] >= counts[1 - number])
-        image[own] = 1 - depth[own][:, None] * (1 - np.array(to_rgb(EDGE_STYLES[sign][0])))
-    n = graph.n_nodes
-    ax.imshow(image, extent=(0, n, n, 0), interpolation="nearest")
+        for level in range(1, DEPTHS + 1):  # as vectors, for pages that load no images
+            row, column = np.nonzero(own & (depth == level))
+            corners = np.stack([column, row], axis=1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+            squares = Path.make_compound_path_from_polys(side * corners)
+            looks = {"facecolor": EDGE_STYLES[sign][0], "alpha": 0.4 + 0.6 * level / DEPTHS, "linewidth": 0}
+            ax.add_patch(PathPatch(squares, **looks))
     ends = np.cumsum([(group == name).sum() for name in parts])
     for end in ends[:-1]:
         ax.axhline(end, color="black", linewidth=0.7)
@@ -51,6 +56,7 @@ def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
             ax.plot([], [], "s", color=colour, markersize=4, label=name)
     ax.set_xlim(0, n)
     ax.set_ylim(n, 0)
+    ax.set_aspect("equal")
     ax.grid(False)
     finished(ax, f"who is listened to (the {n:,} nodes)", "who listens")
     ax.set_xticks([])

@@ -12,7 +12,7 @@ from scipy.optimize import isotonic_regression
 
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -24,8 +24,6 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
 }
 #: Agents, and agents of one part of a graph, of which each has a line.
 NAMED_AGENTS, NAMED_OF_PART = 8, 3
-#: The mark of the line of an agent.
-AGENT = "agent"
 #: Size in points of the names of lines, and characters of a name.
 NAME_SIZE, NAME_LENGTH = 7, 16
 
@@ -41,15 +39,15 @@ def camp_groups(structure: Structure) -> np.ndarray:
 
 def draw_agents(
     ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **looks: Any
-) -> np.ndarray:
-    """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the agents that have a line.
+) -> dict[int, str]:
+    """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of single lines.
 
     Of up to eight agents each has a line. Of more, a part of the graph with more than three agents is drawn as its
     range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
     of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
     group = camp_groups(structure)
-    named: list[int] = []
+    single: dict[int, str] = {}
     step: Any = "post" if looks.get("drawstyle") == "steps-post" else None
     for name, (colour, line) in CAMP_STYLES.items():
         own = np.flatnonzero(group == name)
@@ -65,11 +63,10 @@ def draw_agents(
             ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
             own, width, label = own[sorted(ends)], 0.7, ""
         for v in own:
-            drawn = {"color": colour, "linestyle": line, "linewidth": width, "gid": AGENT}
+            drawn = {"color": colour, "linestyle": line, "linewidth": width}
             ax.plot(run.t, values[v], label=label or None, **drawn, **looks)
-            label = ""
-        named.extend(own.tolist())
-    return np.array(named, dtype=int)
+            label, single[int(v)] = "", colour
+    return single
 
 
 def draw_deadlines(ax: Axes, run: Trajectory) -> None:
@@ -81,13 +78,22 @@ def draw_deadlines(ax: Axes, run: Trajectory) -> None:
 
 
 def name_agents(
-    ax: Axes, run: Trajectory, values: np.ndarray, agents: np.ndarray, *, ends: bool = False, until: float | None = None
+    ax: Axes,
+    run: Trajectory,
+    values: np.ndarray,
+    lines: dict[int, str],
+    *,
+    ends: bool = False,
+    until: float | None = None,
 ) -> None:
-    """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``."""
-    if not agents.size or not run.t.size:
+    """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``.
+
+    ``lines`` holds the colours of the lines by agent, as :func:`draw_agents` returns them.
+    """
+    if not lines or not run.t.size:
         return
+    agents, colours = np.array(list(lines)), list(lines.values())
     names = [shorten(run.labels[v], NAME_LENGTH - 4) for v in agents]
-    colours = [str(line.get_color()) for line in ax.lines if line.get_gid() == AGENT]
     columns = (0, -1) if ends and agents.size > 1 else (0,)
     texts = [_spread(ax, values[agents, k], names, colours) for k in columns]
     first, last = float(run.t[0]), float(run.t[-1]) if until is None else until
@@ -102,7 +108,7 @@ def name_agents(
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
     left = (10 + 0.62 * NAME_SIZE * max(len(name) for _, _, name, _ in texts[0])) * point
-    ticks = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(first, last)
+    ticks = MaxNLocator(tick_count(ax.xaxis, 5), steps=STEPS).tick_values(first, last)
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
 

@@ -96,7 +96,7 @@ def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float
             edge, width = (colour, 0.5) if name == "followers" else ("black", 1.2)
             looks: dict[str, Any] = {"color": colour, "markeredgecolor": edge, "markeredgewidth": width, "zorder": 3}
             x, y = place[own].T
-            ax.plot(x, y, "o", markersize=2 * radius, gid="nodes", **looks)
+            ax.plot(x, y, "o", markersize=2 * radius, **looks)
             ax.plot([], [], "o", markersize=6, label=name, **looks)
 
 
@@ -190,7 +190,7 @@ def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Seque
             parts.append(triangle)
     for part in parts:
         width = 2 * REACH * radius
-        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", gid="ground", **looks))  # type: ignore[arg-type]
+        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **looks))  # type: ignore[arg-type]
 
 
 def _inside(triangle: np.ndarray, point: np.ndarray) -> bool:

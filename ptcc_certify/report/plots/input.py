@@ -64,7 +64,7 @@ def plot_input(
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
     >>> ax.get_ylabel(), ax.texts[0].get_text()
-    ('input $|u_k|$', 'certified peak 16')
+    ('input $|u_k|$', 'certified peak 16.1')
     """
     run, structure = trajectory_of(subject), structure_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
