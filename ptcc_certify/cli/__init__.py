@@ -15,7 +15,7 @@ import sys
 
 import click
 
-from ptcc_certify.cli import batch, certify, check_and_report, classify, design, examples_and_cite, simulate
+from ptcc_certify.cli import batch, certify, check_and_report, classify, design, examples_and_cite, explore, simulate
 from ptcc_certify.errors import ExitCode, PTCCError, explain, one_line
 
 __all__ = ["cli", "main"]
@@ -46,6 +46,7 @@ for command in (
     check_and_report.report,
     simulate.simulate,
     design.design,
+    explore.explore,
     examples_and_cite.examples,
     batch.batch,
     examples_and_cite.cite,
