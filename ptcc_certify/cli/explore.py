@@ -43,6 +43,7 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
         click.echo("Ctrl-C ends the explorer", err=True)
         if not no_browser and _has_browser():
             threading.Thread(target=webbrowser.open, args=(server.address,), daemon=True).start()
+        server.warm_up()
         server.serve_forever()
     except KeyboardInterrupt:
         click.echo("the explorer has ended", err=True)

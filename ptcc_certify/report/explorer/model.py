@@ -7,6 +7,7 @@ bound is therefore that of functions found before, in a fraction of a second; at
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +20,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import refuse
 from ptcc_certify.certificate.verdict import CERTIFIED
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
@@ -281,7 +282,9 @@ class Explorer:
         if base is None:
             base = certify(graph, Settings().protocol(), simulation=False, method="paper")
             self._latest[settings.graph, "paper"] = base
-        run = simulate(graph, protocol, question.x0, samples=_SAMPLES, **question.sliding)
+        run = None
+        with suppress(SimulationError):  # the panels tell that there is none
+            run = simulate(graph, protocol, question.x0, samples=_SAMPLES, **question.sliding)
         x0 = exact_initial_state(base.structure, question.x0)
         sigma0 = None if question.sigma0 is None else exact_initial_state(base.structure, question.sigma0)
         sliding = protocol.reaching

@@ -2,6 +2,7 @@
 // One request at a time: whatever is moved meanwhile, the next asks for the settings as they then are.
 const REST = 250; // milliseconds of rest after which settings are certified
 const controls = document.getElementById("controls");
+const verdict = document.getElementById("verdict");
 const number = (range) => document.getElementById(range.dataset.of);
 const ranges = [...controls.querySelectorAll("input[type=range]")];
 let wanted = 0; // counts the moves
@@ -42,7 +43,7 @@ async function showPanel(name, svg) {
 
 async function show(view) {
   document.body.classList.toggle("refused", "refusal" in view);
-  const verdict = document.getElementById("verdict");
+  setText(verdict.firstElementChild, "refusal" in view ? "Refused" : "Verdict");
   if ("refusal" in view) {
     verdict.className = "bad";
     return setText(verdict.lastElementChild, view.refusal);
@@ -100,6 +101,8 @@ function move() {
   wanted += 1;
   clearTimeout(timer);
   if (certifying) certifying.abort();
+  verdict.className = "open"; // nothing is called certified but what is shown
+  setText(verdict.lastElementChild, "computing");
   history.replaceState(null, "", `?${settings()}`);
   preview();
 }

@@ -18,7 +18,7 @@ from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, fi
 PANELS = {
     "states": "States over time",
     "decay": "Decay of the error under its proved bound",
-    "graph": "The graph: solid arrows from allies, dashed ones from opponents",
+    "graph": "The graph: who listens to whom",
     "input": "Size of the input over time",
     "sliding": "Sliding variables over time",
 }
@@ -71,6 +71,8 @@ def png(figure: Figure) -> bytes:
 def _draw(certificate: Certificate, name: str, ax: Axes) -> None:
     """Draw a panel, or say that there is nothing to draw."""
     try:
+        if name != "graph" and certificate.trajectory is None:
+            raise ValueError("the integrator failed: there is no run to draw")
         (_draw_decay if name == "decay" else PLOTS[name])(certificate, ax=ax)
     except ValueError as nothing:
         ax.clear()

@@ -33,7 +33,7 @@ def python_of(question: Question) -> str:
         arguments += [f"sigma0={question.sigma0}", f"disturbance={_disturbance(question)}"]
     if settings.method != "best":
         arguments.append(f'method="{settings.method}"')
-    lines.append(f"cert = ptcc.certify(g, p, {', '.join(arguments)})")
+    lines += ["cert = ptcc.certify(", "    g,", "    p,", *(f"    {argument}," for argument in arguments), ")"]
     lines += ["print(cert)", 'ptcc.save_figure(ptcc.plot_decay(cert).figure, "decay.png")']
     return "\n".join(lines)
 

@@ -23,7 +23,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 import jinja2
 
-from ptcc_certify.errors import ParameterError, PTCCError, explain
+from ptcc_certify.errors import ParameterError, explain
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.report.explorer.facts import HEADS
 from ptcc_certify.report.explorer.model import Explorer, View
@@ -108,6 +108,10 @@ class ExplorerServer(ThreadingHTTPServer):
         if isinstance(error, Exception) and not isinstance(error, ConnectionError | TimeoutError):
             print(f"ptcc: {explain(error)}", file=sys.stderr)
 
+    def warm_up(self) -> None:
+        """Compute what the page begins with, before the browser asks: libraries are loaded by then."""
+        threading.Thread(target=self.preview, args=(self.settings,), daemon=True).start()
+
     def page(self) -> str:
         """Return the page."""
         template = resources.files(__package__).joinpath("page.html").read_text(encoding="utf-8")
@@ -191,10 +195,10 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _compute(self, answer: Callable[[Settings], dict[str, Any]], query: str) -> None:
         try:
-            shown = answer(Settings.from_texts(dict(parse_qsl(query, keep_blank_values=True, max_num_fields=100))))
+            shown = answer(Settings.from_texts(dict(parse_qsl(query, keep_blank_values=True))))
         except Superseded:
             return self._send(HTTPStatus.CONFLICT, "a control was moved meanwhile", ".txt")
-        except (PTCCError, ValueError) as error:
+        except Exception as error:  # of whatever kind: the page tells it in one line
             shown = {"refusal": explain(error)}
         return self._send(HTTPStatus.OK, json.dumps(shown), ".json")
 
@@ -242,4 +246,4 @@ def open_server(explorer: Explorer, settings: Settings, port: int) -> ExplorerSe
                 ) from None
             if error.errno not in (errno.EADDRINUSE, errno.EACCES):
                 raise
-    raise ParameterError(f"--port {port}: this port and the next {TRIED} are taken; give another")
+    raise ParameterError(f"--port {port}: this port and those after it are taken; give another")

@@ -146,7 +146,7 @@ def _panel(explorer: Explorer, begin: dict[str, Any]) -> dict[str, Any]:
     def slider(name: str) -> Any:
         value, of = float(as_fraction(begin[name], name)), SLIDERS[name]
         bounds = {"min": min(of.least, value), "max": max(of.largest, value), "step": of.step}
-        looks = {"readout_format": ".6g", "description_tooltip": of.meaning}
+        looks = {"readout_format": ".6g", "tooltip": of.meaning}
         return widgets.FloatSlider(value=value, description=name, continuous_update=False, **looks, **bounds, **wide)
 
     seed, largest = begin["seed"], max(LARGEST_SEED, begin["seed"])
