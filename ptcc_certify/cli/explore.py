@@ -6,12 +6,13 @@ import os
 import sys
 import threading
 import webbrowser
+from pathlib import Path
 from typing import Any
 
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.errors import ExitCode
+from ptcc_certify.errors import ExitCode, ParameterError
 
 
 @click.command()
@@ -30,12 +31,13 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
     from ptcc_certify.report.explorer.server import open_server
     from ptcc_certify.report.explorer.settings import Settings
 
-    if shared.graph_file(graph) != graph:  # a packaged graph
-        explorer = Explorer()
-    else:
-        given, how = shared.read(graph, options), dict(options)
-        explorer = Explorer(given, graph, reading_of(graph, how.pop("edges"), **how))
-    server = open_server(explorer, Settings(graph), port)
+    if graph == "-":
+        raise ParameterError("-: the code that the explorer shows reads the graph again; save it and name the file")
+    name, explorer = graph, Explorer()
+    if shared.graph_file(graph) == graph:  # no packaged one
+        given, how, name = shared.read(graph, options), dict(options), Path(graph).name
+        explorer = Explorer(given, name, reading_of(graph, how.pop("edges"), **how))
+    server = open_server(explorer, Settings(name), port)
     try:
         if server.server_port != port:
             click.echo(f"port {port} is taken; this is port {server.server_port}", err=True)

@@ -17,7 +17,7 @@ from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, fi
 #: The panels, in the order in which they stand, and what they show.
 PANELS = {
     "states": "States over time",
-    "decay": "Decay of the error under its proved bound",
+    "decay": "Error under its proved bound",
     "graph": "The graph: who listens to whom",
     "input": "Size of the input over time",
     "sliding": "Sliding variables over time",
@@ -64,7 +64,7 @@ def message_figure(message: str) -> Figure:
 def png(figure: Figure) -> bytes:
     """Return a figure as PNG."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=120)
+    figure.savefig(buffer, format="png", dpi=90)
     return buffer.getvalue()
 
 

@@ -13,6 +13,7 @@ import secrets
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
@@ -110,7 +111,12 @@ class ExplorerServer(ThreadingHTTPServer):
 
     def warm_up(self) -> None:
         """Compute what the page begins with, before the browser asks: libraries are loaded by then."""
-        threading.Thread(target=self.preview, args=(self.settings,), daemon=True).start()
+
+        def work() -> None:
+            with suppress(Exception):  # the page will ask again, and tell
+                self.preview(self.settings)
+
+        threading.Thread(target=work, daemon=True).start()
 
     def page(self) -> str:
         """Return the page."""
