@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import html
+import runpy
 import shlex
-import subprocess
 import sys
 import time
+from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -66,10 +67,9 @@ class Panel:
         return self.images[0][0] - began, time.perf_counter() - began
 
 
-def certificate_of(explorer: Explorer, settings: Settings) -> ptcc.Certificate:
-    certificate = explorer.view(settings).certificate
-    assert certificate is not None
-    return certificate
+def certificate_of(view: View) -> ptcc.Certificate:
+    assert view.certificate is not None
+    return view.certificate
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def panel(explorer: Explorer) -> Panel:
 
 @pytest.fixture(scope="module")
 def sliding(explorer: Explorer) -> Panel:
-    return Panel(explorer, SLIDING)
+    return Panel(explorer, SLIDING.changed(graph="fig1a", method="paper"))
 
 
 def test_it_opens_with_a_certified_view(panel: Panel):
@@ -154,7 +154,7 @@ def test_what_is_shown_is_what_certify_certifies(explorer: Explorer):
     whole = ptcc.certify(
         load_graph("fig3a"), settings.protocol(), start, sigma0=sigma0, disturbance="1*sin(2*k*t)", method="paper"
     )
-    shown = certificate_of(explorer, settings)
+    shown = certificate_of(explorer.view(settings))
     for part in ("rate", "overshoot", "initial_state", "sigma0", "reaching", "claim", "verdict"):
         assert getattr(shown, part) == getattr(whole, part), part
     assert shown.final_state is not None
@@ -171,7 +171,7 @@ def test_doubled_weights_double_the_rate():
     rates = []
     for factor in (1, 2):
         graph = ptcc.SignedDigraph.from_edges([(s, t, factor * w) for s, t, w in pairs])
-        rates.append(certificate_of(Explorer(graph), Settings(GIVEN, method="paper")).rate)
+        rates.append(certificate_of(Explorer(graph).view(Settings(GIVEN, method="paper"))).rate)
     assert float(rates[1] / rates[0]) == pytest.approx(2, rel=1e-6)
 
 
@@ -239,7 +239,7 @@ def told_by(view: View) -> tuple[object, ...]:
 def test_a_larger_margin_reaches_the_manifold_earlier(explorer: Explorer):
     times = []
     for mu1, delta in ((1.5, 1), (2, 1), (4, 1), (4, 0)):
-        reaching = certificate_of(explorer, SLIDING.changed(mu1=mu1, delta=delta)).reaching
+        reaching = certificate_of(explorer.preview(SLIDING.changed(mu1=mu1, delta=delta))).reaching
         assert reaching is not None
         times.append(max(r.time for r in reaching))
     assert times == sorted(times, reverse=True)
@@ -296,8 +296,7 @@ def test_settings_outside_the_choices_are_refused_at_once(change: dict[str, Any]
 # ---------------------------------------------------------------------- proved or not
 
 
-def test_nothing_is_called_certified_before_the_check(explorer: Explorer):
-    panel = Panel(explorer, Settings())
+def test_nothing_is_called_certified_before_the_check(panel: Panel):
     panel.set("T", 0.7)
     assert len(panel.images) == len(panel.texts) == 2
     assert "certified" not in panel.texts[0]
@@ -318,15 +317,13 @@ def test_what_the_check_rejects_is_not_certified(explorer: Explorer, monkeypatch
 def test_a_preview_claims_what_the_certificate_does_but_for_the_size_of_bounds(first: Settings, second: Settings):
     """Whatever protocol the Lyapunov functions were found under: they belong to the graph."""
     explorer = Explorer()
-    for known in (False, True):
-        if known:
-            explorer.view(first)
-        preview, view = explorer.preview(second), explorer.view(second)
-        assert [preview.facts[head] for head in ("claim", "x(T)")] == [view.facts[head] for head in ("claim", "x(T)")]
-        assert preview.certificate is not None and view.certificate is not None
-        for part in ("protocol", "initial_state", "sigma0", "reaching", "theorem"):
-            assert getattr(preview.certificate, part) == getattr(view.certificate, part), part
-        assert ptcc.check(preview.certificate.to_dict()).accepted  # nothing is claimed that would not be certified
+    explorer.view(first)
+    preview, view = explorer.preview(second), explorer.view(second)
+    assert [preview.facts[head] for head in ("claim", "x(T)")] == [view.facts[head] for head in ("claim", "x(T)")]
+    assert preview.certificate is not None and view.certificate is not None
+    for part in ("protocol", "initial_state", "sigma0", "reaching", "theorem"):
+        assert getattr(preview.certificate, part) == getattr(view.certificate, part), part
+    assert ptcc.check(preview.certificate.to_dict()).accepted  # nothing is claimed that would not be certified
 
 
 def test_without_a_run_the_graph_is_shown_and_the_rest_says_why(monkeypatch: pytest.MonkeyPatch):
@@ -344,14 +341,22 @@ def test_without_a_run_the_graph_is_shown_and_the_rest_says_why(monkeypatch: pyt
 # ---------------------------------------------------------------------- code
 
 
-def shown_and_made(settings: Settings, folder: Path, explorer: Explorer) -> tuple[View, list[str], Run]:
-    """Return a view, the lines that its Python prints, and what its command line does."""
-    view = explorer.view(settings)
-    (folder / "shown.py").write_text(f"{view.python}\nprint(cert.assessment.text)\n", encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "shown.py"], cwd=folder, capture_output=True, text=True, check=True, timeout=100
-    )
-    return view, done.stdout.splitlines(), ptcc_called(*shlex.split(view.command)[1:])
+@pytest.fixture
+def made(
+    explorer: Explorer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[View, list[str], Run]]:
+    """What returns a view, the lines that its Python prints, and what its command line does, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+    def make(settings: Settings, explorer: Explorer = explorer) -> tuple[View, list[str], Run]:
+        view = explorer.view(settings)
+        Path("shown.py").write_text(f"{view.python}\nprint(cert.assessment.text)\n", encoding="utf-8")
+        capsys.readouterr()
+        runpy.run_path("shown.py")
+        printed = capsys.readouterr().out.splitlines()
+        return view, printed, ptcc_called(*shlex.split(view.command)[1:])
+
+    return make
 
 
 @pytest.mark.parametrize(
@@ -363,24 +368,25 @@ def shown_and_made(settings: Settings, folder: Path, explorer: Explorer) -> tupl
     ],
     ids=["nominal", "telegraph", "sin"],
 )
-def test_the_code_that_is_copied_makes_what_is_shown(settings: Settings, tmp_path: Path, explorer: Explorer):
-    view, printed, command = shown_and_made(settings, tmp_path, explorer)
+def test_the_code_that_is_copied_makes_what_is_shown(
+    settings: Settings, made: Callable[..., tuple[View, list[str], Run]]
+):
+    view, printed, command = made(settings)
     assert printed[-1] == view.verdict
     assert str(view.certificate) in "\n".join(printed)
-    assert (tmp_path / "decay.png").stat().st_size > 1000
+    assert Path("decay.png").stat().st_size > 1000
     assert command.out.splitlines()[-1] == f"verdict    {view.verdict}", command.err
     assert any(
         "worst ratio" in line and view.facts["simulated"].split()[-1] in line for line in command.out.splitlines()
     )
 
 
-def test_the_code_reads_a_given_graph_as_it_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.chdir(tmp_path)
+def test_the_code_reads_a_given_graph_as_it_was_read(made: Callable[..., tuple[View, list[str], Run]]):
     Path("it's mine.csv").write_text("a,b,1\nb,a,1\nb,c,-2\na,b,3\n", encoding="utf-8")
     how = {"duplicates": "last", "undirected": False, "drop_self_loops": False}
     source = reading_of("it's mine.csv", "listens", **how)
     graph = ptcc.read_graph("it's mine.csv", orientation="listens", **how)  # type: ignore[arg-type]
-    view, printed, command = shown_and_made(Settings("mine"), tmp_path, Explorer(graph, "mine", source))
+    view, printed, command = made(Settings("mine"), Explorer(graph, "mine", source))
     assert printed[-1] == view.verdict
     assert command.out.splitlines()[-1] == f"verdict    {view.verdict}", command.err
 

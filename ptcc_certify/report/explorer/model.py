@@ -34,7 +34,7 @@ from ptcc_certify.report.explorer.settings import GIVEN, Settings, refuse_unknow
 from ptcc_certify.simulation.run import simulate
 
 #: Instants of a run that is drawn while a control is moved.
-_SAMPLES = 81
+_SAMPLES = 61
 
 
 @dataclass(frozen=True, eq=False)
