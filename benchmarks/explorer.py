@@ -1,27 +1,38 @@
-"""Seconds from the move of a control of the explorer to the new image, and to the verdict of the check.
+"""Seconds from the move of a control of the explorer to the new image and text, and to the verdict of the check.
 
-Every control is moved twice on every packaged graph, and every class of bounds is asked for before it was searched.
-Drawing, simulation, bound, comparison and independent check are included; a browser is not.
+Every control is moved twice on every packaged graph and on one of 40 nodes, through the server of the page: settings
+in, text and figures out, both in one answer. With a browser (playwright and Chromium) a slider is moved there besides,
+and the seconds are those until image and text on the page have changed.
 
 Usage
 -----
-python benchmarks/explorer.py
+python benchmarks/explorer.py [--browser]
 """
 
 from __future__ import annotations
 
+import argparse
 import gc
+import http.client
 import os
 import platform
+import shutil
 import statistics
+import threading
 import time
 from importlib.metadata import version
 from typing import Any
+from urllib.parse import urlencode
 
+import numpy as np
+
+import ptcc_certify as ptcc
 from ptcc_certify.examples import GRAPHS
-from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.report.explorer import DISTURBANCES, KINDS, Explorer, Settings, controls
+from ptcc_certify.report.explorer import Explorer, Settings
+from ptcc_certify.report.explorer.server import ExplorerServer
+from ptcc_certify.report.explorer.settings import DISTURBANCES, KINDS
 
+FORTY = "40 nodes"
 GAINS = {"T": (0.5, 0.8), "rho1": (0.5, 1.0), "rho2": (0.3, 0.7), "kappa": (1.5, 2.0)}
 SLIDING = {
     "T_r": (0.8, 1.0),
@@ -30,64 +41,106 @@ SLIDING = {
     "mu2": (0.5, 2.0),
     "mu3": (1.5, 2.0),
     "delta": (0.5, 0.7),
-    "sigma(0) random": (False, True),
+    "reaching": ("false", "true"),
     "disturbance": DISTURBANCES[::-1],
 }
-COMMON = {"start seed": (1, 2), "bounds": ("paper", "best")}
+COMMON = {"seed": (1, 2), "method": ("paper", "best")}
 MOVES: dict[str, dict[str, Any]] = {
     "nominal": {**GAINS, **COMMON},
     "sliding-mode": {**{name: GAINS[name] for name in ("rho1", "rho2", "kappa")}, **SLIDING, **COMMON},
 }
 
 
-class Panel:
-    """The widget, with a clock on its image."""
+def random_graph(n: int) -> ptcc.SignedDigraph:
+    """Return a ring with chords of both signs."""
+    rng = np.random.default_rng(1)
+    edges = {(k, (k + 1) % n): 1 for k in range(n)}
+    for source, target in rng.integers(0, n, size=(2 * n, 2)).tolist():
+        if source != target:
+            edges[source, target] = int(rng.choice([-2, -1, 1, 2]))
+    return ptcc.SignedDigraph.from_edges([(s, t, w) for (s, t), w in edges.items()])
 
-    def __init__(self, explorer: Explorer, settings: Settings):
-        self.box, _, _, self.image = controls(explorer, settings).children
-        self.seen: list[float] = []
-        self.image.observe(lambda change: self.seen.append(time.perf_counter()), names="value")
+
+class Client:
+    """What the page asks of its server, with a clock."""
+
+    def __init__(self, server: ExplorerServer, graph: str, kind: str):
+        self.server, self.settings = server, {"graph": graph, "kind": kind}
+        self.connection = http.client.HTTPConnection("127.0.0.1", server.server_port)
+        self.move("seed", 0)
 
     def move(self, name: str, value: Any) -> tuple[float, float]:
-        """Return the seconds to the first new image and to the verdict."""
+        """Return the seconds to image and text, and to the verdict."""
+        self.settings[name] = value
         gc.collect()
-        self.seen.clear()
-        control = next(child for child in self.box.children if child.description == name)
-        began = time.perf_counter()
-        control.value = value
-        done = time.perf_counter()
-        if not self.seen:
-            raise RuntimeError(f"{name} = {value} drew nothing")
-        return self.seen[0] - began, done - began
+        began, seconds = time.perf_counter(), []
+        for what in ("preview", "view"):
+            self.connection.request("GET", f"{self.server.root}{what}?{urlencode(self.settings)}")
+            answer = self.connection.getresponse()
+            if b'"panels"' not in answer.read():
+                raise RuntimeError(f"{name} = {value} drew nothing")
+            seconds.append(time.perf_counter() - began)
+        return seconds[0], seconds[1]
 
 
-def told(label: str, pairs: list[tuple[float, float]]) -> None:
-    columns = []
-    for seconds in zip(*pairs, strict=True):
-        columns.append(f"{statistics.median(seconds):7.2f} {max(seconds):7.2f}")
-    print(f"{label:<34}{len(pairs):>6}   {'   '.join(columns)}")
+def tell(label: str, pairs: list[tuple[float, ...]]) -> None:
+    columns = [f"{statistics.median(seconds):7.2f} {max(seconds):7.2f}" for seconds in zip(*pairs, strict=True)]
+    print(f"{label:<34}{len(pairs):>6}   {'   '.join(columns)}", flush=True)
+
+
+def in_browser(server: ExplorerServer) -> None:
+    """Move a slider on the page ten times, with every graph and protocol."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(server.address)
+        for kind in KINDS:
+            page.select_option("#kind", kind)
+            for graph in server.explorer.graphs:
+                page.select_option("#graph", graph)
+                seconds = []
+                for k in range(10):
+                    page.wait_for_selector("#verdict:not(.open)")
+                    seconds.append((page.evaluate(MOVE_ON_PAGE, str(0.5 + k / 10)) / 1000,))
+                tell(f"{graph}, {kind}, in Chromium", seconds)  # type: ignore[arg-type]
+        browser.close()
+
+
+#: Moves the slider of rho2, and tells the milliseconds until image and text have changed.
+MOVE_ON_PAGE = """value => new Promise(resolve => {
+  const image = document.querySelector("#panel-states img"), text = document.querySelector('dd[data-head="error"]');
+  const before = [image.src, text.textContent], began = performance.now();
+  const look = () => image.src !== before[0] && text.textContent !== before[1] && image.complete
+    ? resolve(performance.now() - began) : requestAnimationFrame(look);
+  const slider = document.querySelector('[data-of="rho2"]');
+  slider.value = value;
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  look();
+})"""
 
 
 def main() -> None:
-    versions = ", ".join(f"{name} {version(name)}" for name in ("matplotlib", "numpy", "casadi", "ipywidgets"))
-    print(f"Python {platform.python_version()}, {versions}; {os.cpu_count()} CPUs\n")
-    print(f"{'seconds':<34}{'moves':>6}   {'image: median, max':<15}   verdict: median, max")
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--browser", action="store_true", help="move a slider in Chromium too")
+    browser = arguments.parse_args().browser
+    versions = ", ".join(f"{name} {version(name)}" for name in ("matplotlib", "numpy", "casadi"))
+    print(f"Python {platform.python_version()}, {versions}; {os.cpu_count()} CPUs, load {os.getloadavg()[0]:.1f}\n")
+    print(f"{'seconds: median, max':<34}{'moves':>6}   {'image and text':<15}   verdict")
+    server = ExplorerServer(Explorer(random_graph(40), FORTY), Settings(FORTY), 0)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
     everything: list[tuple[float, float]] = []
     for kind in KINDS:
-        for graph in GRAPHS:
-            panel = Panel(Explorer(), Settings(graph, kind=kind))
-            pairs = [panel.move(name, value) for name, values in MOVES[kind].items() for value in values]
-            told(f"{graph}, {kind}", pairs)
+        for graph in (*GRAPHS, FORTY):
+            client = Client(server, graph, kind)
+            pairs = [client.move(name, value) for name, values in MOVES[kind].items() for value in values]
+            tell(f"{graph}, {kind}", pairs)  # type: ignore[arg-type]
             everything += pairs
-    told("all", everything)
-    first = []
-    for method in METHODS[1:]:
-        panel = Panel(Explorer(), Settings("fig1a", method="paper"))
-        panel.move("bounds", method)
-        pairs = [panel.move("graph", graph) for graph in GRAPHS[1:]]
-        told(f"first view of a graph, {method}", pairs)
-        first += pairs
-    told("first views", first)
+    tell("all", everything)  # type: ignore[arg-type]
+    if browser:
+        in_browser(server)
+    server.shutdown()
 
 
 if __name__ == "__main__":

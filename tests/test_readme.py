@@ -39,8 +39,9 @@ def ptcc(command: str) -> Run:
 
 #: Blocks of commands, each run from top to bottom in one folder as a reader would; those that set up are CI's own.
 SESSIONS = [block for block in blocks("sh") if "ptcc " in block and "pip install" not in block]
-#: Commands with a test of their own, which costs as much as all others: tests/cli, test_all_examples_behave_*.
-RUN_ELSEWHERE = {"ptcc examples all -o figures"}
+#: Commands with a test of their own. The first costs as much as all others: tests/cli, test_all_examples_behave_*; the
+#: second ends at Ctrl-C only: tests/report/test_explorer_page.py, test_ctrl_c_ends_the_explorer_at_once_*.
+RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a"}
 
 
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda text: text.splitlines()[0][:30])

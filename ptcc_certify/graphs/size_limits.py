@@ -22,5 +22,5 @@ REPEATED_NODES, INPUT_NODES = 1000, 100
 DRAWN_NODES, LABELLED_NODES = 300, 40
 #: Nodes of a graph that a notebook draws unasked: a layout takes seconds above.
 SHOWN_NODES = 120
-#: Nodes of a graph that is explored, and up to which its certificate is checked unasked.
-EXPLORED_NODES, CHECKED_NODES = 120, 24
+#: Nodes of a graph that is explored.
+EXPLORED_NODES = 120

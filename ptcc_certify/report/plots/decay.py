@@ -130,8 +130,11 @@ def error_norm(subject: Certificate | Trajectory, certificate: Certificate | Non
 
 
 def resolved(norm: np.ndarray, bound: np.ndarray, floor: float) -> np.ndarray:
-    """Return the norm where a run says something of it: not below the integrator's floor, nor where the bound is."""
-    return np.where((norm > floor) & (bound > floor), norm, np.nan)
+    """Return the norm where a run says something of it: above the integrator's floor, and where the bound is.
+
+    Where the bound lies below the floor, only what exceeds it by more than the floor is shown: a violation.
+    """
+    return np.where((norm > floor) & ((bound > floor) | (norm > bound + floor)), norm, np.nan)
 
 
 def _require_bounds(certificate: Certificate, run: Trajectory | None) -> None:

@@ -1,0 +1,301 @@
+"""What the explorer shows of settings: figures, facts, verdict, and the code that makes them.
+
+Lyapunov functions depend on the graph alone; gains and deadline enter through the clock. While a control is moved the
+bound is therefore that of functions found before, in a fraction of a second; at rest it is what ``certify`` certifies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import refuse
+from ptcc_certify.certificate.verdict import CERTIFIED
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
+from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.size_limits import EXPLORED_NODES
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.disturbance import Disturbance, as_disturbance
+from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of
+from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png
+from ptcc_certify.report.explorer.reproduction import command_of, python_of
+from ptcc_certify.report.explorer.settings import GIVEN, Settings, refuse_unknown
+from ptcc_certify.simulation.run import simulate
+
+#: Instants of a run that is drawn while a control is moved.
+_SAMPLES = 61
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What ``certify`` is asked for some settings.
+
+    Attributes
+    ----------
+    settings : Settings
+    source : mapping or None
+        Where the graph was read from and how (``path``, ``orientation``, ...); None of a packaged graph or an object.
+    graph : SignedDigraph
+    protocol : NominalProtocol or SlidingModeProtocol
+    x0 : list of N int
+    sigma0 : list of N int, or None
+        None for the nominal protocol.
+    disturbance : Disturbance or None
+    """
+
+    settings: Settings
+    source: Mapping[str, Any] | None
+    graph: SignedDigraph
+    protocol: Protocol
+    x0: list[int]
+    sigma0: list[int] | None
+    disturbance: Disturbance | None
+
+    @property
+    def sliding(self) -> dict[str, Any]:
+        """What is asked under the sliding-mode protocol alone."""
+        return {} if self.sigma0 is None else {"sigma0": self.sigma0, "disturbance": self.disturbance}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class View:
+    """What is shown for some settings: in a notebook the figure, elsewhere the text.
+
+    Attributes
+    ----------
+    settings : Settings
+    refusal : str
+        What is wrong with the settings, in one line; empty if nothing is.
+    question : Question or None
+    certificate : Certificate or None
+        None where the settings are refused, like the question.
+    checked : bool
+        Whether ``certify`` made the certificate, with its independent check.
+    """
+
+    settings: Settings
+    refusal: str = ""
+    question: Question | None = None
+    certificate: Certificate | None = None
+    checked: bool = False
+
+    @cached_property
+    def facts(self) -> dict[str, str]:
+        """What is claimed and bounded, by heads that are the same for all settings; empty if they are refused."""
+        if self.certificate is None:
+            return {}
+        return facts_of(self.certificate) | ({"simulated": run_of(self.certificate)} if self.checked else {})
+
+    @property
+    def verdict(self) -> str:
+        """The verdict line of ``certify``; before the check it says so."""
+        if self.certificate is None:
+            return self.refusal
+        return self.certificate.assessment.text if self.checked else UNCHECKED
+
+    @property
+    def grade(self) -> str:
+        """``"good"`` if certified and of use; ``"doubt"``, ``"bad"``; ``"open"`` before the check."""
+        if self.certificate is None:
+            return "bad"
+        if not self.checked:
+            return "open"
+        assessment = self.certificate.assessment
+        if assessment.violated:
+            return "bad"
+        return "good" if assessment.verdict == CERTIFIED and assessment.useful else "doubt"
+
+    @property
+    def text(self) -> str:
+        """Facts and verdict as lines, or the refusal."""
+        lines = [f"{head:<10} {text}" for head, text in (self.facts | {"verdict": self.verdict}).items()]
+        return self.refusal or "\n".join(lines)
+
+    @property
+    def panels(self) -> tuple[str, ...]:
+        """The panels of the protocol at hand."""
+        return tuple(name for name in PANELS if name != "sliding" or self.settings.kind == "sliding-mode")
+
+    @cached_property
+    def figure(self) -> Figure:
+        """All panels in one figure, or the refusal."""
+        return message_figure(self.refusal) if self.certificate is None else draw_panels(self.certificate, self.panels)
+
+    @cached_property
+    def png(self) -> bytes:
+        """The figure as PNG."""
+        return png(self.figure)
+
+    @property
+    def python(self) -> str:
+        """Python that makes the checked certificate; empty if the settings are refused."""
+        return "" if self.question is None else python_of(self.question)
+
+    @property
+    def command(self) -> str:
+        """The command line that prints it; empty if the settings are refused."""
+        return "" if self.question is None else command_of(self.question)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+class Explorer:
+    """Makes views of settings, and keeps what does not depend on the gains.
+
+    Parameters
+    ----------
+    graph : SignedDigraph, optional
+        A graph of up to 120 nodes besides the packaged ones.
+    name : str
+        Of this graph.
+    source : mapping, optional
+        Where this graph was read from and how: ``path``, and keywords of :func:`ptcc_certify.read_graph`.
+
+    Attributes
+    ----------
+    graphs : dict of str to SignedDigraph
+        By name; a given graph comes first.
+
+    Raises
+    ------
+    ParameterError
+        The graph has more than 120 nodes.
+
+    Examples
+    --------
+    >>> view = Explorer().view(Settings("fig1b", T=0.6))
+    >>> print(view.text.splitlines()[0])
+    claim      bipartite consensus at T = 0.6 (Theorem 1.1)
+    >>> print(Explorer().view(Settings("fig1b", T=0)).text)
+    T = 0 is outside its domain; T must be > 0
+    """
+
+    def __init__(self, graph: SignedDigraph | None = None, name: str = GIVEN, source: Mapping[str, Any] | None = None):
+        if graph is not None and graph.n_nodes > EXPLORED_NODES:
+            raise ParameterError(
+                f"graphs are explored up to {EXPLORED_NODES} nodes; this one has {graph.n_nodes}: use certify"
+            )
+        given = {} if graph is None else {name: graph}
+        self.graphs = given | {packaged: load_graph(packaged) for packaged in GRAPHS if packaged not in given}
+        self._sources = {name: source}
+        self._latest: dict[tuple[str, str], Certificate] = {}
+        self._drawn: dict[str, str] = {}
+
+    def preview(self, settings: Settings) -> View:
+        """Return a view at once: the bound is that of Lyapunov functions found before, and nothing is checked.
+
+        Parameters
+        ----------
+        settings : Settings
+
+        Returns
+        -------
+        View
+        """
+        return self._view(settings, self._preview, checked=False)
+
+    def view(self, settings: Settings, progress: Callable[[str], None] = lambda step: None) -> View:
+        """Return the view of what ``certify`` certifies; settings that are refused are told in one line.
+
+        Parameters
+        ----------
+        settings : Settings
+        progress : callable, optional
+            Is told each step of ``certify`` as it begins.
+
+        Returns
+        -------
+        View
+        """
+        return self._view(settings, lambda question: self._certificate(question, progress), checked=True)
+
+    def svg(self, view: View, name: str) -> str:
+        """Return a panel of a view as SVG; that of the graph is drawn once."""
+        assert view.certificate is not None
+        if name != "graph":
+            return panel_svg(view.certificate, name)
+        if view.settings.graph not in self._drawn:
+            self._drawn[view.settings.graph] = panel_svg(view.certificate, name)
+        return self._drawn[view.settings.graph]
+
+    def question(self, settings: Settings) -> Question:
+        """Return what ``certify`` is asked for settings; initial states are drawn from their seed.
+
+        Raises
+        ------
+        ParameterError
+            The settings are refused.
+        """
+        refuse_unknown("graph", settings.graph, self.graphs)
+        graph, protocol = self.graphs[settings.graph], settings.protocol()
+        x0, random = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, graph.n_nodes)).tolist()
+        source, sigma0, disturbance = self._sources.get(settings.graph), None, None
+        if (sliding := protocol.reaching) is not None:
+            sigma0 = random if settings.reaching else [0] * graph.n_nodes
+            sine = f"{settings.own['delta']}*sin(2*k*t)"
+            word = sine if settings.disturbance == "sin" else settings.disturbance
+            disturbance = as_disturbance(word, graph.n_nodes, sliding.delta, 2 * float(protocol.T), settings.seed)
+        return Question(settings, source, graph, protocol, x0, sigma0, disturbance)
+
+    def _view(self, settings: Settings, certificate: Callable[[Question], Certificate], *, checked: bool) -> View:
+        try:
+            question = self.question(settings)
+            return View(settings, "", question, certificate(question), checked)
+        except PTCCError as error:
+            return View(settings, str(error))
+        except OverflowError:
+            return View(settings, "a number is beyond the range of float64; choose other settings")
+
+    def _certificate(self, question: Question, progress: Callable[[str], None]) -> Certificate:
+        settings = question.settings
+        certificate = certify(
+            question.graph,
+            question.protocol,
+            question.x0,
+            **question.sliding,
+            method=settings.method,
+            progress=progress,
+        )
+        self._latest[settings.graph, settings.method] = certificate
+        return certificate
+
+    def _preview(self, question: Question) -> Certificate:
+        """Return a certificate of Lyapunov functions found before: the latest of the class, or else the paper's."""
+        settings, graph, protocol = question.settings, question.graph, question.protocol
+        refuse(graph, protocol, settings.method, {}, [])
+        base = self._latest.get((settings.graph, settings.method)) or self._latest.get((settings.graph, "paper"))
+        if base is None:
+            base = certify(graph, Settings().protocol(), simulation=False, method="paper")
+            self._latest[settings.graph, "paper"] = base
+        run = None
+        with suppress(SimulationError):  # the panels tell that there is none
+            run = simulate(graph, protocol, question.x0, samples=_SAMPLES, **question.sliding)
+        x0 = [Fraction(x) for x in question.x0]
+        sigma0 = None if question.sigma0 is None else [Fraction(s) for s in question.sigma0]
+        sliding = protocol.reaching
+        reaching = None if sliding is None or sigma0 is None else certified_reaching_times(sliding, sigma0)
+        first = x0 if sigma0 is None else [x - s for x, s in zip(x0, sigma0, strict=True)]
+        return base.changed(
+            protocol=protocol,
+            initial_state=tuple(x0),
+            sigma0=None if sigma0 is None else tuple(sigma0),
+            reaching=reaching,
+            final_state=final_state(base.structure, first, matrix=base.influence),
+            trajectory=run,
+            notes=(),
+        )

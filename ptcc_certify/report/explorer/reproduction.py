@@ -1,0 +1,83 @@
+"""The Python and the command line that certify what the explorer shows."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from ptcc_certify.examples import GRAPHS
+from ptcc_certify.protocols import SlidingModeProtocol
+
+if TYPE_CHECKING:
+    from ptcc_certify.report.explorer.model import Question
+
+#: How a graph was read, unless it says otherwise: option of ``read_graph`` and flag of ``ptcc``.
+_READING = {"duplicates": "refuse", "drop_self_loops": False, "undirected": False}
+
+
+def python_of(question: Question) -> str:
+    """Return Python that makes the certificate of a question and draws its decay."""
+    settings, source, name = question.settings, question.source, question.settings.graph
+    lines = ["import ptcc_certify as ptcc"]
+    if source is None and name in GRAPHS:
+        lines += ["from ptcc_certify.examples import load_graph", "", f'g = load_graph("{name}")']
+    elif source is None:
+        lines += ["", "g = ...  # the graph that was given to explore()"]
+    else:
+        how = "".join(f", {key}={value!r}" for key, value in source.items() if key != "path")
+        lines += ["", f"g = ptcc.read_graph({source['path']!r}{how})"]
+    kind = "SlidingModeProtocol" if settings.kind == "sliding-mode" else "NominalProtocol"
+    lines.append(f"p = ptcc.{kind}({', '.join(f'{key}={value!r}' for key, value in _texts(question).items())})")
+    arguments = [f"x0={question.x0}"]
+    if question.sigma0 is not None:
+        arguments += [f"sigma0={question.sigma0}", f"disturbance={_disturbance(question)}"]
+    if settings.method != "best":
+        arguments.append(f'method="{settings.method}"')
+    lines += ["cert = ptcc.certify(", "    g,", "    p,", *(f"    {argument}," for argument in arguments), ")"]
+    lines += ["print(cert)", 'ptcc.save_figure(ptcc.plot_decay(cert).figure, "decay.png")']
+    return "\n".join(lines)
+
+
+def command_of(question: Question) -> str:
+    """Return the ``ptcc certify`` of a question."""
+    settings, source = question.settings, dict(question.source or {})
+    words = ["ptcc", "certify", str(source.pop("path", settings.graph))]
+    for key, value in source.items():
+        flag = "--edges" if key == "orientation" else f"--{key.replace('_', '-')}"
+        words += [flag] if value is True else [flag, str(value)]
+    words += [] if settings.kind == "nominal" else ["--protocol", settings.kind]
+    for key, value in _texts(question).items():
+        words += [f"--{key.replace('_', '-')}", value]
+    words.append(f"--x0={','.join(map(str, question.x0))}")
+    if question.sigma0 is not None:
+        words += [f"--sigma0={','.join(map(str, question.sigma0))}"] if any(question.sigma0) else []
+        words += ["--disturbance", _command_disturbance(question)]
+        words += ["--seed", str(settings.seed)] if settings.disturbance == "telegraph" else []
+    words += [] if settings.method == "best" else ["--method", settings.method]
+    return shlex.join(words)
+
+
+def reading_of(path: str, orientation: str | None, **how: str | bool) -> dict[str, str | bool]:
+    """Return where a graph was read from and how, but for what is so unless it is said."""
+    said = {key: value for key, value in how.items() if value != _READING[key]}
+    return {"path": path} | ({} if orientation is None else {"orientation": orientation}) | said
+
+
+def _texts(question: Question) -> dict[str, str]:
+    return {name: str(value) for name, value in question.settings.own.items()}
+
+
+def _command_disturbance(question: Question) -> str:
+    settings = question.settings
+    return f"{settings.own['delta']}*sin(2*k*t)" if settings.disturbance == "sin" else settings.disturbance
+
+
+def _disturbance(question: Question) -> str:
+    settings, protocol = question.settings, question.protocol
+    if settings.disturbance != "telegraph" or not isinstance(protocol, SlidingModeProtocol):
+        return repr(_command_disturbance(question))
+    until = 2 * float(protocol.T)
+    return (
+        f"ptcc.telegraph_noise({float(protocol.delta)}, rate={20 / until!r}, n={len(question.x0)}, "
+        f"until={until!r}, seed={settings.seed})"
+    )
