@@ -31,7 +31,7 @@ from ptcc_certify import Ensemble, NominalProtocol, SignedDigraph, analyse, batc
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
 from ptcc_certify.batch.settings import Settings
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph
@@ -646,7 +646,7 @@ def test_what_cannot_be_done_is_refused_before_the_work(args: tuple[str, ...], s
 )
 def test_settings_are_refused_with_and_without_a_table(more: dict[str, Any], says: str):
     for output in (None, "t.csv"):
-        with pytest.raises(ParameterError, match=says):
+        with pytest.raises(PTCCError, match=says):
             certify_many(**{"sources": TRIANGLE, "protocol": PROTOCOL, "output": output} | more)
     assert names() == ["spec.toml"]
 
