@@ -5,10 +5,12 @@ import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "_ext")]
 
+from docutils import nodes  # noqa: E402
 from reference_pages import write_reference  # noqa: E402
 
 project = "ptcc-certify"
@@ -61,3 +63,15 @@ html_show_sphinx = html_show_copyright = False
 html_copy_source = False
 pygments_style, pygments_dark_style = "friendly", "monokai"
 copybutton_exclude = ".linenos, .gp, .go"
+
+
+def name_controls(app: Any, page: nodes.document) -> None:
+    """Say what a page cannot show: controls are moved where a notebook runs."""
+    for block in list(page.findall(nodes.literal_block)):
+        if block.astext().startswith("VBox(children="):
+            block.replace_self(nodes.paragraph(text="Here the controls appear when you run the notebook yourself."))
+
+
+def setup(app: Any) -> None:
+    """Change pages as they are read."""
+    app.connect("doctree-read", name_controls)

@@ -7,8 +7,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import click
-
 import lmi
 import ptcc_certify
 from ptcc_certify.cli import cli
@@ -109,7 +107,7 @@ def lmi_page() -> str:
 def command_page() -> str:
     """Return the page of the command line: what ``--help`` of every command prints."""
     page = "# Command line\n\nWhat `ptcc --help` and `ptcc COMMAND --help` print.\n"
-    group = click.Context(cli, info_name="ptcc", max_content_width=100)
+    group = cli.make_context("ptcc", [], resilient_parsing=True, max_content_width=100)
     for name in ("", *cli.list_commands(group)):
         command = cli.get_command(group, name) if name else cli
         assert command is not None
