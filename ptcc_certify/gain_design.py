@@ -64,7 +64,7 @@ from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
+    from ptcc_certify.graphs.digraph import Exact
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
 #: Significant decimal digits of the gains and deadlines that are found.
@@ -353,20 +353,21 @@ class Fit(NamedTuple):
 
 
 def design(
-    graph: SignedDigraph,
+    graph: Any,
     *,
     max_input: Exact,
     initial_bound: Exact | InitialSet,
     deadline: Exact | None = None,
     residual: Exact | None = None,
     input_norm: int | None = None,
+    orientation: str | None = None,
 ) -> Design:
     """Find gains of the nominal protocol whose input is proved to stay within a limit, and the shortest deadline.
 
     Parameters
     ----------
-    graph : SignedDigraph
-        Up to 400 agents.
+    graph : graph-like
+        Up to 400 agents, in whatever form :func:`ptcc_certify.as_graph` takes.
     max_input : int, float, str or Fraction
         Positive: bound of ``|u_k|`` for all agents, at all times, from all initial states.
     initial_bound : int, float, str, Fraction or InitialSet
@@ -377,6 +378,8 @@ def design(
         Positive: how far every agent may be from its final state at the deadline. Then the gain may be capped.
     input_norm : {2}, optional
         ``max_input`` bounds ``||u||_2`` instead.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
 
     Returns
     -------
@@ -411,7 +414,8 @@ one asked for)
     r = None if residual is None else parameter("residual", residual)
     if input_norm not in (None, 2):
         raise ParameterError(f"input_norm = {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
-    structure = analyse(graph)
+    structure = analyse(graph, orientation)
+    graph = structure.graph
     initial_set = (
         initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
     )

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.batch.backends import compute_rows, default_workers
-from ptcc_certify.batch.output import Journal, journal_path, refuse_table, table_bytes
+from ptcc_certify.batch.output import Journal, Table, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
 from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
@@ -42,14 +42,14 @@ def certify_many(
     restart: bool = False,
     progress: Callable[[int, int, int], None] = lambda done, total, errors: None,
     **settings: Any,
-) -> list[Row]:
+) -> Table:
     """Certify many graphs, and return or write a table with one row for each.
 
     Whatever goes wrong with one graph becomes the entry ``error`` of its row and stops nothing.
 
     Parameters
     ----------
-    sources : path, pattern, SignedDigraph, Ensemble, or a sequence of these
+    sources : path, pattern, graph-like, Ensemble, a sequence of these, or a mapping of name to graph-like
         A text is a file, a pattern such as ``"graphs/*.csv"`` (``**`` for folders within), the name of a packaged
         graph, or an ensemble's ``.toml`` file. A pattern skips folders and the table itself; a link to nowhere that
         matches has an error. A file that is named several times, in whatever way or through links, has one row, under
@@ -140,7 +140,7 @@ def certify_many(
         if path is not None and journal is not None:
             _write(path, rows)
             journal.remove()
-    return _in_order(rows)
+    return Table(_in_order(rows))
 
 
 def _in_order(rows: dict[int, Row]) -> list[Row]:

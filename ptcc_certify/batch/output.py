@@ -14,13 +14,17 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from ptcc_certify.batch.rows import COLUMNS, Row, package_version, printable
 from ptcc_certify.batch.settings import INSTALL, Settings
 from ptcc_certify.batch.sources import Source
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.tables import import_pandas
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Endings of a table's name.
 TABLES = (".csv", ".parquet")
@@ -33,6 +37,29 @@ _FITTING: dict[type, Callable[[Any], bool]] = {
     int: lambda x: abs(x) < 2**63,
     bool: lambda x: True,
 }
+
+
+class Table(list[Row]):
+    """The rows of many graphs, one dictionary for each."""
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the rows as a DataFrame whose types depend on no row: texts, ``Int64``, ``Float64``, ``boolean``.
+
+        An empty entry is ``pandas.NA``.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> Table().to_pandas().dtypes["nodes"]
+        Int64Dtype()
+        """
+        kinds = {str: "string", int: "Int64", float: "Float64", bool: "boolean"}
+        table = import_pandas().DataFrame(list(self), columns=list(COLUMNS), dtype=object)
+        return table.astype({name: kinds[kind] for name, kind in COLUMNS.items()})
 
 
 def table_bytes(rows: Sequence[Row], suffix: str) -> bytes:

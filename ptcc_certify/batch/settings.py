@@ -16,6 +16,7 @@ from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import behaviour_name
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.parameters import parameter
 
@@ -110,8 +111,7 @@ class Settings:
         return cls(protocol, **settings, reading=Reading(**reading))
 
     def __post_init__(self) -> None:
-        if not isinstance(self.protocol, Protocol):
-            raise ParameterError(f"protocol = {shorten(repr(self.protocol))} is none; give a NominalProtocol, say")
+        refuse_no_protocol(self.protocol)
         one_node = SignedDigraph.from_edges([], nodes=["1"])  # what certify refuses of it, it refuses of every graph
         sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
         refuse(one_node, self.protocol, self.method, sliding, ())

@@ -6,17 +6,20 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
-from ptcc_certify.examples import GRAPHS, graph_path
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.ensembles import Ensemble
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
 from ptcc_certify.graphs.rationals import shorten
 
 #: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
@@ -67,29 +70,39 @@ class Source:
 
 def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
-    if isinstance(sources, str | os.PathLike | SignedDigraph | Ensemble):
+    if isinstance(sources, str | os.PathLike | Ensemble) or not isinstance(sources, Iterable) or _is_one_graph(sources):
         sources = [sources]
-    if not isinstance(sources, Iterable):
-        raise ParameterError(f"{shorten(repr(sources))} is no graph; give paths, SignedDigraphs or Ensembles")
     selection: dict[Hashable, Source] = {}
     graphs = ensembles = 0
-    for source in sources:
-        if isinstance(source, SignedDigraph):
-            own_sources = [Source(f"graph#{graphs}", source, ("graph", graphs), _mark_of_graph(source))]
-            graphs += 1
-        elif isinstance(source, Ensemble):
+    named = sources if isinstance(sources, Mapping) else {}
+    for name, graph in named.items():
+        graph = as_graph(graph)
+        key = ("named", str(name))
+        selection[key] = Source(str(name), graph, key, _mark_of_graph(graph))
+    for source in () if named else sources:
+        if isinstance(source, Ensemble):
             ensembles += 1
             name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
             own_sources = _graphs_of(name, source, ("ensemble", ensembles))
         elif isinstance(source, str | os.PathLike):
             own_sources = _expand(os.fspath(source), own)
         else:
-            raise ParameterError(f"{shorten(repr(source))} is no graph; give paths, SignedDigraphs or Ensembles")
+            graph = as_graph(source)
+            own_sources = [Source(f"graph#{graphs}", graph, ("graph", graphs), _mark_of_graph(graph))]
+            graphs += 1
         for one in own_sources:
             selection.setdefault(one.key, one)
     if not selection:
         raise ParameterError("there are no graphs; name files or patterns")
     return list(selection.values())
+
+
+def _is_one_graph(source: Any) -> bool:
+    """Tell one graph, matrix or table of edges, which can be iterated over, from a sequence of graphs."""
+    held = isinstance(source, SignedDigraph) or isinstance(getattr(source, "graph", None), SignedDigraph)
+    return (
+        held or isinstance(source, np.ndarray) or any(hasattr(source, x) for x in ("is_multigraph", "columns", "tocoo"))
+    )
 
 
 def _expand(text: str, own: Sequence[Path]) -> list[Source]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import FinalState
 from ptcc_certify.errors import HypothesisError
-from ptcc_certify.graphs.io import in_node_order
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.io import as_state
+from ptcc_certify.graphs.structure import Structure, analyse
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
@@ -55,14 +55,14 @@ def is_prescribed_time_stable(trajectory: Trajectory, tolerance: float = 1e-6) -
     return bool(np.abs(after).max(initial=0.0) <= tolerance * np.abs(trajectory.error).max(initial=0.0))
 
 
-def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
+def is_stability(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     """Definition 2: ``x_k = 0`` for all agents (from the deadline on).
 
     Parameters
     ----------
     x : sequence of N numbers, mapping or pandas Series by label, FinalState or Trajectory
         A trajectory is judged at its deadline and at every later sample, relative to its largest initial value.
-    structure : Structure
+    graph : Structure or graph-like
     tolerance : float
         0 asks for equality, which makes sense for exact final states.
 
@@ -80,17 +80,18 @@ def is_stability(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
     >>> is_stability(final_state(st, [3, 4]), st)
     True
     """
+    structure = analyse(graph)
     return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, structure, tolerance))
 
 
-def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
+def is_bipartite_consensus(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     """Definition 3: ``|x_k| = x*`` for all agents, with ``x* > 0`` (see :func:`is_stability` for parameters).
 
     Parameters
     ----------
     x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
-    structure : Structure
+    graph : Structure or graph-like
     tolerance : float
         0 asks for equality, which makes sense for exact final states.
 
@@ -108,17 +109,18 @@ def is_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0)
     >>> is_bipartite_consensus(final_state(st, [3, 4]), st), is_bipartite_consensus(final_state(st, [3, 3]), st)
     (True, False)
     """
+    structure = analyse(graph)
     return all(_same_modulus(state, tol) for state, tol in _states(x, structure, tolerance))
 
 
-def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
+def is_interval_bipartite_consensus(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     """Definition 4: ``|x_k| = x_f > 0`` for all leaders, ``|x_l| <= x_f`` for all followers; one closed component.
 
     Parameters
     ----------
     x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
-    structure : Structure
+    graph : Structure or graph-like
     tolerance : float
         0 asks for equality, which makes sense for exact final states.
 
@@ -136,6 +138,7 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
     >>> is_interval_bipartite_consensus(final_state(st, [2, 0, 0]), st)
     True
     """
+    structure = analyse(graph)
     if len(structure.closed_components) != 1:
         return False
     leaders, followers = structure.leaders.tolist(), structure.followers.tolist()
@@ -146,14 +149,14 @@ def is_interval_bipartite_consensus(x: Any, structure: Structure, tolerance: flo
     )
 
 
-def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.0) -> bool:
+def is_bipartite_containment(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     """Definition 5: balanced closed components in bipartite consensus, unbalanced at 0, followers within the leaders.
 
     Parameters
     ----------
     x : sequence of N numbers, FinalState or Trajectory
         See :func:`is_stability`.
-    structure : Structure
+    graph : Structure or graph-like
     tolerance : float
         0 asks for equality, which makes sense for exact final states.
 
@@ -171,6 +174,7 @@ def is_bipartite_containment(x: Any, structure: Structure, tolerance: float = 0.
     >>> is_bipartite_containment(final_state(st, [1, 0, 2]), st)
     True
     """
+    structure = analyse(graph)
     return all(_is_contained(state, structure, tol) for state, tol in _states(x, structure, tolerance))
 
 
@@ -206,4 +210,4 @@ def _states(x: Any, structure: Structure, tolerance: float) -> list[tuple[Sequen
             for column in range(states.shape[1])
             for i in range(x.deadline_index, states.shape[-1])
         ]
-    return [(in_node_order(x, structure.graph, "x"), tolerance)]
+    return [(as_state(x, structure.graph, "x"), tolerance)]

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.final_state import Influence, exact_initial_state, influence
+from ptcc_certify.bounds.final_state import Influence, influence
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
@@ -281,7 +282,7 @@ class Envelope:
             A value of the clock is negative or not a number, or ``x0`` does not fit the graph; or there is a reaching
             phase, in which the clock alone bounds nothing.
         """
-        return self._norms(self._at(clock), exact_initial_state(self.structure, x0))
+        return self._norms(self._at(clock), as_state(x0, self.structure.graph))
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z||`` from ``x0``, (M,), at the instants where ``1 - t/T`` is ``remaining``, (M,).
@@ -291,7 +292,7 @@ class Envelope:
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        return self._norms(self._when(remaining), exact_initial_state(self.structure, x0))
+        return self._norms(self._when(remaining), as_state(x0, self.structure.graph))
 
     def _norms(self, at: Instants, x0: Sequence[Fraction]) -> np.ndarray:
         """Return the bounds of ``||z||`` from ``x0``."""
@@ -318,7 +319,7 @@ class Envelope:
         ParameterError
             A value of ``remaining`` is not from 0 to 1, or ``x0`` does not fit the graph.
         """
-        return self._deviations(self._when(remaining), exact_initial_state(self.structure, x0))[:-1]
+        return self._deviations(self._when(remaining), as_state(x0, self.structure.graph))[:-1]
 
     def deviation(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``|x_k - (Q x0)_k|`` at clock values ``s`` from ``x0``: how far each agent is from its final state.
@@ -343,11 +344,11 @@ class Envelope:
             A value of the clock is negative or not a number, or ``x0`` does not fit the graph; or there is a reaching
             phase, in which the clock alone bounds nothing.
         """
-        return self._deviations(self._at(clock), exact_initial_state(self.structure, x0))[:-1]
+        return self._deviations(self._at(clock), as_state(x0, self.structure.graph))[:-1]
 
     def deviation_norm(self, clock: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||x - Q x0||`` at values ``clock`` of ``s``, from ``x0``; see :meth:`deviation`."""
-        return self._deviations(self._at(clock), exact_initial_state(self.structure, x0))[-1]
+        return self._deviations(self._at(clock), as_state(x0, self.structure.graph))[-1]
 
     def _deviations(self, at: Instants, x0: Sequence[Fraction], unit: float | None = None) -> np.ndarray:
         """Return the bounds of every agent and of the norm, (N + 1, M), in that unit or in 1."""

@@ -16,21 +16,22 @@ the certificate forms them exactly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lmi.errors import LMIError
 from lmi.sparse_h_matrix import SparseHMatrix, solve
-from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graphs.io import in_node_order
-from ptcc_certify.graphs.rationals import as_fraction, shorten
-from ptcc_certify.graphs.structure import ClosedComponent, Structure
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_state
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
+from ptcc_certify.graphs.tables import series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -39,6 +40,9 @@ from ptcc_certify.theorems.lemmas import (
     exact_left_vector,
     left_vector,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
@@ -197,14 +201,17 @@ def follower_state(structure: Structure, state: np.ndarray) -> np.ndarray:
     return solve(block, -(rows @ leaders), block.diagonal())
 
 
-def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
+def influence(graph: Any, *, exact: bool | None = None, orientation: str | None = None) -> Influence:
     """Compute ``Q`` in factored form.
 
     Parameters
     ----------
-    structure : Structure
+    graph : graph-like or Structure
+        Whatever :func:`ptcc_certify.as_graph` takes.
     exact : bool, optional
         Rationals or floats; by default rationals for graphs of at most ``EXACT_NODES`` nodes.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
 
     Returns
     -------
@@ -216,10 +223,10 @@ def influence(structure: Structure, *, exact: bool | None = None) -> Influence:
 
     Examples
     --------
-    >>> foes = analyse(SignedDigraph.from_edges([(1, 2, -3), (2, 1, -1)]))
-    >>> influence(foes).left_null_vectors  # they meet at (3 x_1 - x_2)/4 and its opposite
+    >>> influence([(1, 2, -3), (2, 1, -1)]).left_null_vectors  # they meet at (3 x_1 - x_2)/4 and its opposite
     ((Fraction(3, 4), Fraction(-1, 4)),)
     """
+    structure = analyse(graph, orientation)
     graph = structure.graph
     exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
     left_null_vectors: list[tuple[Number, ...]] = []
@@ -277,8 +284,8 @@ class FinalState:
     >>> end = final_state(analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1), (2, 3, 4)])), [3, 1, 7])
     >>> end
     FinalState(1=1, 2=-1, 3=-1)
-    >>> end.consensus_values, end.degenerate
-    ((Fraction(1, 1),), ())
+    >>> end.consensus_values, end.degenerate, end[2]
+    ((Fraction(1, 1),), (), Fraction(-1, 1))
     """
 
     labels: tuple[str, ...]
@@ -305,29 +312,67 @@ class FinalState:
         """(N,) float64 array: ``states``, rounded."""
         return np.array([float(x) for x in self.states])
 
+    def __getitem__(self, label: Hashable) -> Number:
+        if str(label) not in self.labels:
+            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
+            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
+        return self.states[self.labels.index(str(label))]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.values, dtype=dtype)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the labels, so that ``dict(final_state)`` has the states by label."""
+        return self.labels
+
+    def to_pandas(self) -> pd.Series:
+        """Return ``values`` as a Series by label.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> final_state([("a", "b", -1)], [3, 5]).to_pandas().to_dict()
+        {'a': 3.0, 'b': -3.0}
+        """
+        return series(self.values, self.labels, "final state")
+
     def __repr__(self) -> str:
         entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
         return f"FinalState({entries}{', ...' if len(self.labels) > 8 else ''})"
 
 
 def final_state(
-    structure: Structure,
-    x0: Sequence[Any] | Mapping[Any, Any],
+    graph: Any,
+    x0: Any,
     *,
     exact: bool | None = None,
     matrix: Influence | None = None,
+    orientation: str | None = None,
 ) -> FinalState:
     """Compute the state at the deadline, ``Q x0``.
 
     Parameters
     ----------
-    structure : Structure
-    x0 : sequence of N numbers, mapping of label to number or pandas Series
-        In node order, or by label; ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
+    graph : graph-like or Structure
+        Whatever :func:`ptcc_certify.as_graph` takes.
+    x0 : state-like
+        In node order, or by label: whatever :func:`ptcc_certify.as_state` takes.
     exact : bool, optional
         See :func:`influence`.
     matrix : Influence, optional
         ``Q``, if it is known already.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
 
     Returns
     -------
@@ -344,10 +389,11 @@ def final_state(
 
     Examples
     --------
-    >>> final_state(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])), [1, 0, 2]).states
+    >>> final_state([("a", "c", 1), ("b", "c", -3)], {"a": 1, "b": 2, "c": 0}).states
     (Fraction(1, 1), Fraction(-5, 4), Fraction(2, 1))
     """
-    initial_state = exact_initial_state(structure, x0)
+    structure = analyse(graph, orientation)
+    initial_state = as_state(x0, structure.graph)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
     final, values = matrix.apply(initial_state if matrix.exact else [float(x) for x in initial_state])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
@@ -355,35 +401,6 @@ def final_state(
     meets_at_zero = [c == 0 if matrix.exact else abs(float(c)) <= 1e-12 * size for c in values]
     degenerate = tuple(k for k, zero in zip(numbers, meets_at_zero, strict=True) if zero)
     return FinalState(structure.graph.labels, tuple(final), tuple(values), degenerate)
-
-
-def exact_initial_state(
-    structure: Structure, x0: Sequence[Any] | Mapping[Any, Any], name: str = "x0"
-) -> list[Fraction]:
-    """Return an initial state as N rationals; ``x0`` in node order, or with labels. ``name`` is what messages call it.
-
-    Raises
-    ------
-    ParameterError
-        Wrong length, labels other than those of the nodes, or an entry that is not a finite number.
-    """
-    labels = structure.graph.labels
-    x0 = in_node_order(x0, structure.graph, name)
-    if isinstance(x0, str) or not hasattr(x0, "__getitem__"):
-        raise ParameterError(f"the initial state {name} is a sequence of numbers in node order, or a mapping by label")
-    if len(x0) != len(labels):
-        raise ParameterError(f"the initial state {name} has {len(x0)} values for {len(labels)} agents")
-    initial_state = []
-    for label, value in zip(labels, x0, strict=True):
-        if type(value) is Fraction:
-            initial_state.append(value)
-            continue
-        try:
-            initial_state.append(as_fraction(value, f"{name} of agent {shorten(label)}"))
-        except NumberError as error:
-            where = f"{name} of agent {shorten(label)}"
-            raise ParameterError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
-    return initial_state
 
 
 # ---------------------------------------------------------------------- large graphs

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
@@ -19,8 +20,9 @@ from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
-from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
@@ -59,7 +61,7 @@ class RejectedCertificate(PTCCError, ValueError):
         super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Content, Shown):
     """A claim about a signed digraph under a protocol, with its proof.
 
@@ -203,13 +205,66 @@ class Certificate(Content, Shown):
         # What UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape.
         write_atomically(path, _json(document).encode("utf-8", "backslashreplace"))
 
+    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
+        """Return the JSON and the contents of its side files, as the independent check takes them.
+
+        Raises
+        ------
+        FormatError
+            The certificate was read, and a side file is no longer there.
+        """
+        if self.source is None:
+            document, out = self._document(self.verdict)
+            return document, out.files
+        folder, names = self.source.path.parent, set(_side_files(self.document))
+        return self.document, {name: read_bytes(folder / name, name) for name in names}
+
+    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+        """Draw a figure of the certificate.
+
+        Parameters
+        ----------
+        what : {"decay", "input", "graph", "spectrum", "states"}
+            Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states.
+        **keywords : Any
+            ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ParameterError
+            No figure is called so, or there is nothing to draw.
+        """
+        return plot(self, what, **keywords)
+
+    def summary(self) -> str:
+        """Return what ``ptcc certify`` prints of it."""
+        return summary(self)
+
+    def __eq__(self, other: object) -> bool:
+        """Two certificates are equal when they claim and prove the same; what was observed does not count."""
+        return isinstance(other, Certificate) and self._digest == other._digest
+
+    def __hash__(self) -> int:
+        return hash(self._digest)
+
+    @property
+    def _digest(self) -> str:
+        document = self._document(self.verdict)[0] if self.source is None else self.source.document
+        return str(document["digest"])
+
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
         behaviour = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
         return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
 
-def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 1) -> Certificate:
+def read_certificate(
+    path: str | Path | Mapping[str, Any] | Certificate, *, stdlib: bool = False, memory: float = 1
+) -> Certificate:
     """Check a certificate's file with the independent check, and read it back.
 
     Nothing is taken from a file that the check does not accept, and no claim from its key ``unverified``. Bounds are
@@ -217,8 +272,9 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
 
     Parameters
     ----------
-    path : str or Path
-        A file of schema ``ptcc-certificate/2``; its side files are in the same folder.
+    path : str, Path, mapping or Certificate
+        A file of schema ``ptcc-certificate/2``; its side files are in the same folder. Or its parsed JSON, without side
+        files; or a certificate, which is written down and read back.
     stdlib : bool
         Let the check use the standard library alone.
     memory : float
@@ -251,6 +307,14 @@ def read_certificate(path: str | Path, *, stdlib: bool = False, memory: float = 
     >>> saved.with_simulation(samples=11).comparison.violated
     False
     """
+    if isinstance(path, Certificate | Mapping):
+        with TemporaryDirectory() as folder:
+            file = Path(folder, "certificate.json")
+            if isinstance(path, Certificate):
+                path.save(file)
+            else:
+                write_atomically(file, _json(dict(path)).encode("utf-8", "backslashreplace"))
+            return read_certificate(file, stdlib=stdlib, memory=memory)
     path = Path(path)
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)

@@ -102,7 +102,7 @@ class Source:
     obligations: tuple[Obligation, ...]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Content:
     """The parts of a certificate, and what follows from them."""
 

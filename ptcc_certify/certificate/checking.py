@@ -5,16 +5,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from ptcc_certify import checker
 from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.rationals import shorten
 
 
 def check(
-    source: str | Path | Mapping[str, Any],
+    source: Any,
     *,
     stdlib: bool = False,
     files: Mapping[str, bytes] | None = None,
@@ -24,8 +25,8 @@ def check(
 
     Parameters
     ----------
-    source : str, Path or mapping
-        A path, or the parsed JSON object.
+    source : str, Path, mapping or Certificate
+        A path, the parsed JSON object, or a certificate as it would be written.
     stdlib : bool
         Use the standard library alone, even where python-flint and NumPy are installed.
     files : mapping of str to bytes, optional
@@ -51,9 +52,7 @@ def check(
     return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
 
 
-def read_and_check(
-    source: str | Path | Mapping[str, Any], **options: Any
-) -> tuple[dict[str, Any], checker.CheckReport]:
+def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker.CheckReport]:
     """Return the parsed JSON object beside the report of :func:`check`, whose options these are.
 
     Raises
@@ -66,6 +65,10 @@ def read_and_check(
     >>> read_and_check({"schema": "ptcc-certificate/2"})[0]
     {'schema': 'ptcc-certificate/2'}
     """
+    if hasattr(source, "for_check"):
+        source, options["files"] = source.for_check()
+    elif not isinstance(source, str | os.PathLike | Mapping):
+        raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
     try:
         return checker.read_and_check(source, **options)
     except checker.UnreadableError as error:

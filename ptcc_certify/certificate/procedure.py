@@ -8,7 +8,7 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -44,6 +44,7 @@ from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import HypothesisError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
@@ -79,11 +80,12 @@ SETTLED = 1e-6
 
 
 def certify(
-    graph: SignedDigraph,
+    graph: Any,
     protocol: Protocol,
-    x0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    x0: Any = None,
     *,
-    sigma0: Sequence[Any] | Mapping[Any, Any] | None = None,
+    orientation: str | None = None,
+    sigma0: Any = None,
     disturbance: Any = None,
     simulation: bool | None = None,
     method: str = "best",
@@ -100,14 +102,16 @@ def certify(
 
     Parameters
     ----------
-    graph : SignedDigraph
-        Any signed digraph, disconnected ones included.
+    graph : graph-like
+        Any signed digraph, disconnected ones included, in whatever form :func:`ptcc_certify.as_graph` takes.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
-    x0 : sequence of N numbers, mapping of label to number or pandas Series, optional
-        The initial state, in node order, or by label where there are labels. Without it there is no final state and no
-        simulation.
-    sigma0 : sequence of N numbers, mapping of label to number or pandas Series, optional
+    x0 : state-like, optional
+        The initial state, in node order, or by label where there are labels: whatever :func:`ptcc_certify.as_state`
+        takes. Without it there is no final state and no simulation.
+    orientation : {"information", "listens"}, optional
+        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+    sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
         final state.
     disturbance : Disturbance, str, number, callable or sequence, optional
@@ -145,8 +149,9 @@ def certify(
     Raises
     ------
     ParameterError
-        ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong length, with
-        other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond ``delta``.
+        No protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong
+        length, with other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond
+        ``delta``.
 
     References
     ----------
@@ -169,6 +174,7 @@ ReachingTime(0, 1 before T_r)))
     FinalState(1=-1.5, 2=1.5)
     """
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
     request = read_request(structure, protocol, {**options, "time_limit": time_limit, "expectations": expectations})

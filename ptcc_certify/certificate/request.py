@@ -11,22 +11,21 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import MAX_SCALE_BITS
-from ptcc_certify.bounds.final_state import exact_initial_state
-from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 
-#: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
-LARGEST_STATE = Fraction(10**300)
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000
 
@@ -100,6 +99,7 @@ def refuse(
     graph: SignedDigraph, protocol: Protocol, method: str, sliding: Mapping[str, Any], nominal: Sequence[Any]
 ) -> None:
     """Refuse what does not fit together."""
+    refuse_no_protocol(protocol)
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     for name, value in sliding.items():
@@ -118,7 +118,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
     request = Request(
         method=arguments["method"],
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
-        initial_set=_read_initial_set(structure, arguments["initial_set"]),
+        initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
         time_limit=60 + n / 1000 if seconds is None else seconds,
         expectations=arguments["expectations"] or Expectations(),
@@ -140,28 +140,6 @@ def _limits(entry: Limits, protocol: Protocol) -> GainLimits:
     if limits.sample_period is not None and limits.sample_period > T:
         raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
     return limits
-
-
-def _read_initial_set(structure: Structure, initial_set: Any) -> InitialSet | None:
-    """Return a set of initial states, or refuse it."""
-    if initial_set is None:
-        return None
-    if not isinstance(initial_set, InitialSet):
-        return initial_set_within(structure, initial_set)
-    n = structure.graph.n_nodes
-    for name, vector in (("center", initial_set.center), ("radius", initial_set.radius or initial_set.center)):
-        if len(vector) != n:
-            raise ParameterError(f"{name} of the initial states has {len(vector)} entries for {n} agents")
-    if any(len(axis) != n for axis in initial_set.axes):
-        raise ParameterError(f"an axis of the initial states has another number of entries than {n} agents")
-    if initial_set.radius and initial_set.axes:
-        raise ParameterError("initial states have a radius, for a box, or axes, for an ellipsoid; leave one out")
-    if any(r < 0 for r in initial_set.radius):
-        raise ParameterError("a radius of the initial states is negative")
-    numbers = [x for vector in (initial_set.center, initial_set.radius, *initial_set.axes) for x in vector]
-    if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
-        raise ParameterError("the initial states are beyond 1e300, or have too many digits to keep")
-    return initial_set
 
 
 def _distinct_weights(graph: SignedDigraph) -> Iterable[Fraction]:
@@ -199,14 +177,10 @@ def _refuse_long(values: Iterable[Fraction], n: int, what: str, where: Callable[
             )
 
 
-def read_initial_state(
-    structure: Structure, values: Sequence[Any] | Mapping[Any, Any], name: str
-) -> tuple[Fraction, ...]:
+def read_initial_state(structure: Structure, values: Any, name: str) -> tuple[Fraction, ...]:
     """Return ``X(0)`` or ``sigma(0)`` in rationals, or refuse it."""
-    state = tuple(exact_initial_state(structure, values, name))
+    state = tuple(as_state(values, structure.graph, name))
     for label, value in zip(structure.graph.labels, state, strict=True):
-        if abs(value) > LARGEST_STATE:
-            raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
         if not writable(value):
             raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
     longest = max(zip(structure.graph.labels, state, strict=True), key=lambda entry: _bits(entry[1]))[0]
@@ -215,7 +189,7 @@ def read_initial_state(
 
 
 def read_sliding_variable(
-    structure: Structure, protocol: Protocol, sigma0: Sequence[Any] | Mapping[Any, Any] | None
+    structure: Structure, protocol: Protocol, sigma0: Any
 ) -> tuple[tuple[Fraction, ...] | None, tuple[ReachingTime, ...] | None]:
     """Return ``sigma(0)`` and the proved reaching times; nothing for the nominal protocol."""
     sliding = protocol.reaching

@@ -90,4 +90,4 @@ def _save_curve(answer: Design, path: str) -> None:
         from ptcc_certify.report.plots.style import save_figure
         from ptcc_certify.report.plots.trade_off import plot_trade_off
 
-        save_figure(plot_trade_off(answer).figure, path)
+        save_figure(plot_trade_off(answer), path)

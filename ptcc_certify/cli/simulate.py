@@ -49,11 +49,10 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
     more |= {name: options[name] for name in ("samples", "boundary_layer")}
     trajectory = run(signed, protocol, shared.read_initial_states(options, signed), **more)
     if output and suffix in FIGURES:
-        from ptcc_certify.graphs.structure import analyse
         from ptcc_certify.report.plots.style import save_figure
         from ptcc_certify.report.plots.trajectory import plot_run
 
-        save_figure(plot_run(trajectory, analyse(signed), wide=wide), output)
+        save_figure(plot_run(trajectory, wide=wide), output)
     elif output:
         write_atomically(output, trajectory.to_csv())
     else:

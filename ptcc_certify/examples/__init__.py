@@ -9,13 +9,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import read_graph
+from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 
-GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
+__all__ = ["EXAMPLES", "GRAPHS", "Example", "graph_path", "load_graph", "select"]
 
 
 @dataclass(frozen=True)
@@ -70,19 +71,6 @@ def _examples() -> dict[int, Example]:
 EXAMPLES = _examples()
 
 
-def graph_path(name: str) -> Path:
-    """Return the path of a packaged graph.
-
-    Raises
-    ------
-    ParameterError
-        No such graph; the message lists them.
-    """
-    if name not in GRAPHS:
-        raise ParameterError(f'no packaged graph "{name}"; there are ' + ", ".join(GRAPHS))
-    return Path(str(resources.files(__name__) / f"{name}.csv"))
-
-
 def load_graph(name: str) -> SignedDigraph:
     """Read a packaged graph.
 
@@ -91,8 +79,6 @@ def load_graph(name: str) -> SignedDigraph:
     >>> load_graph("fig1a")
     SignedDigraph(6 nodes, 12 edges, 4 negative)
     """
-    from ptcc_certify.graphs.io import read_graph
-
     return read_graph(graph_path(name))
 
 

@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from fractions import Fraction
 from functools import cached_property
@@ -21,9 +21,11 @@ import numpy as np
 from ptcc_certify.errors import GraphError, NumberError
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
+from ptcc_certify.graphs.tables import import_pandas
 
 if TYPE_CHECKING:
     import networkx as nx
+    import pandas as pd
     from scipy import sparse
 
 _INT64_LIMIT = 2**62
@@ -163,8 +165,8 @@ class SignedDigraph(Shown):
         long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
         odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
         for bad, message in (
-            (source == target, "self-loop at node {0}; remove it, or drop all with --drop-self-loops"),
-            (again, "two edges {0} -> {1}; keep one, or merge with --duplicates"),
+            (source == target, "self-loop at node {0}; remove it"),
+            (again, "two edges {0} -> {1}; keep one"),
             (table == 0, "weight 0 of edge {0} -> {1}: an unknown sign is not an edge; remove it or give a weight"),
             (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),
             (odd, "weight of edge {0} -> {1} is outside the range of float64; rescale the weights"),
@@ -349,14 +351,17 @@ class SignedDigraph(Shown):
         >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
+        if not hasattr(graph, "is_multigraph"):
+            raise GraphError(f"a {type(graph).__name__} is no networkx graph; ptcc_certify.as_graph takes other data")
         if graph.is_multigraph():
             raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
         if not graph.is_directed():
-            raise GraphError("the networkx graph is undirected; pass graph.to_directed() if both ends listen")
+            raise GraphError("the networkx graph is undirected; give graph.to_directed() if both ends listen")
+        mend = 'give each edge a signed number, or name the attribute: from_networkx(graph, weight="sign")'
         triples = []
         for u, v, data in graph.edges(data=True):
             if weight not in data:
-                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"')
+                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"; {mend}')
             triples.append((u, v, data[weight]))
         return cls.from_edges(triples, graph.nodes, orientation=orientation)
 
@@ -503,6 +508,52 @@ class SignedDigraph(Shown):
             lines = [f'[{s}, {t}, "{w}"]\n' for s, t, w in zip(*(c.tolist() for c in columns), strict=True)]
             digest.update("".join(lines).encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
+
+    def to_networkx(self) -> nx.DiGraph:
+        """Return a networkx ``DiGraph``: an edge ``u -> v`` lets information flow so, ``weight`` is a float64.
+
+        Examples
+        --------
+        >>> graph = SignedDigraph.from_edges([("a", "b", -2)])
+        >>> SignedDigraph.from_networkx(graph.to_networkx()) == graph
+        True
+        """
+        import networkx as nx
+
+        result = nx.DiGraph()
+        result.add_nodes_from(self.labels)
+        result.add_weighted_edges_from(zip(*self._columns(), strict=True))
+        return result
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the edges as a DataFrame with columns ``source``, ``target``, ``weight`` (float64).
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> SignedDigraph.from_edges([("a", "b", -2)]).to_pandas().to_dict("records")
+        [{'source': 'a', 'target': 'b', 'weight': -2.0}]
+        """
+        source, target, weight = self._columns()
+        return import_pandas().DataFrame({"source": source, "target": target, "weight": weight})
+
+    def _columns(self) -> tuple[list[str], list[str], list[float]]:
+        names = self.labels
+        ends = ([names[i] for i in end.tolist()] for end in (self.source, self.target))
+        return (*ends, self.weights.tolist())  # type: ignore[return-value]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __contains__(self, label: object) -> bool:
+        return str(label) in self.index
 
     def __eq__(self, other: object) -> bool:
         """Two graphs are equal when they have the same labelled nodes and the same exact edges."""

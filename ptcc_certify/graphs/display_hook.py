@@ -1,11 +1,14 @@
-"""What notebooks show of an object: classes say that they can be shown, and who draws them registers here.
+"""What notebooks show of an object, and its figures: classes say what they can show, the room ``report`` draws it.
 
-A function that draws a class is decorated with ``@shows(TheClass)``; it takes the object and returns HTML.
+A function that draws a class is decorated with ``@shows(TheClass)``; it takes the object and returns HTML. Rooms below
+``report`` name it by texts only, so that they do not depend on it.
 """
 
 from functools import singledispatch
 from importlib import import_module
 from typing import Any
+
+from ptcc_certify.errors import ParameterError
 
 #: The module that registers, loaded when a notebook first asks.
 _DRAWN_BY = "ptcc_certify.report.notebook"
@@ -37,3 +40,38 @@ def _html_of(shown: Any) -> str | None:
 
 #: Register the decorated function for a class.
 shows = _html_of.register
+
+
+#: What ``plot(what=...)`` of an object draws, and the module of the function.
+_FIGURES = {
+    "decay": ("report.plots.decay", "plot_decay"),
+    "input": ("report.plots.input", "plot_input"),
+    "graph": ("report.plots.graph", "plot_graph"),
+    "spectrum": ("report.plots.spectrum", "plot_spectrum"),
+    "states": ("report.plots.trajectory", "plot_trajectory"),
+}
+
+
+def plot(subject: Any, what: str, **keywords: Any) -> Any:
+    """Draw a figure of an object.
+
+    Raises
+    ------
+    ParameterError
+        No figure is called so.
+
+    Examples
+    --------
+    >>> plot(None, "picture")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, spectrum, states
+    """
+    if what not in _FIGURES:
+        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FIGURES)}")
+    module, function = _FIGURES[what]
+    return getattr(import_module(f"ptcc_certify.{module}"), function)(subject, **keywords)
+
+
+def summary(subject: Any) -> str:
+    """Return what the command line prints of a certificate."""
+    return "\n".join(import_module("ptcc_certify.report.screen").summary_lines(subject, "graph"))

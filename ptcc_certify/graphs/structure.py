@@ -21,6 +21,7 @@ import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.io import as_graph
 
 STABILITY = "stability"
 BIPARTITE_CONSENSUS = "bipartite consensus"
@@ -240,6 +241,14 @@ class Structure(Shown):
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
 
+    def __eq__(self, other: object) -> bool:
+        """Two structures are equal when their graphs are, with their nodes in the same order."""
+        same = isinstance(other, Structure) and self.graph.labels == other.graph.labels
+        return same and self.graph == other.graph  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self.graph)
+
     def __repr__(self) -> str:
         balanced = sum(c.balanced for c in self.closed_components)
         claim = f"{len(self.components)} components"
@@ -251,12 +260,15 @@ class Structure(Shown):
         )
 
 
-def analyse(graph: SignedDigraph) -> Structure:
+def analyse(graph: Any, orientation: str | None = None) -> Structure:
     """Find components, leaders, camps, negative cycles and the theorem that applies.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
+        Whatever :func:`ptcc_certify.as_graph` takes; a structure is returned as it is.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
 
     Returns
     -------
@@ -273,6 +285,12 @@ def analyse(graph: SignedDigraph) -> Structure:
     Structure(3 nodes, quasi-strong, 1 closed component(s), 1 balanced, 2 leaders; Theorem 2.1: interval bipartite \
 consensus)
     """
+    if isinstance(graph, Structure) and orientation is None:
+        return graph
+    return _structure_of(as_graph(graph, orientation))
+
+
+def _structure_of(graph: SignedDigraph) -> Structure:
     from scipy import sparse
     from scipy.sparse.csgraph import connected_components
 

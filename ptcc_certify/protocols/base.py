@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import fields
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -104,10 +105,12 @@ class Protocol(Parameters, ABC):
         kind = parameters.pop("kind", None)
         if kind not in Protocol._kinds:
             raise ParameterError(f'protocol "{shorten(str(kind))}" is unknown; one of {", ".join(Protocol._kinds)}')
-        try:
-            return Protocol._kinds[kind](**parameters)
-        except TypeError as error:
-            raise ParameterError(f"protocol {kind}: {error}") from None
+        names = [field.name for field in fields(Protocol._kinds[kind])]  # type: ignore[arg-type]
+        for what, odd in (("no", set(names) - set(parameters)), ("an unknown", set(parameters) - set(names))):
+            if odd:
+                named = ", ".join(sorted(map(shorten, odd)))
+                raise ParameterError(f"protocol {kind} has {what} {named}; it has {', '.join(names)}")
+        return Protocol._kinds[kind](**parameters)
 
 
 class ReachingProtocol(Protocol):
@@ -149,6 +152,25 @@ class ReachingProtocol(Protocol):
     def reaching_gain(self) -> Gain:
         """``mu2 + mu3 kappa/(T_r - t)``; by its clock ``c``, ``||sigma|| <= e^-c ||sigma(0)||`` (Proposition 1)."""
         return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
+
+
+def refuse_no_protocol(protocol: Any) -> None:
+    """Refuse what is no protocol.
+
+    Raises
+    ------
+    ParameterError
+        Tells how to make one.
+
+    Examples
+    --------
+    >>> refuse_no_protocol(0.6)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: protocol = 0.6 is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say
+    """
+    if not isinstance(protocol, Protocol):
+        given = shorten(repr(protocol))
+        raise ParameterError(f"protocol = {given} is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say")
 
 
 # ---------------------------------------------------------------------- expressions

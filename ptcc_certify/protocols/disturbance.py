@@ -18,6 +18,7 @@ import numpy as np
 
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import Exact
+from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.expression import ATOMS, Program, enclosure, floats, parse, symbolic
@@ -266,7 +267,7 @@ class ExpressionDisturbance(Disturbance):
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class SampledDisturbance(Disturbance):
+class SampledDisturbance(ByValue, Disturbance):
     """Disturbances given at instants, linear between them, constant before the first and after the last.
 
     Parameters

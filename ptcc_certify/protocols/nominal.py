@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import Protocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
@@ -32,9 +33,9 @@ class NominalProtocol(Protocol):
     ----------
     T, rho1, kappa : int, float, str or Fraction
         Positive; kept as exact rationals, a text obeys the exact grammar. ``T`` in units of time, ``rho1`` in
-        1/time/weight.
+        1/time/weight. By default 1, 1 and 2, as on the command line.
     rho2 : int, float, str or Fraction
-        Not negative, 1/weight.
+        Not negative, 1/weight; by default 1.
 
     Raises
     ------
@@ -51,10 +52,10 @@ class NominalProtocol(Protocol):
     """
 
     kind = "nominal"
-    T: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: NotNegative = NotNegative()
-    kappa: Positive = Positive()
+    T: Positive = Positive(1)
+    rho1: Positive = Positive(1)
+    rho2: NotNegative = NotNegative(1)
+    kappa: Positive = Positive(2)
 
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64
@@ -64,7 +65,7 @@ class NominalProtocol(Protocol):
 
         Parameters
         ----------
-        graph : SignedDigraph
+        graph : graph-like
             N agents.
         x : (N, 1) casadi.SX, optional
             The states; symbols ``x1 .. xN`` by default.
@@ -83,6 +84,7 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         return self.gain.expression(t) * coupling(graph, x)
 
@@ -97,6 +99,7 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph), ca.SX.sym("t")
         return {"t": t, "x": x, "ode": self.input(graph, x, t)}
 
@@ -105,7 +108,7 @@ class NominalProtocol(Protocol):
 
         Parameters
         ----------
-        graph : SignedDigraph, optional
+        graph : graph-like, optional
             At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
             numbers; without a graph they are letters.
 
@@ -129,7 +132,7 @@ class NominalProtocol(Protocol):
         g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
         \end{aligned}
         """
-        rows = nominal_rows(graph)
+        rows = nominal_rows(None if graph is None else as_graph(graph))
         return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
 
 

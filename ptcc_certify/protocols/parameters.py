@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any, Self, overload
 
@@ -21,6 +21,9 @@ class Positive:
 
     zero_allowed = False
 
+    def __init__(self, default: Exact | None = None):
+        self.default = default
+
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
         owner.__annotations__[name] = _EXACT_TYPES  # what the constructor takes, for help()
@@ -31,7 +34,9 @@ class Positive:
     def __get__(self, instance: object, owner: type) -> Fraction: ...
     def __get__(self, instance: Any, owner: type) -> Any:
         if instance is None:
-            raise AttributeError(self.name)  # no default
+            if self.default is None:
+                raise AttributeError(self.name)
+            return self.default
         return instance.__dict__[self.name]
 
     def __set__(self, instance: object, value: Exact) -> None:
@@ -66,6 +71,24 @@ class Parameters:
         """The parameters that are given, by their names."""
         every = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {name: value for name, value in every.items() if value is not None}
+
+    def replace(self, **changes: Exact) -> Self:
+        """Return the same with other values of some parameters.
+
+        Raises
+        ------
+        ParameterError
+            No parameter is called so, or a value is outside its domain.
+
+        Examples
+        --------
+        >>> NominalProtocol(T=1, rho1=1, rho2=1, kappa=2).replace(T=3)
+        NominalProtocol(T=3, rho1=1, rho2=1, kappa=2)
+        """
+        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
+        if unknown := [name for name in changes if name not in names]:
+            raise ParameterError(f"{unknown[0]} is no parameter of {type(self).__name__}; it has {', '.join(names)}")
+        return replace(self, **changes)  # type: ignore[type-var]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={readable(x)}' for name, x in self.parameters.items())})"

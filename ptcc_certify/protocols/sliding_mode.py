@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
@@ -55,15 +56,15 @@ class SlidingModeProtocol(ReachingProtocol):
     """
 
     kind = "sliding-mode"
-    T_r: Positive = Positive()
-    T_s: Positive = Positive()
-    rho1: Positive = Positive()
-    rho2: Positive = Positive()
-    kappa: Positive = Positive()
-    mu1: Positive = Positive()
-    mu2: Positive = Positive()
-    mu3: Positive = Positive()
-    delta: NotNegative = NotNegative()
+    T_r: Positive = Positive("0.5")
+    T_s: Positive = Positive("0.5")
+    rho1: Positive = Positive(1)
+    rho2: Positive = Positive(1)
+    kappa: Positive = Positive(2)
+    mu1: Positive = Positive(2)
+    mu2: Positive = Positive(1)
+    mu3: Positive = Positive(1)
+    delta: NotNegative = NotNegative(1)
 
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:
@@ -89,7 +90,7 @@ class SlidingModeProtocol(ReachingProtocol):
 
         Parameters
         ----------
-        graph : SignedDigraph
+        graph : graph-like
             N agents.
         x, varsigma : (N, 1) casadi.SX, optional
             The states and the auxiliary variables of (47); symbols ``x1 ..`` and ``varsigma1 ..`` by default.
@@ -102,6 +103,7 @@ class SlidingModeProtocol(ReachingProtocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         sigma = x + (symbols("varsigma", graph) if varsigma is None else varsigma)
         return _add_reaching_terms(
@@ -123,6 +125,7 @@ class SlidingModeProtocol(ReachingProtocol):
         """
         import casadi as ca
 
+        graph = as_graph(graph)
         x, varsigma, d, t = *(symbols(name, graph) for name in ("x", "varsigma", "d")), ca.SX.sym("t")
         motion = self.input(graph, x, varsigma, t) + d
         return {
@@ -137,7 +140,7 @@ class SlidingModeProtocol(ReachingProtocol):
 
         Parameters
         ----------
-        graph : SignedDigraph, optional
+        graph : graph-like, optional
             At most 20 nodes: the rows of every agent, with numbers. Without a graph the row of an agent k, in letters.
 
         Returns
@@ -174,7 +177,7 @@ class SlidingModeProtocol(ReachingProtocol):
             [
                 f"u_{{k}} &= {to_latex(expression)}",
                 rf"\sigma_{{k}} &= {to_latex(sigma)}, \quad \dot\varsigma_{{k}} = -{nominal}",
-                *nominal_rows(graph, r"^{\mathrm{nom}}"),
+                *nominal_rows(None if graph is None else as_graph(graph), r"^{\mathrm{nom}}"),
                 f"g &= {gain}",
                 f"h &= {reaching}",
             ]

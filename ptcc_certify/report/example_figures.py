@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ptcc_certify.report.example_results import Run
 from ptcc_certify.report.figures import PLOTS
-from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes
+from ptcc_certify.report.plots.style import DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, new_axes, share_legend
 
 #: The plots of those figures of the paper that have a name of their own.
 _PLOTS = {"graphs": "graph", "sliding_variables": "sliding"}
@@ -51,12 +51,12 @@ def paper_figures(runs: Sequence[Run]) -> dict[str, Figure]:
 
 
 def _panels(runs: Sequence[Run], what: str) -> Figure:
+    width, height = SINGLE_COLUMN if len(runs) == 1 else DOUBLE_COLUMN
     with style.context(STYLE):
-        figure = Figure(SINGLE_COLUMN if len(runs) == 1 else DOUBLE_COLUMN, layout="constrained")
-        panels = figure.subfigures(1, len(runs), squeeze=False)[0]
-        for (example, graph, certificate), panel in zip(runs, panels, strict=True):
-            PLOTS[_PLOTS.get(what, what)](certificate, new_axes(panel))
+        figure = Figure((width, height), layout="constrained")
+        for place, (example, graph, certificate) in enumerate(runs, start=1):
+            ax = new_axes(figure, (1, len(runs), place))
+            PLOTS[_PLOTS.get(what, what)](certificate, ax=ax)
             claim = certificate.claim
-            letter = "ab"[example.graphs.index(graph)]
-            panel.suptitle(f"({letter}) {graph}: {claim.behaviour if claim else ''}")
-    return figure
+            ax.set_title(f"({'ab'[example.graphs.index(graph)]}) {graph}: {claim.behaviour if claim else ''}")
+        return share_legend(figure, 2 * len(runs) + 1)

@@ -25,7 +25,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from lmi.exact.decimal_rounding import down
-from ptcc_certify.bounds.final_state import exact_initial_state, final_state
+from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, PTCCError
@@ -39,6 +39,7 @@ from ptcc_certify.protocols import Protocol, ReachingProtocol
 from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, as_disturbance, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.figures import PLOTS
+from ptcc_certify.report.plots.decay import error_norm, resolved
 from ptcc_certify.report.plots.style import BOUND, RUN, SINGLE_COLUMN, STYLE, finished, new_axes
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
@@ -251,10 +252,10 @@ class Explorer:
             raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
         structure, n = base.structure, base.graph.n_nodes
         draws = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, n)).tolist()
-        x0 = exact_initial_state(structure, draws[0])
+        x0 = [Fraction(x) for x in draws[0]]
         more: dict[str, Any] = {}
         if (sliding := protocol.reaching) is not None:
-            sigma0 = exact_initial_state(structure, draws[1] if settings.reaching else [0] * n)
+            sigma0 = [Fraction(x) for x in (draws[1] if settings.reaching else [0] * n)]
             base = base.changed(sigma0=tuple(sigma0), reaching=certified_reaching_times(sliding, sigma0))
             more = {"sigma0": [float(x) for x in sigma0], "disturbance": _disturbance(settings, sliding, n)}
         run = simulate(base.graph, protocol, [float(x) for x in x0], samples=_SAMPLES, **more)
@@ -487,11 +488,11 @@ def _figure(certificate: Certificate) -> Figure:
     with style.context(STYLE):
         figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
         # Fixed margins in inches, for labels, and for three lines of a legend: finding them takes half the drawing.
-        left, right, bottom, top, gap = 0.65, 0.25, 0.42, 0.55, 0.75
+        left, right, bottom, top, gap = 0.65, 0.35, 0.42, 0.55, 1.25
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)
         figure.subplots_adjust(left / whole, bottom / height, 1 - right / whole, 1 - top / height, gap / panel_width)
         for place, panel in enumerate(draw, start=1):
-            panel(certificate, new_axes(figure, (1, len(draw), place)))
+            panel(certificate, ax=new_axes(figure, (1, len(draw), place)))
     return figure
 
 
@@ -503,8 +504,10 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
     function = next(m for m in envelope.functions if m.coordinates == envelope.coordinates)
     norm = np.linalg.norm(function.coordinates_of(run.states[:, before], certificate.graph.laplacian()), axis=0)
     bound, scale = certificate.norm_bound(run.remaining[before]), float(norm[0]) or 1.0
+    _, floor, unit = error_norm(run, certificate)
+    norm = resolved(norm, bound, floor * unit)
     ax.loglog(run.remaining[before], bound / scale, color=BOUND, linewidth=1.6, label="bound")
-    ax.loglog(run.remaining[before], np.maximum(norm / scale, 1e-300), color=RUN, label="simulated (CVODES)")
+    ax.loglog(run.remaining[before], norm / scale, color=RUN, label="simulated (CVODES)")
     top = float(bound[0]) / scale
     ax.set_ylim(_LEAST, 3 * max(1.0, top if math.isfinite(top) else 1.0))
     ax.invert_xaxis()

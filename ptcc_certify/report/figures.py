@@ -20,11 +20,11 @@ from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Axes]] = {
-    "graph": lambda certificate, ax=None: plot_graph(certificate.structure, ax),
-    "states": lambda certificate, ax=None: plot_trajectory(certificate.trajectory, certificate.structure, ax),
-    "sliding": lambda certificate, ax=None: plot_sliding(certificate.trajectory.sliding, certificate.reaching, ax),
+    "graph": plot_graph,
+    "states": plot_trajectory,
+    "sliding": plot_sliding,
     "decay": plot_decay,
-    "input": lambda certificate, ax=None: plot_input(certificate.trajectory, certificate.structure, certificate, ax),
+    "input": plot_input,
 }
 
 

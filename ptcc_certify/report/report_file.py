@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError, SimulationError
@@ -20,7 +21,7 @@ SUFFIXES = (".html", ".htm", ".tex")
 
 
 def write_report(
-    certificate: str | Path,
+    certificate: str | Path | Mapping[str, Any] | Certificate,
     output: str | Path,
     *,
     simulation: bool | None = None,
@@ -34,8 +35,8 @@ def write_report(
 
     Parameters
     ----------
-    certificate : path
-        A file of schema ``ptcc-certificate/2``.
+    certificate : path, mapping or Certificate
+        A file of schema ``ptcc-certificate/2``, its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
     simulation : bool, optional
@@ -72,7 +73,8 @@ def write_report(
     path, suffix = Path(output), Path(output).suffix.lower()
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
-    if path.is_file() and Path(certificate).is_file() and path.samefile(certificate):
+    file = None if isinstance(certificate, Certificate | Mapping) else Path(certificate)
+    if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")
     if not path.parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graphs.io import in_node_order
-from ptcc_certify.graphs.rationals import as_fraction, shorten
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.simulation.cvodes import Tolerances
@@ -35,10 +35,11 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    graph: SignedDigraph,
+    graph: Any,
     protocol: Protocol,
     x0: Any,
     *,
+    orientation: str | None = None,
     sigma0: Any = None,
     disturbance: Any = None,
     boundary_layer: float | None = None,
@@ -63,15 +64,17 @@ def simulate(
 
     Parameters
     ----------
-    graph : SignedDigraph
-        N agents.
+    graph : graph-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes.
     protocol : Protocol
         With ``rho2 = 0`` the run is on the plain clock ``t``, without a deadline.
-    x0 : (N,) or (N, S) array of numbers, mapping by label, pandas Series or DataFrame
-        The initial state in the order of ``graph.labels``, or by label where there are labels; S columns are S initial
-        states, or the S components of vector-valued agents: the protocol acts as ``L kron I_S``, so both evolve alike.
-        Sliding mode: one column.
-    sigma0 : (N,) array of numbers, mapping by label or pandas Series, optional
+    x0 : state-like, or N rows of S numbers
+        The initial state in the order of ``graph.labels``, or by label where there are labels: whatever
+        :func:`ptcc_certify.as_state` takes. S columns are S initial states, or the S components of vector-valued
+        agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode: one column.
+    orientation : {"information", "listens"}, optional
+        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+    sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
@@ -133,16 +136,19 @@ def simulate(
     (array([ 0.5, -0.5]), True)
     """
     begin = time.perf_counter()
-    x0, sigma0 = in_node_order(x0, graph), in_node_order(sigma0, graph, "sigma0")
-    initial_states, tolerances = _read_initial_state(graph, x0), Tolerances(rtol, atol)
+    graph, tolerances = as_graph(graph, orientation), Tolerances(rtol, atol)
+    refuse_no_protocol(protocol)
+    initial_state = _floats(x0, graph, "x0")
+    manifold = None if sigma0 is None else _floats(sigma0, graph, "sigma0")
     tolerances.check()
-    other, foreign = "sliding-mode", {"sigma0": sigma0, "boundary_layer": boundary_layer}
+    other = "sliding-mode"
+    foreign: dict[str, Any] = {"sigma0": manifold, "boundary_layer": boundary_layer}
     if protocol.reaching is not None:
         other, foreign = "nominal", {"actuator": actuator, "delta": delta, "noise": noise, "noise_bound": noise_bound}
     for name, value in foreign.items():
         if value is not None:
             raise ParameterError(f"{name} belongs to the {other} protocol; leave it out or change the protocol")
-    if protocol.reaching is not None and (np.ndim(x0) != 1 or np.ndim(sigma0) > 1):
+    if protocol.reaching is not None and (initial_state.ndim > 1 or (manifold is not None and manifold.ndim > 1)):
         raise ParameterError(
             "the sliding mode is simulated from one initial state at a time; give N numbers x0 and sigma0"
         )
@@ -153,12 +159,11 @@ def simulate(
     else:
         instants = wanted_instants(protocol, times)
     until = float(instants.t[-1])
-    initial_state = initial_states[:, 0] if np.ndim(x0) == 1 else initial_states
     with interruptible():
         if (sliding := protocol.reaching) is not None:
             source = "worst-case" if disturbance is None else disturbance
             signal = as_disturbance(source, graph.n_nodes, sliding.delta, until)
-            manifold = np.zeros(graph.n_nodes) if sigma0 is None else _read_initial_state(graph, sigma0, "sigma0")[:, 0]
+            manifold = np.zeros(graph.n_nodes) if manifold is None else manifold
             run: Trajectory = simulate_sliding(
                 graph, sliding, initial_state, manifold, signal, instants, tolerances, boundary_layer
             )
@@ -168,29 +173,7 @@ def simulate(
     return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - begin})
 
 
-def _read_initial_state(graph: SignedDigraph, x0: Any, name: str = "x0") -> np.ndarray:
-    """Return the initial state as an (N, S) float array."""
-    try:
-        array = np.asarray(x0)
-    except ValueError:
-        raise ParameterError(f"the initial state {name} has rows of different lengths") from None
-    n = graph.n_nodes
-    if array.ndim not in (1, 2) or array.shape[0] != n or array.size == 0:
-        shape = " x ".join(map(str, array.shape)) or "a single number"
-        raise ParameterError(
-            f"the initial state {name} has shape {shape}; give {n} numbers, or {n} rows, one for each agent"
-        )
-    if array.dtype.kind in "OU":
-        try:
-            array = np.array([float(as_fraction(v, name)) for v in array.ravel()]).reshape(array.shape)
-        except (NumberError, OverflowError) as error:
-            raise ParameterError(f"the initial state {name}: {error}") from None
-    if array.dtype.kind not in "iuf":
-        raise ParameterError(f"the initial state {name} holds real numbers, not {array.dtype}")
-    array = array.astype(float).reshape(n, -1)
-    if not np.isfinite(array).all():
-        row, column = np.argwhere(~np.isfinite(array))[0]
-        raise ParameterError(
-            f"the initial {name} of agent {shorten(graph.labels[row])} is {array[row, column]}, not a finite number"
-        )
-    return array
+def _floats(values: Any, graph: SignedDigraph, name: str) -> np.ndarray:
+    """Return a state as an (N,) array, or N rows of S numbers as an (N, S) array."""
+    states = np.array([[float(x) for x in row] for row in as_states(values, graph, name)])
+    return states if states.shape[1] > 1 or getattr(values, "ndim", 1) == 2 else states[:, 0]

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.display_hook import Shown, plot
+from ptcc_certify.graphs.equality import ByValue
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.tables import import_pandas
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol, ReachingProtocol
     from ptcc_certify.protocols.gain_limits import GainLimits
@@ -23,7 +28,7 @@ RESOLVED = 100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Shown):
+class Trajectory(ByValue, Shown):
     """The states of N agents at M instants.
 
     Attributes
@@ -79,7 +84,7 @@ class Trajectory(Shown):
     atol: float
     deadline_index: int | None
     deadline_residual: float | None
-    stats: Mapping[str, float]
+    stats: Mapping[str, float] = field(compare=False)
     actuator: GainLimits | None = field(default=None, kw_only=True)
     forcing: str | None = field(default=None, kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
@@ -165,6 +170,62 @@ class Trajectory(Shown):
         if not near.size:
             raise ParameterError(f"no instant of the trajectory is {fraction} T; simulate with times=[{wanted}]")
         return self.states[..., near[0]]
+
+    def __getitem__(self, label: Hashable) -> np.ndarray:
+        """(M,) or (S, M) array: the states of one agent."""
+        if str(label) not in self.graph:
+            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
+            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
+        return self.states[self.graph.index[str(label)]]
+
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.states, dtype=dtype)
+
+    def plot(self, what: str = "states", **keywords: Any) -> Any:
+        """Draw the run: its ``"states"``, ``"input"`` or ``"graph"``.
+
+        Parameters
+        ----------
+        what : str
+        **keywords : Any
+            ``ax`` and others of :func:`ptcc_certify.plot_trajectory`, ``plot_input``, ``plot_graph``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return plot(self, what, **keywords)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the states as a DataFrame: one row per instant, indexed by ``t``, one column per agent.
+
+        Of S components or initial states the columns are pairs ``(label, 1 .. S)``.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
+        >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_pandas().loc[0.0].to_dict()
+        {'a': 1.0, 'b': 0.0}
+        """
+        pandas, columns = import_pandas(), list(self.labels)
+        names: Any = pandas.Index(columns, name="node")
+        if self.states.ndim == 3:
+            numbers = range(1, self.states.shape[1] + 1)
+            names = pandas.MultiIndex.from_product([columns, numbers], names=["node", "component"])
+        return pandas.DataFrame(
+            self.states.reshape(-1, self.t.size).T, index=pandas.Index(self.t, name="t"), columns=names
+        )
 
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,...`` as text, one row per instant, floats in full.

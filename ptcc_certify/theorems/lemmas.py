@@ -20,6 +20,7 @@ import lmi
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs import size_limits as limits
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
 
 EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES, limits.FACTOR_NODES
@@ -27,12 +28,12 @@ EXACT_NODES, DENSE_NODES, FACTOR_NODES = limits.EXACT_NODES, limits.DENSE_NODES,
 _NEAREST, _PRODUCTS, _RESTARTS = 8, 2000, 50
 
 
-def gauge(graph: SignedDigraph) -> np.ndarray | None:
+def gauge(graph: Any) -> np.ndarray | None:
     """Lemma 1: a graph is structurally balanced iff some diagonal ``G`` of signs has ``G L G = M(L)``.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
 
     Returns
     -------
@@ -44,6 +45,7 @@ def gauge(graph: SignedDigraph) -> np.ndarray | None:
     >>> gauge(SignedDigraph.from_edges([(1, 2, -3), (2, 3, 1)]))
     array([ 1, -1, -1], dtype=int8)
     """
+    graph = as_graph(graph)
     return analyse(graph).gauge
 
 
@@ -68,7 +70,7 @@ class Spectrum:
         return float(2 * self.nonzero.real.min()) if self.nonzero.size else None
 
 
-def laplacian_spectrum(structure: Structure) -> Spectrum:
+def laplacian_spectrum(structure: Any) -> Spectrum:
     """Lemma 2: a strong graph is unbalanced iff every eigenvalue of ``L`` has positive real part.
 
     If it is balanced, 0 is simple (eigenvector ``G 1``) and the others have positive real part. For any graph the
@@ -76,7 +78,7 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure or graph-like
         Of strong components above ``DENSE_NODES`` nodes only the eigenvalues nearest to 0 are computed, by Arnoldi's
         method; above ``FACTOR_NODES`` that takes too long.
 
@@ -90,6 +92,7 @@ def laplacian_spectrum(structure: Structure) -> Spectrum:
     >>> laplacian_spectrum(analyse(g)).nonzero.real.round(6).tolist()
     [2.0, 4.0]
     """
+    structure = analyse(structure)
     balanced = {c.nodes[0] for c in structure.closed_components if c.balanced}
     values: list[np.ndarray] = []
     for nodes, block in component_blocks(structure):
@@ -164,7 +167,7 @@ def _nearest_eigenvalues(block: Any) -> np.ndarray:
     return np.asarray(eigenvalues)
 
 
-def left_vector(graph: SignedDigraph) -> np.ndarray:
+def left_vector(graph: Any) -> np.ndarray:
     """Lemma 2.3: the positive ``p`` with ``p' M(L) = 0`` and ``p' 1 = 1`` of a strongly connected graph.
 
     Computed without subtractions (Grassmann, Taksar, Heyman 1985), hence to full relative accuracy in each entry
@@ -173,7 +176,7 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
         Strongly connected.
 
     Returns
@@ -190,6 +193,7 @@ def left_vector(graph: SignedDigraph) -> np.ndarray:
     >>> left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)]))
     array([0.75, 0.25])
     """
+    graph = as_graph(graph)
     if graph.n_nodes > DENSE_NODES:
         return np.full(graph.n_nodes, 1 / graph.n_nodes) if _all_ones(graph) else _sparse_left_vector(graph)
     rate = np.abs(graph.dense_laplacian())
@@ -283,12 +287,12 @@ def dyadic_left_vector(graph: SignedDigraph, p: np.ndarray | None = None) -> lis
     return whole if _annihilates(graph, whole) else None
 
 
-def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
+def exact_left_vector(graph: Any) -> list[Fraction]:
     """Lemma 2.3 in exact rationals (see :func:`left_vector`); for graphs of at most ``EXACT_NODES`` nodes.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
         Strongly connected.
 
     Returns
@@ -306,6 +310,7 @@ def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
     >>> exact_left_vector(SignedDigraph.from_edges([(1, 2, -3), (2, 1, 1)]))
     [Fraction(3, 4), Fraction(1, 4)]
     """
+    graph = as_graph(graph)
     n, L = graph.n_nodes, graph.exact_laplacian()
     # p' M(L) = 0 has rank n - 1; its last equation gives way to p' 1 = 1.
     system = [[L[j][i] if i == j else -abs(L[j][i]) for j in range(n)] for i in range(n - 1)] + [[Fraction(1)] * n]
@@ -315,12 +320,12 @@ def exact_left_vector(graph: SignedDigraph) -> list[Fraction]:
     return [row[0] for row in p]
 
 
-def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) -> float:
+def algebraic_connectivity(graph: Any, p: np.ndarray | None = None) -> float:
     """Lemma 3.1: ``a(L) = min xi' Lbar xi / xi' P xi`` over ``xi' G p = 0``, ``Lbar = (P L + L' P) / 2``.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
         Strongly connected, structurally balanced, N >= 2.
     p : (N,) array, optional
         :func:`left_vector` by default.
@@ -340,6 +345,7 @@ def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) ->
     >>> round(algebraic_connectivity(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])), 12)
     2.0
     """
+    graph = as_graph(graph)
     if graph.n_nodes < 2:
         raise HypothesisError("a(L) needs at least two nodes")
     if gauge(graph) is None:
@@ -350,12 +356,12 @@ def algebraic_connectivity(graph: SignedDigraph, p: np.ndarray | None = None) ->
     return float(np.linalg.eigvalsh((S + S.T) / 2)[1])
 
 
-def unbalanced_lyapunov(graph: SignedDigraph) -> lmi.DiagonalCertificate:
+def unbalanced_lyapunov(graph: Any) -> lmi.DiagonalCertificate:
     """Lemma 3.2: a diagonal ``Omega > 0`` with ``Omega L + L' Omega > 0`` of an unbalanced strong graph.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
         Strongly connected and structurally unbalanced.
 
     Returns
@@ -374,6 +380,7 @@ def unbalanced_lyapunov(graph: SignedDigraph) -> lmi.DiagonalCertificate:
     >>> round(unbalanced_lyapunov(g).rate, 6)
     2.0
     """
+    graph = as_graph(graph)
     structure = analyse(graph)
     if structure.connectivity != "strong":
         raise HypothesisError(f"Lemma 3.2 asks for a strongly connected graph; this one is {structure.connectivity}")
@@ -400,12 +407,12 @@ def unbalanced_diagonal(graph: SignedDigraph) -> np.ndarray:
         return p / p.max()
 
 
-def follower_lyapunov(structure: Structure) -> lmi.DiagonalCertificate:
+def follower_lyapunov(structure: Any) -> lmi.DiagonalCertificate:
     """Lemmas 7, 9.1: ``L_F`` is a nonsingular H-matrix; some diagonal ``Xi_F > 0`` has ``Xi_F L_F + L_F' Xi_F > 0``.
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure or graph-like
         With followers.
 
     Returns
@@ -423,13 +430,14 @@ def follower_lyapunov(structure: Structure) -> lmi.DiagonalCertificate:
     >>> follower_lyapunov(analyse(SignedDigraph.from_edges([(1, 2, -4)]))).rate
     8.0
     """
+    structure = analyse(structure)
     F = structure.followers
     if F.size == 0:
         raise HypothesisError("the graph has no followers")
     return lmi.h_matrix_lyapunov(structure.graph.laplacian()[F][:, F])
 
 
-def containment_weights(structure: Structure) -> np.ndarray:
+def containment_weights(structure: Any) -> np.ndarray:
     """Lemmas 8 and 9.2: ``varpi_k = -L_F^-1 L_FLk G_k 1``, the pull of balanced closed component k on each follower.
 
     Absolute row sums are at most 1. With one closed component (Lemma 8) the column is ``zeta``, and ``|zeta| = 1``
@@ -437,7 +445,7 @@ def containment_weights(structure: Structure) -> np.ndarray:
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure or graph-like
 
     Returns
     -------
@@ -450,6 +458,7 @@ def containment_weights(structure: Structure) -> np.ndarray:
     >>> containment_weights(analyse(g))
     array([[ 0.25, -0.75]])
     """
+    structure = analyse(structure)
     from scipy.sparse.linalg import splu
 
     balanced, F = [c for c in structure.closed_components if c.balanced], structure.followers
@@ -465,12 +474,12 @@ def containment_weights(structure: Structure) -> np.ndarray:
     return np.asarray(factor.solve(-scale[:, None] * (rows @ ends)))
 
 
-def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
+def exact_containment_weights(structure: Any) -> list[list[Fraction]]:
     """Lemmas 8 and 9.2 in exact rationals (see :func:`containment_weights`), as rows.
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure or graph-like
 
     Returns
     -------
@@ -488,6 +497,7 @@ def exact_containment_weights(structure: Structure) -> list[list[Fraction]]:
     >>> exact_containment_weights(analyse(g))
     [[Fraction(1, 3), Fraction(-2, 3)]]
     """
+    structure = analyse(structure)
     F = structure.followers.tolist()
     balanced = [c for c in structure.closed_components if c.balanced]
     if not F or not balanced:

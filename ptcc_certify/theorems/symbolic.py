@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol, SlidingModeProtocol
 from ptcc_certify.protocols.casadi_latex import to_latex
@@ -101,12 +101,12 @@ class SymbolicLyapunov:
         return f"${self.latex()}$"
 
 
-def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Protocol) -> SymbolicLyapunov:
+def symbolic_lyapunov(structure: Any, V: LyapunovFunction, protocol: Protocol) -> SymbolicLyapunov:
     """Write ``E``, ``V`` and ``V'`` of a theorem row as CasADi expressions.
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure or graph-like
     V : LyapunovFunction
         From the theorem that applies to the graph (``certificate.lyapunov``).
     protocol : NominalProtocol or SlidingModeProtocol
@@ -131,6 +131,7 @@ def symbolic_lyapunov(structure: Structure, V: LyapunovFunction, protocol: Proto
     """
     import casadi as ca
 
+    structure = analyse(structure)
     graph = structure.graph
     protocol = protocol.nominal
     loop = protocol.closed_loop(graph)
@@ -211,12 +212,12 @@ class SymbolicSliding:
         return f"SymbolicSliding({self.x.numel()} agents)"
 
 
-def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> SymbolicSliding:
+def symbolic_sliding(graph: Any, protocol: SlidingModeProtocol) -> SymbolicSliding:
     """Write ``sigma``, ``V`` and ``V'`` of Proposition 1 as CasADi expressions.
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
         N agents.
     protocol : SlidingModeProtocol
 
@@ -233,6 +234,7 @@ def symbolic_sliding(graph: SignedDigraph, protocol: SlidingModeProtocol) -> Sym
     """
     import casadi as ca
 
+    graph = as_graph(graph)
     loop, n = protocol.closed_loop(graph), graph.n_nodes
     t, x, varsigma = loop["t"], loop["x"][:n], loop["x"][n:]
     sigma = x + varsigma

@@ -10,8 +10,12 @@ Corollaries 1 to 5.
 from __future__ import annotations
 
 from copy import copy
+from typing import Any
 
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.claims import sliding_number
 from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
 from ptcc_certify.theorems.strong import BalancedStrong, UnbalancedStrong
@@ -40,13 +44,14 @@ _SLIDING: tuple[Theorem, ...] = tuple(map(_sliding_mode, _NOMINAL))
 THEOREMS: tuple[Theorem, ...] = (*_NOMINAL, *_SLIDING)
 
 
-def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
+def theorem_for(graph: Any, protocol: str | Protocol = "nominal") -> Theorem:
     """Return the theorem whose hypotheses the graph meets; a disconnected graph takes the composite of Theorem 3 or 6.
 
     Parameters
     ----------
-    structure : Structure
-    protocol : {"nominal", "sliding-mode"}
+    graph : graph-like or Structure
+        Whatever :func:`ptcc_certify.as_graph` takes.
+    protocol : {"nominal", "sliding-mode"} or a protocol
 
     Returns
     -------
@@ -59,5 +64,8 @@ def theorem_for(structure: Structure, protocol: str = "nominal") -> Theorem:
     >>> theorem_for(st).number, theorem_for(st, "sliding-mode").number
     ('1.1', '4.1')
     """
-    rows = _SLIDING if protocol == "sliding-mode" else _NOMINAL
+    structure, kind = analyse(graph), getattr(protocol, "kind", protocol)
+    if kind not in ("nominal", "sliding-mode"):
+        raise ParameterError(f"protocol {shorten(repr(kind))} is unknown; one of nominal, sliding-mode")
+    rows = _SLIDING if kind == "sliding-mode" else _NOMINAL
     return next(theorem for theorem in rows if theorem.applies(structure))

@@ -127,7 +127,7 @@ def test_who_decides_whom():
 
 
 @pytest.mark.parametrize(
-    ("x0", "message"), [([1], "1 values for 2"), ([1, "x"], "not a number"), ([1, float("nan")], "finite")]
+    ("x0", "message"), [([1], "1 value for 2"), ([1, "x"], "not a number"), ([1, float("nan")], "finite")]
 )
 def test_bad_starts_are_refused(x0, message):
     st_ = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
@@ -138,7 +138,7 @@ def test_bad_starts_are_refused(x0, message):
 def test_a_start_by_label():
     st_ = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]))
     assert final_state(st_, {"2": 1, 1: 5}).states == (3, 3)
-    for bad in ({"1": 5}, {"1": 5, "3": 2}, "52", {5, 2}, iter([1, 2])):
+    for bad in ({"1": 5}, {"1": 5, "3": 2}, "52", {5, 2}, iter([1, 2, 3])):
         with pytest.raises(ParameterError, match="x0"):
             final_state(st_, bad)
 

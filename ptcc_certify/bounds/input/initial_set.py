@@ -9,19 +9,19 @@ from typing import Any
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.input_formulas import InitialSet, Linear
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io import by_label, in_node_order
-from ptcc_certify.graphs.rationals import as_fraction
+from ptcc_certify.graphs.io import as_graph, by_label, in_node_order
+from ptcc_certify.graphs.io.initial_state import LARGEST_STATE
+from ptcc_certify.graphs.rationals import as_fraction, writable
 from ptcc_certify.graphs.structure import Structure
 
 
-def initial_set_within(structure: Structure, bound: Any) -> InitialSet:
+def initial_set_within(graph: Any, bound: Any) -> InitialSet:
     """Return all initial states with ``||X(0)||_inf <= bound``.
 
     Parameters
     ----------
-    structure : Structure
-        Of N agents.
+    graph : graph-like or Structure
+        Whatever :func:`ptcc_certify.as_graph` takes.
     bound : int, float, str or Fraction
         Positive, at most 1e300.
 
@@ -37,7 +37,7 @@ def initial_set_within(structure: Structure, bound: Any) -> InitialSet:
 
     Examples
     --------
-    >>> initial_set_within(analyse(SignedDigraph.from_edges([("a", "b", 1)])), "1/2").radius
+    >>> initial_set_within([("a", "b", 1)], "1/2").radius
     (Fraction(1, 2), Fraction(1, 2))
     """
     try:
@@ -48,18 +48,18 @@ def initial_set_within(structure: Structure, bound: Any) -> InitialSet:
         raise ParameterError(
             "the bound of initial states is outside its domain; it must be positive, and at most 1e300"
         )
-    n = structure.graph.n_nodes
+    n = as_graph(graph).n_nodes
     return InitialSet((Fraction(0),) * n, (R,) * n)
 
 
-def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> InitialSet:
+def box(low: Any, high: Any, graph: Any = None) -> InitialSet:
     """Return all initial states with ``low_k <= x_k(0) <= high_k``.
 
     Parameters
     ----------
     low, high : sequences of N numbers, mappings of label to number or pandas Series
         Ints, floats (the dyadic numbers they are), Fractions or texts of the exact grammar.
-    graph : SignedDigraph, optional
+    graph : graph-like, optional
         Needed where there are labels: it has the order of the nodes.
 
     Returns
@@ -90,7 +90,7 @@ def box(low: Any, high: Any, graph: SignedDigraph | None = None) -> InitialSet:
     return InitialSet(tuple((a + b) / 2 for a, b in ends), tuple((b - a) / 2 for a, b in ends))
 
 
-def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = None) -> InitialSet:
+def ellipsoid(center: Any, axes: Sequence[Any], graph: Any = None) -> InitialSet:
     """Return all initial states ``center + sum_j v_j axes_j`` with ``||v||_2 <= 1``.
 
     Parameters
@@ -98,7 +98,7 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = No
     center : sequence of N numbers, mapping of label to number or pandas Series
     axes : sequence of vectors like ``center``
         One semi-axis or more; they need not be orthogonal.
-    graph : SignedDigraph, optional
+    graph : graph-like, optional
         Needed where there are labels: it has the order of the nodes.
 
     Returns
@@ -126,12 +126,32 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: SignedDigraph | None = No
     return InitialSet(middle, axes=vectors)
 
 
-def _without_labels(values: Any, graph: SignedDigraph | None, name: str) -> Any:
+def _without_labels(values: Any, graph: Any, name: str) -> Any:
     if graph is not None:
-        return in_node_order(values, graph, name)
+        return in_node_order(values, as_graph(graph), name)
     if by_label(values, name) is not None:
         raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
     return values
+
+
+def read_initial_set(structure: Structure, initial_set: Any) -> InitialSet:
+    """Return a set of initial states, or refuse it."""
+    if not isinstance(initial_set, InitialSet):
+        return initial_set_within(structure, initial_set)
+    n = structure.graph.n_nodes
+    for name, vector in (("center", initial_set.center), ("radius", initial_set.radius or initial_set.center)):
+        if len(vector) != n:
+            raise ParameterError(f"{name} of the initial states has {len(vector)} entries for {n} agents")
+    if any(len(axis) != n for axis in initial_set.axes):
+        raise ParameterError(f"an axis of the initial states has another number of entries than {n} agents")
+    if initial_set.radius and initial_set.axes:
+        raise ParameterError("initial states have a radius, for a box, or axes, for an ellipsoid; leave one out")
+    if any(r < 0 for r in initial_set.radius):
+        raise ParameterError("a radius of the initial states is negative")
+    numbers = [x for vector in (initial_set.center, initial_set.radius, *initial_set.axes) for x in vector]
+    if any(abs(x) > LARGEST_STATE or not writable(Fraction(x)) for x in numbers):
+        raise ParameterError("the initial states are beyond 1e300, or have too many digits to keep")
+    return initial_set
 
 
 def ways(influence: Influence) -> list[Linear]:

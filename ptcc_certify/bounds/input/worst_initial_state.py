@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ptcc_certify.checker.input_formulas import InitialSet
+from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import refuse_no_protocol
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class WorstInitialState:
 
 
 def worst_initial_state(
-    structure: Structure, protocol: Protocol, initial_set: InitialSet, *, samples: int = 120, latest: float = 14.0
+    graph: Any, protocol: Protocol, initial_set: Any, *, samples: int = 120, latest: float = 14.0
 ) -> WorstInitialState:
     """Return the initial state with the largest ``|u_k(t)|`` under the nominal part of the protocol (numerical).
 
@@ -54,11 +56,11 @@ def worst_initial_state(
 
     Parameters
     ----------
-    structure : Structure
-        Of N agents.
+    graph : graph-like or Structure
+        Whatever :func:`ptcc_certify.as_graph` takes.
     protocol : Protocol
-    initial_set : InitialSet
-        Of N numbers.
+    initial_set : InitialSet or positive number
+        Of N numbers; a number ``R`` stands for ``||X(0)||_inf <= R``.
     samples : int
         Number of instants.
     latest : float
@@ -75,12 +77,15 @@ def worst_initial_state(
     Examples
     --------
     >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]))
-    >>> worst = worst_initial_state(pair, NominalProtocol(1, 1, 1, 1), initial_set_within(pair, 3))
+    >>> worst = worst_initial_state(pair, NominalProtocol(1, 1, 1, 1), 3)
     >>> worst.x0, worst.t, worst.size
     (array([-3., -3.]), 0.0, 12.0)
     """
     from scipy.linalg import expm
 
+    refuse_no_protocol(protocol)
+    structure = analyse(graph)
+    initial_set = read_initial_set(structure, initial_set)
     L = structure.graph.dense_laplacian()
     center = np.array([nearest_float(x) for x in initial_set.center])
     radius = np.array([nearest_float(x) for x in initial_set.radius]) if initial_set.radius else np.zeros(len(center))

@@ -78,8 +78,14 @@ def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
     return None
 
 
-def _header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
-    """Return the columns of source, target and weight if a row is a header, else None."""
+def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
+    """Return the columns of source, target and weight if a row is a header, else None.
+
+    Examples
+    --------
+    >>> header(["weight", "from", "to"], "a.csv, line 1"), header(["a", "b", "1"], "a.csv, line 1")
+    ((1, 2, 0), None)
+    """
     source, target = column(row, _SOURCE, place), column(row, _TARGET, place)
     if source is None or target is None:
         return None
@@ -99,17 +105,17 @@ def read_edge_list(data: bytes, name: str) -> Rows:
     nodes, weights = Numbers(), Numbers()
     first, second, codes, numbers = [], [], [], []
     ignored: dict[str, None] = {}
-    started = header = False
+    started = named = False
     width, (s, t, w) = 3, (0, 1, 2)
     for number, row in records(data, name):
         if not started and len(row) > 1:
             started = True
-            if columns := _header([field.strip() for field in row], f"{name}, line {number}"):
-                header, width, (s, t, w) = True, len(row), columns
+            if columns := header([field.strip() for field in row], f"{name}, line {number}"):
+                named, width, (s, t, w) = True, len(row), columns
                 ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
                 continue
         if len(row) > width and any(map(str.strip, row[width:])):
-            ignored["beyond the header" if header else "after the third"] = None
+            ignored["beyond the header" if named else "after the third"] = None
         try:
             source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
         except LookupError:
@@ -122,7 +128,7 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         numbers.append(number)
     notes = ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
     rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
-    rows.headerless, rows.notes = not header, notes
+    rows.headerless, rows.notes = not named, notes
     return rows
 
 

@@ -1,10 +1,10 @@
-"""Starts: one exact number for each node, from a text or a file, or random."""
+"""The gate for states: one exact number for each node, from whatever form a user holds them in, or random."""
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -14,10 +14,114 @@ from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCEr
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.edge_list import column, records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
-from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.rationals import as_fraction, parse_exact, shorten
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")
+
+
+#: Largest entry of an initial state, in size: final states and trajectories are also reported as floats.
+LARGEST_STATE = Fraction(10**300)
+
+
+def as_state(values: Any, graph: SignedDigraph, name: str = "x0") -> list[Fraction]:
+    """Return one exact number for each node, in node order, from whatever form a user holds them in.
+
+    Every function that takes a state takes all of these.
+
+    Parameters
+    ----------
+    values : state-like
+        - N numbers in node order: a list, tuple or array of ints, floats (the dyadic numbers they are), Fractions or
+          texts of the exact grammar;
+        - by label, in any order: a mapping or a pandas Series, or a DataFrame of one column;
+        - a text or a path as :func:`read_state` takes it: ``"5,2,-4"``, ``"b=2, a=1"``, ``"state.csv"``;
+        - ``"random"``: the state that ``ptcc certify`` draws.
+    graph : SignedDigraph
+        N nodes.
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    list of N Fraction
+
+    Raises
+    ------
+    ParameterError
+        The number of values is not N, a label is that of no node, or an entry is not a finite number, or beyond 1e300.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> as_state([1, "0.1"], graph), as_state({"b": 0.5, "a": 1}, graph), as_state("b=2, a=1", graph)
+    ([Fraction(1, 1), Fraction(1, 10)], [Fraction(1, 1), Fraction(1, 2)], [Fraction(1, 1), Fraction(2, 1)])
+    """
+    rows = as_states(values, graph, name)
+    if (size := len(rows[0])) != 1:
+        raise ParameterError(
+            f"the initial state {name} has {size} numbers for each agent; give one, or ask certify_vectors"
+        )
+    return [row[0] for row in rows]
+
+
+def as_states(values: Any, graph: SignedDigraph, name: str = "x0") -> list[list[Fraction]]:
+    """Return S exact numbers for each node: what :func:`as_state` takes, or N rows of S numbers, by label or in order.
+
+    Returns
+    -------
+    list of N lists of S Fraction
+
+    Raises
+    ------
+    ParameterError
+        As :func:`as_state`, or rows differ in length.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", 1)])
+    >>> as_states({"b": [3, 4], "a": [1, 2]}, graph) == as_states([[1, 2], [3, 4]], graph)
+    True
+    """
+    if isinstance(values, str) and values.strip() == "random":
+        return random_states([0, 1] if name == "sigma0" else 0, graph.n_nodes)  # what the command line draws
+    if isinstance(values, str | os.PathLike):
+        try:
+            state = read_state(values, graph)
+        except PTCCError as error:
+            raise type(error)(f"{name}: {error}") from None
+        return [[_checked(x, label, name)] for label, x in zip(graph.labels, state, strict=True)]
+    what, mend = f"the initial state {name}", f"give one number for each of {_some(graph.labels)}"
+    if isinstance(values, set | frozenset | bytes | bytearray):
+        raise ParameterError(f"{what} is {shorten(repr(values))}, which has no order; {mend}")
+    values = in_node_order(values.toarray() if hasattr(values, "tocoo") else values, graph, name)
+    if not isinstance(values, Iterable) or not getattr(values, "ndim", True):
+        raise ParameterError(f"{what} is {'missing' if values is None else shorten(repr(values))}; {mend}")
+    rows = [list(row) if _is_row(row) else [row] for row in values]
+    if len(rows) != graph.n_nodes:
+        count = f"{len(rows)} value{'s' * (len(rows) != 1)} for {graph.n_nodes} agents"
+        raise ParameterError(f"{what} has {count}; {mend}")
+    if len({len(row) for row in rows}) > 1 or not rows[0]:
+        raise ParameterError(f"{what} has empty rows, or rows of different lengths; give as many numbers to each agent")
+    return [[_checked(x, label, name) for x in row] for label, row in zip(graph.labels, rows, strict=True)]
+
+
+def _is_row(entry: Any) -> bool:
+    return isinstance(entry, list | tuple) or getattr(entry, "ndim", 0) > 0
+
+
+def _checked(value: Any, label: str, name: str) -> Fraction:
+    """Return an entry as a rational, or refuse it by agent."""
+    if type(value) is not Fraction:
+        where = f"{name} of agent {shorten(label)}"
+        try:
+            value = as_fraction(value, where)
+        except NumberError as error:
+            text = str(error)
+            raise ParameterError(text if text.startswith(where) else f"{where}: {text}") from None
+    if abs(value) > LARGEST_STATE:
+        raise ParameterError(f"{name} of agent {shorten(label)} is beyond 1e300; choose another unit")
+    return value
 
 
 def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> list[Fraction]:
@@ -70,7 +174,7 @@ def read_state(text_or_path: str | os.PathLike[str], graph: SignedDigraph) -> li
 def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
     """Put one entry for each node in node order: by label where there are labels, otherwise as they come.
 
-    Every state that a user hands in passes here, so that a label counts wherever there is one.
+    Everything that has an entry for each node passes here, so that a label counts wherever there is one.
 
     Parameters
     ----------
@@ -126,6 +230,10 @@ def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
         labels, entries = [str(label) for label in values], list(values.values())
     elif (beside := labels_beside(values)) is not None:
         labels, entries = beside, list(values.to_numpy())
+        names = [str(title) for title in getattr(values, "columns", ())]
+        node, value = column(names, _NODE, name), column(names, _VALUE, name)
+        if node is not None and value is not None and len(names) == 2:  # a table as in a file
+            labels, entries = [str(label) for label in values.iloc[:, node]], list(values.iloc[:, value])
     else:
         return None
     result = dict(zip(labels, entries, strict=True))

@@ -4,34 +4,60 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
+from ptcc_certify.report.plots.subject import require_same, trajectory_of
+from ptcc_certify.simulation.trajectory import Trajectory
 
-#: Horizontal axes of the decay, and their labels.
-_DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time, $t/T$", "clock": "stretched clock $s(t)$"}
+#: Horizontal axes of the decay, and their labels; that of time has a unit.
+_DECAY_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
+#: What is drawn below the integrator's floor, as a share of it.
+_BELOW_FLOOR = 1e-2
+#: 1 - t/T down to which bounds are drawn where there is no run, and how many instants.
+_LAST, _INSTANTS = 1e-8, 401
+#: The name of the best bound among those of the Lyapunov functions.
+_BEST = "best"
 
 
 @styled
-def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = "left") -> Axes:
-    """Draw ``||E(t)|| / ||E(0)||`` of the simulated run under its proved bounds; the vertical axis is logarithmic.
+def plot_decay(
+    subject: Any,
+    *,
+    ax: Axes | None = None,
+    certificate: Certificate | None = None,
+    axis: str = "left",
+    each: bool = True,
+    time_unit: str = "",
+) -> Axes:
+    r"""Draw ``||E(t)|| / ||E(0)||``, ``E = -L X``, of a run under its proved bounds; the vertical axis is logarithmic.
 
-    Thick: the bound, the best of all proved Lyapunov functions at every instant. Thin: each of them. Dashed: the
-    paper's. Dotted: the integrator's floor, below which the run says nothing. If only Theorem 1.1's own coordinates
-    were proved, ``||eps(t)||`` instead.
+    Thick: the bound ``min_i sqrt(e^(-rate_i s(t)) V_i(0) / lmin(P_i))``, the best of all proved Lyapunov functions at
+    every instant. Thin: each of them. Dashed: the paper's. If only Theorem 1.1's own coordinates were proved,
+    ``||eps(t)||`` instead. The run, with circles, is drawn down to the integrator's floor, its tolerance times the
+    size of the states times what ``E`` multiplies them by: below, a run says nothing.
 
     Parameters
     ----------
-    certificate : Certificate
-        With a trajectory and a proved rate.
+    subject : Certificate or Trajectory
+        A certificate with an initial state and a proved rate; without a run its bounds alone are drawn
+        (``certificate.with_simulation()`` adds one). A trajectory without ``certificate`` is drawn alone.
     ax : Axes, optional
+    certificate : Certificate, optional
+        Of the graph, protocol and initial state of a trajectory, whose bounds are drawn over it.
     axis : {"left", "time", "clock"}
-        Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or ``t/T``; or the stretched
-        clock ``s(t)``, on which each bound is a straight line where nothing but a rate is at work.
+        Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or the time ``t``; or the
+        stretched clock ``s(t)``, on which each bound is a straight line where nothing but a rate is at work.
+    each : bool
+        Whether every Lyapunov function is drawn, or the best bound alone.
+    time_unit : str
+        Of the deadline, for the label of the axis of time.
 
     Returns
     -------
@@ -39,55 +65,113 @@ def plot_decay(certificate: Certificate, ax: Axes | None = None, *, axis: str = 
 
     Raises
     ------
-    ValueError
-        There is nothing to draw, or an unknown axis.
+    ParameterError
+        There is nothing to draw, the certificate is of another graph, protocol or initial state, or an unknown axis.
 
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]
-    ['remaining time, $1 - t/T$', 'time, $t/T$', 'stretched clock $s(t)$']
+    ['remaining time, $1 - t/T$', 'time $t$ (unit of $T$)', 'stretched clock $s(t)$']
+    >>> [line.get_label() for line in plot_decay(cert.trajectory).lines]
+    ['simulated (CVODES)', "integrator's floor"]
     """
     if axis not in _DECAY_AXES:
-        raise ValueError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
-    run, envelope, x0 = certificate.trajectory, certificate.envelope, certificate.initial_state
-    if run is None or x0 is None or certificate.comparison is None or not envelope.functions:
-        raise ValueError("the certificate holds no simulated run with a proved bound")
-    ax, before = axes_of(ax), run.remaining > 0
-    unit = float(np.abs(run.states).max(initial=0)) or 1.0  # in which squares neither overflow nor vanish
-    remaining, states = run.remaining[before], run.states[:, before] / unit
-    place = {"left": remaining, "time": 1 - remaining, "clock": run.clock[before]}[axis]
-    functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
-    norm = np.linalg.norm(functions[0].coordinates_of(states, certificate.graph.laplacian()), axis=0)
-    bound = envelope.norm_bound(remaining, x0) / unit
-    scale = float(norm[0]) or float(bound[0])
+        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    proved = subject if isinstance(subject, Certificate) else certificate
+    run = None if isinstance(subject, Certificate) and subject.trajectory is None else trajectory_of(subject)
+    if proved is not None:
+        _require_bounds(proved, run)
+    remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
+    norm, floor, unit = error_norm(run or subject, proved)
+    bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
+    best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
+    scale = float(norm[0]) or (float(best[0]) if bounds else 0.0)
     if scale == 0:
-        raise ValueError("the agents begin where they end: nothing decays")
-    for number, function in enumerate(functions if len(functions) > 1 else ()):
-        alone = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit / scale
-        if function.kind == "paper":
-            ax.plot(place, alone, color="black", linewidth=0.9, linestyle="--", label="the paper's")
-        else:
-            label = "each Lyapunov function" if all(m.kind == "paper" for m in functions[:number]) else None
-            ax.plot(place, alone, color=BOUND, linewidth=0.7, alpha=0.55, label=label)
-    ax.plot(place, bound / scale, color=BOUND, linewidth=1.6, label="proved bound")
-    if norm[0] > 0:
-        ax.plot(place, np.maximum(norm / scale, 1e-300), color=RUN, label="simulated (CVODES)")
-        floor = FLOOR_FACTOR * run.rtol * float(np.abs(states).max()) * _row_sum(certificate)
-        ax.axhline(floor / scale, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")
-        least = min(float((norm / scale).min()), floor / scale)
-        ax.set_ylim(max(least, 1e-18) / 3, 3 * max(float((norm / scale).max()), float((bound / scale).max())))
+        raise ParameterError("the agents begin where they end: nothing decays")
+    gain = subject.protocol.gain
+    place = {
+        "left": remaining,
+        "time": float(gain.T) * (1 - remaining),
+        "clock": np.asarray(gain.clock_at_remaining(remaining)),
+    }[axis]
+    ax = axes_of(ax)
+    for values, looks in bounds.values():
+        ax.plot(place, values / scale, **looks)
+    bottom, last = max(float(np.nanmin(best)), 1e-16 * scale), remaining.size - 1
+    if run is not None and norm[0] > 0:
+        bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
+        _draw_run(ax, place, resolved(norm, best, floor) / scale, floor / scale, bottom / scale)
+        last = int(np.flatnonzero((best if bounds else norm) >= bottom)[-1])
     ax.set_yscale("log")
-    if axis == "left":
-        ax.set_xscale("log", subs=[])  # ticks at decades only
-        ax.invert_xaxis()
-    name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    return finished(ax, _DECAY_AXES[axis], rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$")
+    ax.set_ylim(bottom / scale, 3 * max(1.0, float(best[0]) / scale if bounds else 0.0))
+    ax.set_xscale("log" if axis == "left" else "linear")
+    ax.set_xlim(place[0], place[max(last, 1)])
+    name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
+    label = time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
+    return finished(ax, label, rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$")
 
 
-def _row_sum(certificate: Certificate) -> float:
-    """Bound ``||dz||`` for an error of 1 in every state."""
-    if certificate.envelope.coordinates == "eps":
-        return 2 * math.sqrt(certificate.graph.n_nodes)
-    return float(np.linalg.norm(abs(certificate.graph.laplacian()).sum(axis=1)))
+def error_norm(subject: Certificate | Trajectory, certificate: Certificate | None) -> tuple[np.ndarray, float, float]:
+    """Return ``||z||`` at the instants before the deadline, the integrator's floor, and the unit of both.
+
+    ``z`` is ``E``, or the ``eps`` in which a certificate's bounds are. The unit is the largest state, in which squares
+    neither overflow nor vanish. Of a certificate without a run the first instant alone is there.
+    """
+    if isinstance(subject, Trajectory):
+        states, tolerance = subject.states[:, subject.remaining > 0], subject.rtol
+    else:
+        states, tolerance = np.array([[float(x)] for x in subject.initial_state or ()]), 0.0
+    laplacian = subject.graph.laplacian()
+    unit = float(np.abs(states).max(initial=0)) or 1.0
+    if certificate is not None and certificate.envelope.coordinates == "eps":
+        z = certificate.envelope.functions[0].coordinates_of(states / unit, laplacian)
+        multiple = 2 * math.sqrt(len(states))  # bounds ||dz|| for an error of 1 in every state
+    else:
+        z, multiple = laplacian @ (states / unit), float(np.linalg.norm(abs(laplacian).sum(axis=1)))
+    return np.linalg.norm(z, axis=0), FLOOR_FACTOR * tolerance * multiple, unit
+
+
+def resolved(norm: np.ndarray, bound: np.ndarray, floor: float) -> np.ndarray:
+    """Return the norm where a run says something of it: not below the integrator's floor, nor where the bound is."""
+    return np.where((norm > floor) & (bound > floor), norm, np.nan)
+
+
+def _require_bounds(certificate: Certificate, run: Trajectory | None) -> None:
+    if certificate.initial_state is None:
+        raise ParameterError("the certificate has no initial state, from which something decays; certify with x0")
+    if not certificate.envelope.functions:
+        raise ParameterError("the certificate holds no proved bound of a decay")
+    if run is not None:
+        require_same(run, certificate)
+
+
+def _bounds(
+    certificate: Certificate, remaining: np.ndarray, unit: float, each: bool
+) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
+    """Return the bounds of every Lyapunov function in the norm, and the best of all, with how they are drawn."""
+    envelope, x0 = certificate.envelope, certificate.initial_state
+    functions = [m for m in envelope.functions if m.coordinates == envelope.coordinates]
+    bounds: dict[str, tuple[np.ndarray, dict[str, Any]]] = {}
+    label: str | None = "each Lyapunov function"
+    for function in functions if each and len(functions) > 1 else ():
+        values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
+        if function.kind == "paper":
+            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "label": "the paper's"}
+        else:
+            looks = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
+            label = None
+        bounds[function.name] = values, looks
+    best = envelope.norm_bound(remaining, x0) / unit
+    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": "proved bound"})}
+
+
+def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float) -> None:
+    """Draw what a run says, and the floor below which it says nothing, if that is in sight."""
+    if np.isfinite(seen).any():
+        marks: dict[str, Any] = {"marker": "o", "markersize": 2.8, "markerfacecolor": "white", "markevery": 0.1}
+        ax.plot(place, seen, color=RUN, linewidth=1.1, label="simulated (CVODES)", **marks)
+    if bottom < floor:
+        ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
+        ax.axhline(floor, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")

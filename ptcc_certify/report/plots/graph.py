@@ -5,129 +5,195 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import networkx as nx
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.patches import FancyArrowPatch
+from matplotlib.patches import FancyArrowPatch, Polygon
+from scipy.spatial import Delaunay, QhullError
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
+from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.plots.style import CAMP_COLOURS, SINGLE_COLUMN, axes_of, camp_groups, finished, styled
+from ptcc_certify.report.plots.adjacency import draw_adjacency
+from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends
+from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
+from ptcc_certify.report.plots.subject import structure_of
 
-#: Colour and line of an edge from an ally (+1) or an opponent (-1).
-EDGE_STYLES = {1: ("#4477AA", "-", "ally"), -1: ("#AA3344", "--", "opponent")}
-#: Colour and width, in points, of what marks the closed components of a graph.
-HALO = ("#DDDDDD", 22)
+#: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
+GROUND, REACH = "#E2E2E2", 1.5
+#: Size in points of what is written, and characters of a label that fit into a node.
+TEXT_SIZE, INSIDE = 7, 3
+#: Arrows of which each has its weight written at it.
+WEIGHED_ARROWS = 24
+#: Height of the drawing in inches.
+_HEIGHT = 3.4
 
 
 @styled
-def plot_graph(structure: Structure, ax: Axes | None = None) -> Axes:
-    """Draw the signed digraph: arrows in the direction of information, solid from allies, dashed from opponents.
+def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
+    """Draw the signed digraph ``(V, E, W)``: an arrow from ``j`` to ``k`` where ``w_kj != 0``, so that ``k`` listens.
 
-    Nodes have the colours of their camps; leaders are larger and outlined, and a grey ground joins each of
-    their groups, the closed strong components. Up to 40 nodes are labelled. The layout is the same in every run.
+    Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
+    one with two heads. Where weights differ, ``|w_kj|`` is written at up to 24 arrows, and told by widths. Nodes have
+    the colours of their camps; leaders are outlined, and a grey ground lies under each of their groups, the closed
+    strong components. The layout is the same in every run.
+
+    Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
+    followers stand together.
 
     Parameters
     ----------
-    structure : Structure
-        Of up to 300 nodes.
+    subject : Structure, Certificate, Trajectory or graph
     ax : Axes, optional
 
     Returns
     -------
     Axes
 
-    Raises
-    ------
-    ValueError
-        The graph has more than 300 nodes.
-
     Examples
     --------
-    >>> ax = plot_graph(analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])))
-    >>> len(ax.patches), [text.get_text() for text in ax.texts]
-    (3, ['a', 'b', 'c'])
+    >>> ax = plot_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)]))
+    >>> [text.get_text() for text in ax.texts]
+    ['a', 'b', 'c', '1', '2']
     """
-    graph = structure.graph
-    n = graph.n_nodes
-    if n > DRAWN_NODES:
-        raise ValueError(f"graphs are drawn up to {DRAWN_NODES} nodes; this one has {n}")
-    ax, place, many = axes_of(ax, (SINGLE_COLUMN[0], 3.4)), _layout(graph), n > LABELLED_NODES
-    for component in structure.closed_components if structure.followers.size else ():
-        _draw_ground(ax, graph, place, component.nodes)
+    structure = structure_of(subject)
+    graph, ax = structure.graph, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
+    if graph.n_nodes > LABELLED_NODES:
+        return draw_adjacency(ax, structure)
+    width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
+    inside = max(map(len, graph.labels)) <= INSIDE and graph.n_nodes <= FREE_NODES
+    radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5, 10)) if inside else 4.5
+    part = np.full(graph.n_nodes, -1)
+    for number, component in enumerate(structure.closed_components):
+        part[list(component.nodes)] = number
+    margin = 4 * radius if inside else 60  # for labels
+    arrows = arrows_of(graph)
+    place, bends = places_and_bends(arrows, part, radius, (width - margin, height - 4 * radius))
     if structure.followers.size:
-        ax.plot([], [], color=HALO[0], linewidth=6, label="leader group")
-    radius = _draw_nodes(ax, structure, place)
-    looks: dict[int, dict[str, Any]] = {
-        sign: {"color": colour, "linestyle": line, "linewidth": 0.6 if many else 1.1}
-        for sign, (colour, line, _) in EDGE_STYLES.items()
-    }
-    arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5 if many else 9, "connectionstyle": "arc3,rad=0.1"}
-    for source, target, sign in zip(graph.source.tolist(), graph.target.tolist(), graph.sign.tolist(), strict=True):
-        shrunk = {"shrinkA": radius[source], "shrinkB": radius[target]}
-        ax.add_artist(FancyArrowPatch(place[source], place[target], zorder=1, **arrow, **shrunk, **looks[sign]))
-    for sign, (_, _, name) in EDGE_STYLES.items():
-        if (graph.sign == sign).any():
-            ax.plot([], [], label=name, **looks[sign])
-    if not many:
-        _draw_labels(ax, graph.labels, place, radius)
+        for component in structure.closed_components:
+            _draw_ground(ax, graph, place, component.nodes, radius)
+        ax.fill([], [], color=GROUND, label="leader group")
+    _draw_nodes(ax, structure, place, radius)
+    _draw_arrows(ax, arrows, place, bends, radius)
+    written = _draw_labels(ax, graph.labels, place, radius, None if inside else _boxes_along(arrows, place, bends))
+    _draw_weights(ax, arrows, place, bends, written)
     ax.set_aspect("equal")
-    low, high = place.min(axis=0), place.max(axis=0)
-    half = 0.62 * np.maximum(high - low, 0.6 * (max(high - low) or 1.0))  # a path is a line, in axes that are none
-    (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
-    ax.axis((left, right, bottom, top))
+    ax.set_xlim(-width / 2, width / 2)
+    ax.set_ylim(-height / 2, height / 2)
     ax.set_axis_off()
     return finished(ax, "", "")
 
 
-def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray) -> np.ndarray:
-    """Draw the nodes, leaders larger and outlined; return their radii in points."""
+def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
+    """Draw the nodes, those of leaders outlined."""
     group = camp_groups(structure)
-    area = np.where(group != "followers", 1.7, 1.0) * min(max(4000 / group.size, 14), 130)  # points squared
-    for name, colour in CAMP_COLOURS.items():
+    for name, (colour, _) in CAMP_STYLES.items():
         own = group == name
         if own.any():
-            edge, width = (colour, 0.5) if name == "followers" else ("black", 1.1)
+            edge, width = (colour, 0.5) if name == "followers" else ("black", 1.2)
+            looks: dict[str, Any] = {"color": colour, "markeredgecolor": edge, "markeredgewidth": width, "zorder": 3}
             x, y = place[own].T
-            ax.scatter(x, y, area[own], colour, edgecolors=edge, linewidths=width, zorder=2)
-            ax.plot([], [], "o", color=colour, markeredgecolor=edge, markersize=6, label=name)
-    return np.sqrt(area) / 2
+            ax.plot(x, y, "o", markersize=2 * radius, gid="nodes", **looks)
+            ax.plot([], [], "o", markersize=6, label=name, **looks)
 
 
-def _draw_labels(ax: Axes, labels: Sequence[str], place: np.ndarray, radius: np.ndarray) -> None:
-    """Write short labels into the nodes, others above them."""
-    inside = max(map(len, labels)) <= 2
-    colour, va = ("white", "center_baseline") if inside else ("black", "bottom")
-    looks: dict[str, Any] = {"color": colour, "va": va, "ha": "center", "fontsize": 8, "parse_math": False}
-    for v, label in enumerate(labels):
-        offset = (0, 0 if inside else radius[v] + 2)
-        ax.annotate(shorten(label, 12), place[v], offset, textcoords="offset points", **looks)
+def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, radius: float) -> None:
+    """Draw the arrows, wide where the weight is large."""
+    largest = max((a.size for a in arrows), default=1.0)
+    differ = min((a.size for a in arrows), default=1.0) < largest
+    looks: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1, "mutation_scale": 7, "zorder": 2}
+    for arrow, bend in zip(arrows, bends, strict=True):
+        colour, line, _ = EDGE_STYLES[arrow.sign]
+        looks |= {"color": colour, "linestyle": line, "arrowstyle": "<|-|>" if arrow.mutual else "-|>"}
+        width = 0.6 + 1.0 * arrow.size / largest if differ else 0.9
+        ends = place[arrow.source], place[arrow.target]
+        ax.add_artist(FancyArrowPatch(*ends, connectionstyle=f"arc3,rad={bend}", linewidth=width, **looks))
+    for sign, (colour, line, name) in EDGE_STYLES.items():
+        if any(arrow.sign == sign for arrow in arrows):
+            ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
 
 
-def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int]) -> None:
-    """Draw a grey ground under the nodes of a strong component and along its edges."""
-    inside, (colour, width) = np.zeros(graph.n_nodes, dtype=bool), HALO
+def _draw_labels(
+    ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
+) -> list[np.ndarray]:
+    """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
+    looks: dict[str, Any] = {"fontsize": TEXT_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
+    nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
+    if lines is None:
+        for label, p in zip(labels, place, strict=True):
+            ax.annotate(shorten(label), p, color="white", va="center_baseline", **looks)
+        return nodes
+    taken = nodes + lines
+    halo = [patheffects.withStroke(linewidth=2, foreground="white")]
+    for label, p in zip(labels, place, strict=True):
+        text = shorten(label, 12)
+        half = np.array([0.31 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
+        turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
+        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
+        box = _least_covered(spots, half, taken)
+        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
+    return nodes + taken[len(nodes) + len(lines) :]
+
+
+def _draw_weights(
+    ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, taken: list[np.ndarray]
+) -> None:
+    """Write the sizes of the weights at their arrows, if they differ and there are few."""
+    if len({arrow.size for arrow in arrows}) < 2 or len(arrows) > WEIGHED_ARROWS:
+        return
+    ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+    for arrow, bend in zip(arrows, bends, strict=True):
+        text = f"{arrow.size:.3g}"
+        half = np.array([0.33 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
+        shares = np.array([0.5, 0.42, 0.58, 0.34, 0.66, 0.28, 0.72])
+        box = _least_covered(list(arc(place[arrow.source], place[arrow.target], bend, shares)), half, taken)
+        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
+        ax.text(x, y, text, fontsize=TEXT_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
+
+
+def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[np.ndarray]:
+    """Return small boxes along the arrows."""
+    curves = [arc(place[a.source], place[a.target], bend) for a, bend in zip(arrows, bends, strict=True)]
+    return [np.array([*(p - 1.5), *(p + 1.5)]) for curve in curves for p in curve]
+
+
+def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
+    """Return the box about the first of some spots that covers least of the boxes taken, and take it."""
+    boxes = [np.array([*(spot - half), *(spot + half)]) for spot in spots]
+    others = np.array(taken)
+
+    def covered(box: np.ndarray) -> float:
+        sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
+        return float(np.prod(np.maximum(sides, 0), axis=1).sum())
+
+    taken.append(min(boxes, key=covered))
+    return taken[-1]
+
+
+def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
+    """Draw a ground under a leader group: under its nodes, along its edges, and between them where no other node is."""
+    inside, looks = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
     inside[list(nodes)] = True
-    own = inside[graph.source] & inside[graph.target]
-    lines = [(v, v) for v in nodes] + list(zip(graph.source[own].tolist(), graph.target[own].tolist(), strict=True))
-    narrow = width if graph.n_nodes <= LABELLED_NODES else width / 2
-    for source, target in lines:
-        x, y = place[[source, target]].T
-        ax.plot(x, y, color=colour, linewidth=narrow, solid_capstyle="round", zorder=0)
+    own, foreign = inside[graph.source] & inside[graph.target], place[~inside]
+    parts = [place[[v, v]] for v in nodes] + list(place[np.stack([graph.source[own], graph.target[own]], axis=1)])
+    try:
+        corners = Delaunay(place[list(nodes)]).simplices if len(nodes) > 2 else []
+    except QhullError:  # all on a line
+        corners = []
+    for corner in corners:
+        triangle = place[list(nodes)][corner]
+        if not any(_inside(triangle, p) for p in foreign):
+            parts.append(triangle)
+    for part in parts:
+        width = 2 * REACH * radius
+        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", gid="ground", **looks))  # type: ignore[arg-type]
 
 
-def _layout(graph: SignedDigraph) -> np.ndarray:
-    """Return places of the nodes, (N, 2), the same in every run."""
-    plain = nx.Graph(zip(graph.source.tolist(), graph.target.tolist(), strict=True))
-    plain.add_nodes_from(range(graph.n_nodes))
-    if graph.n_nodes > KAMADA_NODES:
-        place = nx.spring_layout(plain, seed=1)
-    else:
-        hops = dict(nx.all_pairs_shortest_path_length(plain))
-        gap = 2 + max(max(row.values()) for row in hops.values())  # between components
-        place = nx.kamada_kawai_layout(plain, {u: {v: hops[u].get(v, gap) for v in plain} for u in plain})
-    points = np.array([place[v] for v in range(graph.n_nodes)])
-    width, height = np.ptp(points, axis=0)
-    return points if width >= height else points[:, ::-1]  # lying, as axes are wider than high
+def _inside(triangle: np.ndarray, point: np.ndarray) -> bool:
+    """Whether a point is in a triangle."""
+    edges, offsets = np.roll(triangle, -1, axis=0) - triangle, point - triangle
+    turns = edges[:, 0] * offsets[:, 1] - edges[:, 1] * offsets[:, 0]
+    return bool((turns > 0).all() or (turns < 0).all())

@@ -2,42 +2,52 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled
-from ptcc_certify.report.plots.trajectory import draw_agents, draw_deadlines
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.plots.agents import NAME_SIZE, draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled, time_label
+from ptcc_certify.report.plots.subject import require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
 RESOLVED_ERROR = 10
-#: Decades of the input that are drawn below its initial size; changes of sign go further down.
+#: An input that grows to so many times its initial size is drawn on a logarithmic axis,
+LARGE_GROWTH = 3
+#: from so many decades below its initial size on; changes of sign go further down.
 INPUT_DECADES = 3
+#: A certified peak is drawn as a line up to so many times the largest input of the run, else named at the top.
+HIGH_PEAK = 2.5
 
 
 @styled
 def plot_input(
-    trajectory: Trajectory, structure: Structure, certificate: Certificate | None = None, ax: Axes | None = None
+    subject: Any, *, ax: Axes | None = None, certificate: Certificate | None = None, time_unit: str = ""
 ) -> Axes:
-    """Draw ``|u_k(t)|`` with camps coloured, and the peak that a certificate of the same initial state proves.
+    """Draw ``|u_k(t)|`` of one run in the colours and lines of the camps, and the peak that a certificate proves.
 
-    The axis of the input is logarithmic, from three decades below its initial size. Behind an actuator it is the
-    input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn
-    where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol,
-    boundary layers. Under caps and stops that ``certificate`` judges, theirs is drawn.
+    Lines and names are those of :func:`plot_trajectory`; of more than eight agents the largest input in each part of
+    the graph is drawn, with a line for the agent whose input is the largest at first. The axis is linear; logarithmic
+    for an input that grows to three times its initial size. Behind an actuator it is the input that acts. Nothing is
+    drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
+    that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Under caps
+    and stops that the certificate judges, theirs is drawn.
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Of one initial state.
-    structure : Structure
-        Of the same graph.
-    certificate : Certificate, optional
-        Of the same graph, protocol and initial state. One of a set of initial states adds nothing.
+    subject : Certificate or Trajectory
+        Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
+    certificate : Certificate, optional
+        Of the same graph, protocol and initial state as a trajectory. One of a set of initial states adds nothing.
+    time_unit : str
+        Of the deadline, for the label of the axis.
 
     Returns
     -------
@@ -45,35 +55,56 @@ def plot_input(
 
     Raises
     ------
-    ValueError
-        The trajectory holds several initial states, or the certificate is of another graph, protocol or initial state.
+    ParameterError
+        The subject leads to no run of one initial state, or the certificate is of another one.
 
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
-    >>> ax = plot_input(run, analyse(pair))
-    >>> len(ax.lines), ax.get_ylabel()
-    (3, 'input $|u_k|$')
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
+    >>> ax = plot_input(cert)
+    >>> ax.get_ylabel(), ax.texts[-1].get_text()
+    ('input $|u_k|$', 'certified peak 16')
     """
-    _require_one_initial_state(trajectory)
-    peak = None if certificate is None else _certified_peak(trajectory, certificate)
-    ax, u = axes_of(ax), _resolved_input(trajectory)
-    size = np.where(np.isnan(u), 0.0, np.abs(u))
-    top = max(float(size.max(initial=0)), peak or 0.0)
-    if top > 0:
+    run, structure = trajectory_of(subject), structure_of(subject)
+    certificate = subject if isinstance(subject, Certificate) else certificate
+    peak = None if certificate is None else _certified_peak(run, certificate)
+    ax, size = axes_of(ax), np.abs(_resolved_input(run))
+    hold = run.held_input is not None
+    named = draw_agents(ax, run, size, structure, size=True, drawstyle="steps-post" if hold else "default")
+    largest = np.nan_to_num(size)
+    first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
+    shown = peak is not None and (peak <= HIGH_PEAK * top or top == 0)
+    height = max(top, peak or 0.0) if shown else top
+    if first and top > LARGE_GROWTH * first:
         ax.set_yscale("log", nonpositive="clip")
-        first = float(size[:, 0].max(initial=0)) if u.shape[1] else 0.0
-        ax.set_ylim((first or top) * 10.0**-INPUT_DECADES, top * 2)
-    hold = trajectory.held_input is not None
-    draw_agents(trajectory, np.abs(u), structure, ax, drawstyle="steps-post" if hold else "default")
+        ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
+    else:
+        ax.set_ylim(0, 1.12 * height or 1)
     if peak is not None:
-        ax.axhline(peak, color="black", linewidth=0.9, linestyle="--", label="certified peak")
-    return finished(ax, "time $t$", "input $|u_k|$")
+        _draw_peak(ax, peak, shown)
+    draw_deadlines(ax, run)
+    name_agents(ax, run, size, named)
+    return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$")
+
+
+def _draw_peak(ax: Axes, peak: float, shown: bool) -> None:
+    """Draw the certified peak with its value, rounded up; at the top, if it is far above what is drawn."""
+    ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
+    looks: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
+    if not shown:
+        text = f"certified peak {up(peak, 3)}, above"
+        ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **looks)
+        return
+    ax.axhline(peak, color="black", linewidth=0.9, linestyle="--")
+    text = f"certified peak {up(peak, 3)}"
+    ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **looks)
 
 
 @styled
-def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, ax: Axes | None = None) -> Axes:
+def plot_effort(
+    subject: Any, *, ax: Axes | None = None, certificate: Certificate | None = None, time_unit: str = ""
+) -> Axes:
     """Draw the energy spent so far, ``int_0^t ||u||^2 dt``, and the bound that a certificate proves for it.
 
     The integral is numerical: between the samples ``||u||^2`` is taken for an exponential of ``ln(T/(T - t))``, as it
@@ -82,11 +113,13 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Of one initial state.
-    certificate : Certificate, optional
-        Of the same graph, protocol and initial state.
+    subject : Certificate or Trajectory
+        Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
+    certificate : Certificate, optional
+        Of the same graph, protocol and initial state as a trajectory.
+    time_unit : str
+        Of the deadline, for the label of the axis.
 
     Returns
     -------
@@ -94,34 +127,29 @@ def plot_effort(trajectory: Trajectory, certificate: Certificate | None = None, 
 
     Raises
     ------
-    ValueError
-        The trajectory holds several initial states, the energy is beyond the range of floats or not settled by the
+    ParameterError
+        The subject leads to no run of one initial state, the energy is beyond the range of floats or not settled by the
         samples, or the certificate is of another graph, protocol or initial state.
 
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
-    >>> ax = plot_effort(cert.trajectory, cert)
-    >>> [line.get_label() for line in ax.lines]
-    ['simulated (CVODES)', 'certified bound', 'deadline']
+    >>> [line.get_label() for line in plot_effort(cert).lines]
+    ['simulated (CVODES)', 'certified bound', 'deadline $T$']
     """
-    _require_one_initial_state(trajectory)
-    effort, bound = None if certificate is None else _certified_effort(trajectory, certificate), None
-    if effort is not None and effort.energy is not None and not (trajectory.actuator or trajectory.sliding):
+    run = trajectory_of(subject)
+    certificate = subject if isinstance(subject, Certificate) else certificate
+    effort, bound = None if certificate is None else _certified_effort(run, certificate), None
+    if effort is not None and effort.energy is not None and not (run.actuator or run.sliding):
         bound = float(effort.energy.value)
-    ax, energy = axes_of(ax), _energy(trajectory)
-    ax.plot(trajectory.t, energy, color=RUN, label="simulated (CVODES)")
+    ax, energy = axes_of(ax), _energy(run)
+    ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
     if bound is not None:
         ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
     ax.set_ylim(0, 1.1 * max(bound or 0.0, float(energy.max(initial=0))) or 1)
-    draw_deadlines(trajectory, ax)
-    return finished(ax, "time $t$", r"energy spent, $\int \|u\|^2\, dt$")
-
-
-def _require_one_initial_state(trajectory: Trajectory) -> None:
-    if trajectory.states.ndim != 2:
-        raise ValueError(f"the trajectory holds {trajectory.states.shape[1]} initial states; draw the input of one")
+    draw_deadlines(ax, run)
+    return finished(ax, time_label("time $t$", time_unit), r"energy spent, $\int \|u\|^2\, dt$")
 
 
 def _resolved_input(trajectory: Trajectory) -> np.ndarray:
@@ -144,7 +172,7 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
 
     Raises
     ------
-    ValueError
+    ParameterError
         It is beyond the range of floats, or with every second sample it would differ by more than a hundredth.
     """
     T, t, remaining = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
@@ -157,9 +185,9 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
             full = (trajectory.input**2).sum(axis=0)
             every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
     if not np.isfinite(every).all():
-        raise ValueError("the energy is beyond the range of floats; scale the initial state down")
+        raise ParameterError("the energy is beyond the range of floats; scale the initial state down")
     if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
-        raise ValueError("these samples do not settle the energy: simulate with more, unless it is infinite")
+        raise ParameterError("these samples do not settle the energy: simulate with more, unless it is infinite")
     return every
 
 
@@ -192,7 +220,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
 
     Raises
     ------
-    ValueError
+    ParameterError
         The certificate is of another graph, protocol or initial state.
     """
     effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
@@ -212,24 +240,12 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
 
     Raises
     ------
-    ValueError
+    ParameterError
         The certificate is of another graph, protocol or initial state.
     """
-    for name in ("graph", "protocol"):
-        if getattr(certificate, name) != getattr(trajectory, name):
-            raise ValueError(f"the certificate is of another {name} than the trajectory")
-    initial_values = [("initial state", certificate.initial_state, trajectory.states[:, :1])]
-    rounding = np.abs(trajectory.states[:, :1])  # runs are integrated in units of the initial state
+    require_same(trajectory, certificate)
+    effort, slid = certificate.effort, trajectory.sliding
     unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
-    if (slid := trajectory.sliding) is not None:
-        sigma0 = slid.sigma0[:, None]
-        initial_values.append(("sigma(0)", certificate.sigma0, sigma0))
-        unknown = unknown or slid.boundary_layer is not None
-        rounding = rounding + np.abs(sigma0)  # the states are sums of two parts
-    for name, proved, run in initial_values if 0.0 in trajectory.t[:1] else ():
-        at = run if proved is None else np.array([[float(x)] for x in proved])
-        if (np.abs(at - run) > 4 * np.finfo(float).eps * rounding).any():
-            raise ValueError(f"the certificate is of another {name} than the trajectory")
-    effort = certificate.effort
+    unknown = unknown or (slid is not None and slid.boundary_layer is not None)
     unknown = unknown or effort is None or effort.initial_set is not None or certificate.initial_state is None
     return None if unknown else effort

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.axes import Axes
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
+from ptcc_certify.report.plots.subject import certificate_of, structure_of
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 #: Colour and marker of the classes of certificates.
@@ -16,8 +20,8 @@ CLASS_MARKERS = {"paper": ("#000000", "s"), "perron": ("#009E73", "^"), "lmi": (
 
 
 @styled
-def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the eigenvalues of ``L`` (numerical), and the line from which on the input stays bounded.
+def plot_spectrum(subject: Any, *, ax: Axes | None = None, protocol: Protocol | None = None) -> Axes:
+    """Draw the eigenvalues of ``L`` (numerical), and the line ``1/(rho2 kappa)`` from which on the input stays bounded.
 
     The zeros of balanced closed components are marked apart. From every initial state the input (its nominal part,
     under the sliding-mode protocol) is bounded up to the deadline if all other eigenvalues lie right of ``1/(rho2
@@ -25,11 +29,11 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
 
     Parameters
     ----------
-    structure : Structure
+    subject : Certificate, Trajectory, Structure or graph
         Of strong components above 500 nodes only the eigenvalues nearest to 0 are computed.
-    protocol : NominalProtocol or SlidingModeProtocol, optional
-        Whose line is drawn; there is none with ``rho2 = 0``.
     ax : Axes, optional
+    protocol : NominalProtocol or SlidingModeProtocol, optional
+        Whose line is drawn, that of a certificate or trajectory by default; there is none with ``rho2 = 0``.
 
     Returns
     -------
@@ -42,14 +46,25 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
 
     Examples
     --------
-    >>> ax = plot_spectrum(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)])))
+    >>> ax = plot_spectrum(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)]))
     >>> [(line.get_label(), line.get_xdata().round(6).tolist()) for line in ax.lines]
     [('nonzero eigenvalues', [2.0, 4.0]), ('zero eigenvalues', [0.0])]
     """
-    ax, spectrum = axes_of(ax), laplacian_spectrum(structure)
+    ax, spectrum = axes_of(ax), laplacian_spectrum(structure_of(subject))
+    if protocol is None and isinstance(subject, Certificate | Trajectory):
+        protocol = subject.protocol
     if spectrum.nonzero.size:
         values = spectrum.nonzero
-        ax.plot(values.real, values.imag, "o", color=RUN, markersize=5, alpha=0.7, label="nonzero eigenvalues")
+        ax.plot(
+            values.real,
+            values.imag,
+            "o",
+            color=RUN,
+            markersize=5,
+            alpha=0.7,
+            clip_on=False,
+            label="nonzero eigenvalues",
+        )
     if spectrum.kernel_dimension:
         many = "" if spectrum.kernel_dimension == 1 else f" ({spectrum.kernel_dimension})"
         ax.plot([0.0], [0.0], "x", color=BEHIND, markersize=7, label=f"zero eigenvalues{many}")
@@ -63,7 +78,7 @@ def plot_spectrum(structure: Structure, protocol: Protocol | None = None, ax: Ax
 
 
 @styled
-def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
+def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
     """Draw rate against overshoot constant of all proved Lyapunov functions by class, and what no rate exceeds.
 
     A function of rate ``b`` and overshoot constant ``c`` proves ``||z(t)||^2 <= c e^(-b s) ||z(0)||^2``, ``z`` being
@@ -71,7 +86,7 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    certificate : Certificate
+    subject : Certificate
         With a proved Lyapunov function.
     ax : Axes, optional
 
@@ -81,7 +96,7 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
 
     Raises
     ------
-    ValueError
+    ParameterError
         There is nothing to draw.
 
     Examples
@@ -91,9 +106,10 @@ def plot_frontier(certificate: Certificate, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['paper', 'perron', 'upper bound (proved)', 'spectral rate (numerical)']
     """
+    certificate = certificate_of(subject)
     functions = certificate.envelope.functions
     if not functions:
-        raise ValueError("the certificate holds no proved Lyapunov function")
+        raise ParameterError("the certificate holds no proved Lyapunov function")
     ax = axes_of(ax)
     ax.set_xscale("log")
     for kind, (colour, marker) in CLASS_MARKERS.items():

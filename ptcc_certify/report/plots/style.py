@@ -1,22 +1,23 @@
-"""The style of all figures: sizes, colours, axes, legends, and how figures are saved."""
+"""The style of all figures: sizes, colours, axes, ticks, legends, and how figures are saved."""
 
 from __future__ import annotations
 
 import functools
 import io
+import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib import rcParams, style
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure, FigureBase
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.structure import Structure
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
@@ -26,31 +27,34 @@ SINGLE_COLUMN, DOUBLE_COLUMN = (3.5, 2.7), (7.16, 2.9)
 FIGURES = (".png", ".pdf", ".svg")
 #: Colours that the colour-blind tell apart (Okabe and Ito): what runs, what bounds it, what stands behind.
 RUN, BOUND, BEHIND = "#0072B2", "#D55E00", "#7F7F7F"
-#: The same for the parts of a graph.
-CAMP_COLOURS = {"first camp": RUN, "second camp": BOUND, "unbalanced leaders": "#CC79A7", "followers": BEHIND}
+#: Colour and line of an edge from an ally (+1) or an opponent (-1); no camp has them.
+EDGE_STYLES = {1: ("#117733", "-", "from an ally"), -1: ("#882255", "--", "from an opponent")}
+#: Between ticks lie these numbers of units, times a power of ten.
+_STEPS = [1, 2, 2.5, 5, 10]
 
 
 def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
-    """Draw in the style of :data:`STYLE`, unless the axes are given: these have a style of their own."""
+    """Draw in the style of :data:`STYLE`, unless ``ax`` is given: axes have a style of their own."""
 
     @functools.wraps(plot)
-    def drawn(*args: Any, **options: Any) -> Any:
-        if any(isinstance(value, Axes) for value in (*args, *options.values())):
-            return plot(*args, **options)
+    def drawn(subject: Any, *, ax: Axes | None = None, **keywords: Any) -> Any:
+        if ax is not None:
+            return plot(subject, ax=ax, **keywords)
         with style.context(STYLE):
-            return plot(*args, **options)
+            return plot(subject, **keywords)
 
     return drawn
 
 
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a figure to a file; it appears whole or not at all, and equal figures make equal files.
+def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
+    """Write a figure, or that of axes, to a file; it appears whole or not at all, and equal figures make equal files.
 
     Parameters
     ----------
-    figure : Figure
+    drawn : Figure or Axes
+        What a ``plot_*`` returns.
     path : path
-        ``.png`` (200 dots per inch), ``.pdf`` or ``.svg``.
+        ``.png`` (300 dots per inch), ``.pdf`` or ``.svg``.
 
     Raises
     ------
@@ -59,15 +63,15 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     Examples
     --------
-    >>> ax = plot_graph(analyse(SignedDigraph.from_edges([(1, 2, -1)])))
-    >>> save_figure(ax.figure, "graph.jpg")
+    >>> save_figure(plot_graph(SignedDigraph.from_edges([(1, 2, -1)])), "graph.jpg")
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: graph.jpg: figures are written to .png, .pdf, .svg; choose one of these
     """
     suffix = Path(path).suffix.lower()
     if suffix not in FIGURES:
         raise ParameterError(f"{path}: figures are written to {', '.join(FIGURES)}; choose one of these")
-    write_atomically(path, figure_bytes(figure, suffix))
+    figure: Any = drawn.figure
+    write_atomically(path, figure_bytes(figure.figure, suffix))  # that of a part of a figure is the whole
 
 
 def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
@@ -83,9 +87,9 @@ def figure_bytes(figure: FigureBase, suffix: str) -> bytes:
     return buffer.getvalue()
 
 
-def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1)) -> Axes:
+def new_axes(figure: FigureBase, place: tuple[int, int, int] = (1, 1, 1), **keywords: Any) -> Axes:
     """Add axes to a figure in the style that is in force; ``place`` is rows, columns and number, from 1."""
-    ax = figure.add_subplot(*place)
+    ax = figure.add_subplot(*place, **keywords)
     given: Any = rcParams  # whose stubs know literal names only
     # Ticks and grid are made when they are drawn, after the style has gone: fix them now.
     for which in ("x", "y"):
@@ -102,19 +106,52 @@ def axes_of(ax: Axes | None, size: tuple[float, float] = SINGLE_COLUMN) -> Axes:
     return new_axes(Figure(size, layout="constrained")) if ax is None else ax
 
 
+def time_label(quantity: str, unit: str, unknown: str = "unit of $T$") -> str:
+    """Return the label of an axis of time, with the unit, which without a name is that of the deadline."""
+    return f"{quantity} ({unit or unknown})"
+
+
+def place_ticks(axis: Axis) -> None:
+    """Place ticks that do not collide: on a logarithmic axis at decades, over two or so at 1, 2, 5 too.
+
+    Ticks that were placed by hand stay.
+    """
+    if isinstance(axis.get_major_locator(), FixedLocator):
+        return
+    if axis.get_scale() != "log":
+        axis.set_major_locator(MaxNLocator(6, steps=_STEPS))
+        return
+    low, high = sorted(axis.get_view_interval())
+    decades = math.log10(high / low) if low > 0 else math.inf
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    if decades > 2.5:
+        axis.set_major_locator(LogLocator(numticks=7))
+        return
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)) if decades > 0.7 else MaxNLocator(5, steps=_STEPS))
+    axis.set_major_formatter("{x:g}")
+
+
 def finished(ax: Axes, x: str, y: str) -> Axes:
     """Name the axes, and put the legend above them, where it covers no data, in as many columns as its width takes."""
     ax.set_xlabel(x)
     ax.set_ylabel(y)
-    width = ax.get_window_extent().width / ax.figure.dpi
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2 if width < 4 else 3, frameon=False)
+    for axis in (ax.xaxis, ax.yaxis):
+        place_ticks(axis)
+    if ax.get_legend_handles_labels()[0]:
+        width = ax.get_window_extent().width / ax.figure.dpi
+        columns = 2 if width < 4 else 3
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2)
     return ax
 
 
-def camp_groups(structure: Structure) -> np.ndarray:
-    """Return which of ``CAMP_COLOURS`` every node belongs to."""
-    group = np.full(structure.graph.n_nodes, "followers", dtype=object)
-    for component in structure.closed_components:
-        for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
-            group[v] = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
-    return group
+def share_legend(figure: Figure, columns: int) -> Figure:
+    """Put one legend above all panels of a figure in the place of theirs."""
+    shared: dict[str, Any] = {}
+    for ax in figure.axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            shared.setdefault(label, handle)
+        if (own := ax.get_legend()) is not None:
+            own.remove()
+    figure.legend(shared.values(), shared.keys(), loc="outside upper center", ncols=columns, frameon=False)
+    return figure

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator
 
 from ptcc_certify.gain_design import Design
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 
 
 @styled
-def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
+def plot_trade_off(subject: Design, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw the peak input that is certified against the deadline, and below which no gains can stay.
 
     Both axes are logarithmic. The limit that was asked for is a horizontal line.
 
     Parameters
     ----------
-    found : Design
+    subject : Design
     ax : Axes, optional
+    time_unit : str
+        Of the deadline, for the label of the axis.
 
     Returns
     -------
@@ -32,11 +33,9 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['certified with these gains', 'no gains stay below', 'asked for', 'this design']
     """
+    found = subject
     ax, curve = axes_of(ax), found.trade_off(found.deadlines())
     ax.set(xscale="log", yscale="log")
-    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))  # deadlines take up little more than a decade
-    ax.xaxis.set_major_formatter("{x:g}")
-    ax.xaxis.set_minor_formatter("")
     if np.isfinite(curve.certified).any():
         ax.plot(curve.deadlines, curve.certified, color=RUN, label="certified with these gains")
     if np.isfinite(curve.lower).any():
@@ -45,6 +44,8 @@ def plot_trade_off(found: Design, ax: Axes | None = None) -> Axes:
         ax.set_ylim(bottom=float(np.nanmin(curve.lower)) / 3)
     ax.axhline(float(found.asked.max_input), color=BOUND, linewidth=0.9, linestyle=":", label="asked for")
     if found.protocol is not None and found.peak:
-        ax.plot([float(found.protocol.T)], [float(found.peak)], "o", color=RUN, label="this design")
+        ax.plot(
+            [float(found.protocol.T)], [float(found.peak)], "o", color=RUN, markeredgecolor="black", label="this design"
+        )
     norm = r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$"
-    return finished(ax, "deadline $T$", norm)
+    return finished(ax, time_label("deadline $T$", time_unit, "unit of time"), norm)

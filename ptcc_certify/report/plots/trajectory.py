@@ -9,72 +9,79 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.style import (
-    BEHIND,
     BOUND,
-    CAMP_COLOURS,
     DOUBLE_COLUMN,
-    RUN,
     SINGLE_COLUMN,
     axes_of,
-    camp_groups,
     finished,
     new_axes,
+    share_legend,
     styled,
+    time_label,
 )
-from ptcc_certify.simulation.trajectory import SlidingTrajectory, Trajectory
+from ptcc_certify.report.plots.subject import structure_of, trajectory_of
 
 
 @styled
-def plot_trajectory(trajectory: Trajectory, structure: Structure, ax: Axes | None = None) -> Axes:
-    """Draw ``x_k(t)`` with camps coloured, leaders thick, followers thin, and the deadline as a vertical line.
+def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+    """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
+
+    Of up to eight agents each has a line with its name. Of more, parts of the graph with more than three agents are
+    drawn as their range and median, and the agents that begin highest and lowest by name.
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Of one initial state.
-    structure : Structure
-        Of the same graph.
+    subject : Trajectory or Certificate
+        Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
+    time_unit : str
+        Of the deadline, for the label of the axis: ``"s"``.
 
     Returns
     -------
     Axes
 
+    Raises
+    ------
+    ParameterError
+        The subject leads to no run of one initial state.
+
     Examples
     --------
-    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> pair = SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1)])
     >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
-    >>> [line.get_label() for line in plot_trajectory(run, analyse(pair)).lines]
-    ['first camp', 'second camp', 'deadline']
+    >>> ax = plot_trajectory(run, time_unit="s")
+    >>> ax.get_xlabel(), [text.get_text() for text in ax.texts]
+    ('time $t$ (s)', ['ann', 'bob', 'bob', 'ann'])
     """
-    ax = axes_of(ax)
-    draw_agents(trajectory, trajectory.states, structure, ax)
-    return finished(ax, "time $t$", "state $x_k$")
+    run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
+    named = draw_agents(ax, run, run.states, structure)
+    draw_deadlines(ax, run)
+    name_agents(ax, run, run.states, named, ends=True)
+    return finished(ax, time_label("time $t$", time_unit), "state $x_k$")
 
 
 @styled
 def plot_run(
-    trajectory: Trajectory,
-    structure: Structure,
-    reaching: Sequence[ReachingTime] | None = None,
-    *,
-    wide: bool = False,
+    subject: Any, *, reaching: Sequence[ReachingTime] | None = None, wide: bool = False, time_unit: str = ""
 ) -> Figure:
-    """Draw the states; under the sliding-mode protocol with a reaching phase the sliding variables below them.
+    """Draw the states ``x_k(t)``; in a reaching phase the sliding variables ``sigma_k(t)`` below them.
 
     Parameters
     ----------
-    trajectory : Trajectory
-        Of one initial state.
-    structure : Structure
-        Of the same graph.
+    subject : Trajectory or Certificate
+        As for :func:`plot_trajectory`.
     reaching : sequence of N ReachingTime, optional
-        Proved reaching times.
+        Proved reaching times; those of a certificate by default.
     wide : bool
         As wide as two columns of a journal, instead of one.
+    time_unit : str
+        Of the deadline, for the labels of the axes.
 
     Returns
     -------
@@ -84,79 +91,73 @@ def plot_run(
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> len(plot_run(simulate(pair, p, [3, 5], sigma0=[1, 0]), analyse(pair)).axes)
+    >>> len(plot_run(simulate(pair, p, [3, 5], sigma0=[1, 0])).axes)
     2
     """
     width, height = DOUBLE_COLUMN if wide else SINGLE_COLUMN
-    slid = trajectory.sliding
-    if slid is None or not slid.sigma0.any():
-        return plot_trajectory(trajectory, structure, axes_of(None, (width, height))).figure  # type: ignore[return-value]
-    figure = Figure((width, 2 * height), layout="constrained")
-    upper, lower = (new_axes(figure, (2, 1, row)) for row in (1, 2))
-    plot_trajectory(trajectory, structure, upper)
-    plot_sliding(slid, reaching, lower)
-    return figure
+    run = trajectory_of(subject)
+    if run.sliding is None or not run.sliding.sigma0.any():
+        figure = Figure((width, height), layout="constrained")
+        plot_trajectory(run, ax=new_axes(figure), time_unit=time_unit)
+        return figure
+    figure = Figure((width, 1.8 * height), layout="constrained")
+    upper = new_axes(figure, (2, 1, 1))
+    lower = new_axes(figure, (2, 1, 2))
+    plot_trajectory(run, ax=upper, time_unit=time_unit)
+    reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
+    plot_sliding(run, ax=lower, reaching=reaching, time_unit=time_unit)
+    return share_legend(figure, 3 if wide else 2)
 
 
 @styled
 def plot_sliding(
-    trajectory: SlidingTrajectory, reaching: Sequence[ReachingTime] | None = None, ax: Axes | None = None
+    subject: Any, *, ax: Axes | None = None, reaching: Sequence[ReachingTime] | None = None, time_unit: str = ""
 ) -> Axes:
-    r"""Draw ``sigma_k(t)`` up to a little beyond ``T_r``, dots where each reaches 0, ticks where that is proved.
+    r"""Draw ``sigma_k(t)`` up to a little beyond ``T_r``: circles where each reaches 0, ticks by when that is proved.
+
+    Lines, ranges and names are those of :func:`plot_trajectory`.
 
     Parameters
     ----------
-    trajectory : SlidingTrajectory
-    reaching : sequence of N ReachingTime, optional
-        Proved reaching times (``certificate.reaching``).
+    subject : SlidingTrajectory or Certificate
+        Of the sliding-mode protocol.
     ax : Axes, optional
+    reaching : sequence of N ReachingTime, optional
+        Proved reaching times; those of a certificate by default.
+    time_unit : str
+        Of the deadline, for the label of the axis.
 
     Returns
     -------
     Axes
+
+    Raises
+    ------
+    ParameterError
+        The run has no sliding variables.
 
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(pair, p, [3, 5], sigma0=[1, -4])
-    >>> ax = plot_sliding(run, certified_reaching_times(p, [1, -4]))
-    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    >>> ax = plot_sliding(run, reaching=certified_reaching_times(p, [1, -4]))
+    >>> [text.get_text() for text in ax.get_legend().get_texts()][-3:]
     ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """
-    ax, T_r = axes_of(ax), float(trajectory.protocol.T_r)
-    shown = trajectory.t <= 1.1 * T_r
-    for row in trajectory.sigma:
-        ax.plot(trajectory.t[shown], row[shown], color=RUN, linewidth=0.9)
-    reached = trajectory.reaching_times[trajectory.sigma0 != 0]
+    run, structure, ax = trajectory_of(subject).sliding, structure_of(subject), axes_of(ax)
+    if run is None:
+        raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
+    reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
+    T_r = float(run.protocol.T_r)
+    named = draw_agents(ax, run, run.sigma, structure)
+    reached = run.reaching_times[run.sigma0 != 0]
     if np.isfinite(reached).any():
-        ax.plot(reached, np.zeros(reached.size), "o", color=RUN, markersize=3, label="$\\sigma_k$ reaches 0")
+        marked: dict[str, Any] = {"color": "black", "markerfacecolor": "white", "markersize": 3.5, "zorder": 4}
+        ax.plot(reached, np.zeros(reached.size), "o", **marked, label="$\\sigma_k$ reaches 0")
     if reaching is not None:
         proved = [r.time for r in reaching if r.z is None or r.z > 0]
-        ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, label="reaching time at most")
-    ax.axvline(T_r, color="black", linewidth=0.8, linestyle=":", label="$T_r$")
-    return finished(ax, "time $t$", "sliding variable $\\sigma_k$")
-
-
-def draw_agents(
-    trajectory: Trajectory, values: np.ndarray, structure: Structure, ax: Axes, drawstyle: str = "default"
-) -> None:
-    """Draw a line for every agent, leaders first and thick, and the deadlines."""
-    group = camp_groups(structure)
-    names: set[str] = set()
-    for node in np.argsort(group == "followers", kind="stable"):
-        name = str(group[node])
-        line, width = ("--", 0.9) if name == "followers" else ("-", 1.6)
-        looks: dict[str, Any] = {"color": CAMP_COLOURS[name], "linestyle": line, "linewidth": width}
-        label = None if name in names else name
-        ax.plot(trajectory.t, values[node], drawstyle=drawstyle, label=label, **looks)
-        names.add(name)
-    draw_deadlines(trajectory, ax)
-
-
-def draw_deadlines(trajectory: Trajectory, ax: Axes) -> None:
-    """Draw the deadline, and the reaching time of the sliding-mode protocol, as vertical lines."""
-    if trajectory.protocol.prescribed:
-        ax.axvline(float(trajectory.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline")
-    if (sliding := trajectory.protocol.reaching) is not None:
-        ax.axvline(float(sliding.T_r), color=BEHIND, linewidth=0.8, linestyle="-.", label="$T_r$")
+        ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, zorder=3, label="reaching time at most")
+    ax.axvline(T_r, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+    name_agents(ax, run, run.sigma, named, until=min(1.1 * T_r, float(run.t[-1])))
+    return finished(ax, time_label("time $t$", time_unit), "sliding variable $\\sigma_k$")

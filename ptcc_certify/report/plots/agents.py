@@ -1,0 +1,144 @@
+"""Agents over time: a named line for each of a few, ranges and medians of the camps of many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from scipy.optimize import isotonic_regression
+
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN
+from ptcc_certify.simulation.trajectory import Trajectory
+
+#: Colour and line of the parts of a graph, which differ without colours too.
+CAMP_STYLES: dict[str, tuple[str, Any]] = {
+    "first camp": (RUN, "-"),
+    "second camp": (BOUND, (0, (7, 1.5))),
+    "unbalanced leaders": ("#CC79A7", "-."),
+    "followers": (BEHIND, (0, (3, 1.5))),
+}
+#: Agents, and agents of one part of a graph, of which each has a line.
+NAMED_AGENTS, NAMED_OF_PART = 8, 3
+#: The mark of the line of an agent.
+AGENT = "agent"
+#: Size in points of the names of lines, and characters of a name.
+NAME_SIZE, NAME_LENGTH = 7, 16
+
+
+def camp_groups(structure: Structure) -> np.ndarray:
+    """Return which of ``CAMP_STYLES`` every node belongs to."""
+    group = np.full(structure.graph.n_nodes, "followers", dtype=object)
+    for component in structure.closed_components:
+        for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
+            group[v] = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
+    return group
+
+
+def draw_agents(
+    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **looks: Any
+) -> np.ndarray:
+    """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the agents that have a line.
+
+    Of up to eight agents each has a line. Of more, a part of the graph with more than three agents is drawn as its
+    range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
+    of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
+    """
+    group = camp_groups(structure)
+    named: list[int] = []
+    step: Any = "post" if looks.get("drawstyle") == "steps-post" else None
+    for name, (colour, line) in CAMP_STYLES.items():
+        own = np.flatnonzero(group == name)
+        width, label = 0.9 if name == "followers" else 1.5, name
+        if len(group) > NAMED_AGENTS and own.size > NAMED_OF_PART:
+            rows = np.nan_to_num(values[own])
+            high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
+            ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
+            middle, label = (
+                (high, f"{name} (largest)") if size else (np.median(rows, axis=0), f"{name} (median, range)")
+            )
+            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=label, **looks)
+            ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
+            own, width, label = own[sorted(ends)], 0.7, ""
+        for v in own:
+            drawn = {"color": colour, "linestyle": line, "linewidth": width, "gid": AGENT}
+            ax.plot(run.t, values[v], label=label or None, **drawn, **looks)
+            label = ""
+        named.extend(own.tolist())
+    return np.array(named, dtype=int)
+
+
+def draw_deadlines(ax: Axes, run: Trajectory) -> None:
+    """Draw the deadline, and the first one of the sliding-mode protocol, as vertical lines."""
+    if run.protocol.prescribed:
+        ax.axvline(float(run.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+    if (sliding := run.protocol.reaching) is not None:
+        ax.axvline(float(sliding.T_r), color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+
+
+def name_agents(
+    ax: Axes, run: Trajectory, values: np.ndarray, agents: np.ndarray, *, ends: bool = False, until: float | None = None
+) -> None:
+    """Write the names of agents where their lines begin, and where they end if they end apart; show time ``until``."""
+    if not agents.size or not run.t.size:
+        return
+    names = [shorten(run.labels[v], NAME_LENGTH - 4) for v in agents]
+    colours = [str(line.get_color()) for line in ax.lines if line.get_gid() == AGENT]
+    columns = (0, -1) if ends and agents.size > 1 else (0,)
+    texts = [_spread(ax, values[agents, k], names, colours) for k in columns]
+    first, last = float(run.t[0]), float(run.t[-1]) if until is None else until
+    point = (last - first) / (0.7 * ax.get_window_extent().width / ax.figure.dpi * 72)  # of the axes, without names
+    for side, column in zip((-1, 1), texts, strict=False):
+        if side == 1 and len({place for place, *_ in column}) < 2:
+            break  # all end at the same place
+        for height, place, name, colour in column:
+            line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
+            looks: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
+            looks |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
+            start, moved = ((first, last)[side > 0], height), (side * 8, place)
+            ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
+    left = (10 + 0.62 * NAME_SIZE * max(len(name) for _, _, name, _ in texts[0])) * point
+    ticks = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(first, last)
+    ax.set_xticks([x for x in ticks if first <= x <= last])
+    ax.set_xlim(first - left, last)
+
+
+def _spread(
+    ax: Axes, heights: np.ndarray, names: Sequence[str], colours: Sequence[str]
+) -> list[tuple[float, float, str, str]]:
+    """Return heights of lines, heights of their names, which do not overlap, names, and colours.
+
+    Lines that cannot be told apart there share one name.
+    """
+    scale, limits = ax.yaxis.get_transform(), ax.get_ylim()
+    low, high = scale.transform(np.array(limits))
+    height = 0.75 * ax.get_window_extent().height / ax.figure.dpi * 72  # in points, when labels have their room
+    gap = 1.2 * NAME_SIZE / height * (high - low)
+    at = np.clip(scale.transform(np.clip(np.nan_to_num(heights), *limits)), low, high)
+    groups: list[list[int]] = []
+    for k in np.argsort(at, kind="stable"):
+        if groups and at[k] - at[groups[-1][0]] < gap / 6:
+            at[k] = at[groups[-1][0]]
+        if groups and at[k] == at[groups[-1][0]] and colours[k] == colours[groups[-1][0]]:
+            groups[-1].append(int(k))
+        else:
+            groups.append([int(k)])
+    place = np.array([at[own[0]] for own in groups])
+    steps = gap * np.arange(len(groups))
+    place = np.clip(isotonic_regression(place - steps).x, low + gap / 2, max(low + gap / 2, high - steps[-1])) + steps
+    lines, texts = scale.inverted().transform([at[own[0]] for own in groups]), scale.inverted().transform(place)
+    joint = [_joined([names[k] for k in sorted(own)]) for own in groups]
+    return list(zip(lines, texts, joint, [colours[own[0]] for own in groups], strict=True))
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Join names, and count those for which there is no room."""
+    for shown in range(len(names), 0, -1):
+        more = [f"+{len(names) - shown}"] if shown < len(names) else []
+        if len(text := ", ".join([*names[:shown], *more])) <= NAME_LENGTH:
+            return text
+    return text

@@ -1,0 +1,109 @@
+"""What a figure is drawn from: the certificate, run or structure that its subject is, or holds, or leads to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.simulation.trajectory import Trajectory
+
+
+def certificate_of(subject: Any) -> Certificate:
+    """Return a certificate as it is, and refuse anything else.
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import certificate_of
+    >>> certificate_of("fig1b")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; certify the graph first
+    """
+    if isinstance(subject, Certificate):
+        return subject
+    raise ParameterError(
+        f"this figure is drawn from a certificate, not from {type(subject).__name__}; certify the graph first"
+    )
+
+
+def trajectory_of(subject: Any) -> Trajectory:
+    """Return a run of one initial state: the subject itself, or that of a certificate, which is simulated if need be.
+
+    Raises
+    ------
+    ParameterError
+        The subject is neither, the certificate has no initial state, or the run has several.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import trajectory_of
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5], simulation=False)
+    >>> trajectory_of(cert).states[:, 0]
+    array([3., 5.])
+    """
+    run = subject
+    if isinstance(subject, Certificate):
+        run = subject.simulate() if subject.trajectory is None else subject.trajectory
+    if not isinstance(run, Trajectory):
+        kind = type(subject).__name__
+        raise ParameterError(
+            f"this figure is drawn from a trajectory or a certificate, not from {kind}; simulate first"
+        )
+    if run.states.ndim != 2:
+        raise ParameterError(f"the trajectory holds {run.states.shape[1]} initial states; draw a run of one")
+    return run
+
+
+def structure_of(subject: Any) -> Structure:
+    """Return the structure of a certificate, a trajectory, a graph, or anything that reads as a graph.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import structure_of
+    >>> structure_of(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])).balanced
+    True
+    """
+    if isinstance(subject, Structure):
+        return subject
+    if isinstance(subject, Certificate):
+        return subject.structure
+    graph = subject.graph if isinstance(subject, Trajectory) else subject
+    if not isinstance(graph, SignedDigraph):
+        raise ParameterError(f"this figure is drawn from a graph, not from {type(subject).__name__}")
+    return analyse(graph)
+
+
+def require_same(run: Trajectory, certificate: Certificate) -> None:
+    """Refuse a certificate that is of something else than a run.
+
+    Raises
+    ------
+    ParameterError
+        It is of another graph, protocol, initial state or ``sigma(0)``.
+    """
+    for name in ("graph", "protocol"):
+        if getattr(certificate, name) != getattr(run, name):
+            raise ParameterError(f"the certificate is of another {name} than the trajectory")
+    if 0.0 not in run.t[:1]:
+        return
+    pairs = [("initial state", certificate.initial_state, run.states[:, 0])]
+    rounding = np.abs(run.states[:, 0])  # runs are integrated in units of the initial state
+    if run.sliding is not None:
+        pairs.append(("sigma(0)", certificate.sigma0, run.sliding.sigma0))
+        rounding = rounding + np.abs(run.sliding.sigma0)  # the states are sums of two parts
+    for name, proved, first in pairs:
+        if (
+            proved is not None
+            and (np.abs(np.array(list(map(float, proved))) - first) > 4 * np.finfo(float).eps * rounding).any()
+        ):
+            raise ParameterError(f"the certificate is of another {name} than the trajectory")

@@ -1,0 +1,179 @@
+"""Results as Python objects: copies, equality, tables, and a certificate where a file is taken."""
+
+import builtins
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import GainLimits
+
+TEAM = ptcc.as_graph([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
+PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+ROBUST = ptcc.SlidingModeProtocol(delta="0.5")
+
+
+@pytest.fixture(scope="module")
+def cert():
+    return ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], method="perron")
+
+
+@pytest.fixture(scope="module")
+def objects(cert):
+    disturbance = as_disturbance("telegraph", 3, 0.5, 2.0)
+    return {
+        "graph": TEAM,
+        "structure": cert.structure,
+        "nominal": PROTOCOL,
+        "sliding": ROBUST,
+        "gain": Gain(1, 1, 1, 1),
+        "limits": GainLimits(gain_cap=10),
+        "expression": ptcc.ExpressionDisturbance("sin(k*t)"),
+        "samples": disturbance,
+        "certificate": cert,
+        "final state": cert.final_state,
+        "influence": cert.influence,
+        "run": cert.trajectory,
+        "sliding run": ptcc.simulate(TEAM, ROBUST, [5, 2, -4], sigma0=[1, 0, 1], disturbance=disturbance),
+        "design": ptcc.design(TEAM, max_input=10, initial_bound=1),
+        "ensemble": ptcc.Ensemble(count=2, nodes=5),
+        "report of the check": cert.checked,
+        "expectations": ptcc.Expectations("stability"),
+        "set of initial states": ptcc.box([0, 0, 0], [1, 1, 1]),
+    }
+
+
+def test_a_copy_of_a_result_equals_it_and_has_its_hash(objects):
+    for name, one in objects.items():
+        for other in (pickle.loads(pickle.dumps(one)), copy.copy(one), copy.deepcopy(one)):  # noqa: S301 - our own
+            assert other == one and hash(other) == hash(one), name
+        assert one != 5 and len(repr(one)) < 2000
+
+
+def test_results_that_differ_are_not_equal(cert):
+    assert cert != ptcc.certify(TEAM, PROTOCOL.replace(T=2), [5, 2, -4], method="perron", simulation=False)
+    run = ptcc.simulate(TEAM, PROTOCOL, [5, 2, -4], times=[0, 1])
+    assert run != ptcc.simulate(TEAM, PROTOCOL, [5, 2, -3], times=[0, 1])
+    assert run == ptcc.simulate(TEAM, PROTOCOL, [5, 2, -4], times=[0, 1])
+    assert ptcc.analyse(TEAM) != ptcc.analyse([("ann", "bob", 2)])
+
+
+def test_a_certificate_equals_what_is_read_back(cert, tmp_path):
+    cert.save(tmp_path / "c.json")
+    forms = (tmp_path / "c.json", str(tmp_path / "c.json"), cert.to_dict(), cert)
+    assert {ptcc.read_certificate(form) for form in forms} == {cert}
+    assert all(ptcc.check(form).accepted for form in forms)
+    assert ptcc.check(ptcc.read_certificate(cert)).accepted
+
+
+def test_a_report_is_written_of_a_certificate_as_of_its_file(cert, tmp_path):
+    assert ptcc.write_report(cert, tmp_path / "page.html", simulation=False) == "certified"
+    assert "stability" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_what_is_no_certificate_is_refused_with_the_mend():
+    with pytest.raises(FormatError, match="give its path, its JSON object or a Certificate"):
+        ptcc.check(5)
+
+
+def test_an_agent_is_found_by_its_label(cert):
+    final = cert.final_state
+    assert dict(final) == dict(zip(TEAM.labels, final.states, strict=True))
+    assert (np.asarray(final) == final.values).all() and len(final) == 3
+    assert (cert.trajectory["bob"] == cert.trajectory.states[1]).all()
+    assert "ann" in TEAM and list(TEAM) == ["ann", "bob", "eve"] and len(TEAM) == 3
+    for one in (final, cert.trajectory):
+        with pytest.raises(ParameterError, match="no agent is called 'joe'; there are ann, bob, eve"):
+            one["joe"]
+
+
+def test_graphs_go_to_networkx_and_pandas_and_back():
+    pytest.importorskip("pandas")
+    assert ptcc.as_graph(TEAM.to_networkx()) == ptcc.as_graph(TEAM.to_pandas()) == TEAM
+    assert (ptcc.as_graph(TEAM.adjacency(), "listens").adjacency() != TEAM.adjacency()).nnz == 0
+
+
+def test_results_go_to_pandas(cert):
+    pytest.importorskip("pandas")
+    run = cert.trajectory
+    frame = run.to_pandas()
+    assert list(frame.columns) == list(TEAM.labels) and (frame.index == run.t).all()
+    assert (frame["eve"].to_numpy() == run["eve"]).all()
+    several = ptcc.simulate(TEAM, PROTOCOL, [[5, 1], [2, 0], [-4, 2]], times=[0, 1])
+    assert (several.to_pandas()["bob", 2].to_numpy() == several["bob"][1]).all()
+    assert cert.final_state.to_pandas().to_dict() == {k: float(x) for k, x in dict(cert.final_state).items()}
+
+
+def test_a_table_of_many_graphs_has_the_same_types_whatever_its_rows():
+    pytest.importorskip("pandas")
+    table = ptcc.certify_many({"team": TEAM, "fig": "fig1a"}, PROTOCOL, method="perron")
+    frame = table.to_pandas()
+    assert frame["graph"].tolist() == ["team", "fig"]
+    assert (frame.dtypes == type(table)().to_pandas().dtypes).all()
+
+
+def test_without_pandas_a_line_names_it(cert, monkeypatch):
+    real = builtins.__import__
+
+    def without(name, *args, **more):
+        if name == "pandas":
+            raise ImportError(name)
+        return real(name, *args, **more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    for ask in (TEAM.to_pandas, cert.trajectory.to_pandas, cert.final_state.to_pandas):
+        with pytest.raises(ParameterError, match="pip install"):
+            ask()
+
+
+def test_parameters_of_a_protocol_are_replaced_by_name():
+    assert PROTOCOL.replace(T=3, kappa="1/2") == ptcc.NominalProtocol(T=3, rho1=1, rho2=1, kappa="1/2")
+    with pytest.raises(ParameterError, match="gamma is no parameter of NominalProtocol; it has T, rho1, rho2, kappa"):
+        PROTOCOL.replace(gamma=3)
+
+
+def test_a_protocol_has_the_defaults_of_the_command_line():
+    from ptcc_certify.cli import cli
+    from ptcc_certify.cli.options import protocol_of
+
+    context = cli.commands["certify"].make_context("certify", ["fig1a"])
+    for kind, protocol in (("nominal", ptcc.NominalProtocol()), ("sliding-mode", ptcc.SlidingModeProtocol())):
+        assert protocol_of(context.params | {"kind": kind}) == protocol
+
+
+def test_vector_valued_states_have_one_certificate_for_each_component(tmp_path):
+    x0 = [[5, 1], [2, 0], [-4, 2]]
+    protocol = PROTOCOL.replace(rho2=2)
+    certs = ptcc.certify_vectors(TEAM, protocol, x0, method="perron", simulation=False)
+    run = ptcc.simulate(TEAM, protocol, x0)
+    assert len(certs) == 2 and certs.verdict == "certified"
+    assert np.abs(run.final_state - certs.final_state).max() < 1e-6
+    assert not certs.compare(run).violated
+    assert all(ptcc.check(path).accepted for path in certs.save(tmp_path / "c.json"))
+    before = run.remaining > 0
+    norm = np.linalg.norm(run.error, axis=(0, 1))[before]
+    assert (norm <= certs.norm_bound(run.remaining[before]) + 1e-9).all()
+    gap = np.linalg.norm(run.states - run.final_state[..., None], axis=1)[:, before]
+    assert (gap <= certs.deviation_bound(run.remaining[before]) + 1e-6).all()
+    assert (np.linalg.norm(run.input, axis=1)[:, before] <= certs.peak_input[:, None] + 1e-6).all()
+
+
+def test_a_certificate_of_vector_valued_states_is_refused_with_the_mend():
+    with pytest.raises(ParameterError, match="certify_vectors"):
+        ptcc.certify(TEAM, PROTOCOL, [[5, 1], [2, 0], [-4, 2]])
+    with pytest.raises(ParameterError, match="as many of each"):
+        ptcc.certify_vectors(TEAM, ROBUST, [[5, 1], [2, 0], [-4, 2]], sigma0=[1, 0, 1])
+
+
+def test_a_norm_of_tiny_or_huge_bounds_is_not_below_them():
+    from ptcc_certify.certificate.vector_states import _norm
+
+    for size in (1e-300, 1.0, 1e200):
+        assert (_norm([np.array([3 * size]), np.array([4 * size])]) >= 5 * size).all()
+    assert _norm([np.array([np.inf]), np.array([1.0])]) == np.inf and _norm([np.zeros(1), np.zeros(1)]) == 0
