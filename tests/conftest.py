@@ -1,10 +1,13 @@
-"""What all tests share: a hypothesis profile that repeats itself, and the large real graphs where they are present."""
+"""What all tests share: a hypothesis profile that repeats itself; real graphs and a browser where there are any."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 # Before NumPy is loaded: tests run side by side, where more threads only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -30,3 +33,16 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real graphs: {folder} does not exist; set PTCC_REAL_DATA to their folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Chromium, driven by playwright, for what only a browser can tell of a page."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no Chromium: install it (apt-get install chromium)")
+    with playwright.sync_playwright() as engine:
+        chromium = engine.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()

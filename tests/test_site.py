@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from run_blocks import blocks, run_page
@@ -129,20 +129,14 @@ def test_the_built_site_has_its_figures_and_no_fault(site: Path):
 
 
 @pytest.mark.docs
-def test_no_request_leaves_the_site(site: Path):
-    api = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium on this machine")
+def test_no_request_leaves_the_site_and_no_page_is_wider_than_a_phone(site: Path, browser: Any):
     requests: list[str] = []
-    with api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 390, "height": 800})
-        page.on("request", lambda request: requests.append(request.url))
-        for path in sorted(site.rglob("*.html")):
-            page.goto(path.as_uri())
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
-        page.goto((site / "search.html").as_uri() + "?q=overshoot")
-        page.wait_for_selector("#search-results li")
-        browser.close()
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.on("request", lambda request: requests.append(request.url))
+    for path in sorted(site.rglob("*.html")):
+        page.goto(path.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+    page.goto((site / "search.html").as_uri() + "?q=overshoot")
+    page.wait_for_selector("#search-results li")
+    page.close()
     assert [url for url in requests if not url.startswith(("file:", "data:"))] == []

@@ -6,34 +6,18 @@ import re
 from typing import Any
 
 from docutils import nodes
-from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.util import logging
+from ziamath.tex import tex2mml
 
-try:
-    from ptcc_certify.report.notation import formula_svg
-except ImportError:  # to be deleted once the page has it
-
-    def formula_svg(latex: str, inline: bool = True) -> str:
-        """Return a formula as SVG."""
-        from xml.etree.ElementTree import tostring
-
-        import ziamath
-
-        ziamath.config.svg2, size = False, 16
-        drawing = ziamath.Latex(latex, size=size, color="currentColor", inline=inline).svgxml()
-        _, top, _, height = map(float, drawing.get("viewBox").split())
-        em = {side: f"{float(drawing.get(side)) / size:.3f}em" for side in ("width", "height")}
-        drawing.attrib |= em | {"style": f"vertical-align:{-(top + height) / size:.3f}em"}
-        drawing.attrib |= {"role": "img", "aria-label": " ".join(latex.split())}
-        return tostring(drawing, encoding="unicode")
+from ptcc_certify.report.notation import formula_svg
 
 
 def formula(page: Any, node: nodes.Element, inline: bool) -> str:
     """Return the SVG of a formula; one that cannot be set is a warning that names its place."""
     latex = node.astext()
     try:
-        unknown = re.search(r">(\\[A-Za-z]+)<", convert(latex))  # it would be printed as it is
+        unknown = re.search(r">(\\[A-Za-z]+)<", tex2mml(latex))  # it would be printed as it is
         if unknown is None:
             return formula_svg(latex, inline)
         fault = f"unknown command {unknown[1]}"

@@ -34,6 +34,7 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
     there = {"graph": n <= DRAWN_NODES}
     if run is not None:
         slid = run.sliding is not None
+        there["states"] = n <= INPUT_NODES and not saved.constant
         there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
         there["input"] = n <= INPUT_NODES and (slid or not saved.constant)

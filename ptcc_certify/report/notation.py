@@ -13,8 +13,9 @@ from fractions import Fraction
 from typing import Any
 
 import jinja2
-from latex2mathml.converter import convert
+import ziamath
 from markupsafe import Markup, escape
+from ziamath.tex import tex2mml
 
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.certificate.certificate import Certificate
@@ -30,6 +31,8 @@ AUTHORS = "Zhen-Hua Zhu, Huaiyu Wu, Zhi-Hong Guan, Zhi-Wei Liu, Yang Chen, Xiuju
 TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic networks with disturbances"
 
 _MINUS = "\N{MINUS SIGN}"
+#: Units of a formula's drawing in the size of its letters.
+_EM = 200
 _LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4"}
 
 # ---------------------------------------------------------------------- texts of the file
@@ -41,15 +44,16 @@ def printable(text: str, limit: int = CHARACTERS) -> str:
     return "".join(c if c.isprintable() else f"\\u{{{ord(c):x}}}" for c in short)
 
 
-def label(text: str) -> Markup:
+def label(text: str, limit: int = CHARACTERS) -> Markup:
     """Return a label; ``bdi`` keeps its direction of writing to itself."""
-    return Markup("<bdi>{}</bdi>").format(printable(text))
+    return Markup("<bdi>{}</bdi>").format(printable(text, limit))
 
 
-def labels(nodes: Sequence[Any], names: Sequence[str] | None = None) -> Markup:
-    """Return up to 30 labels, or those of nodes, and how many more there are."""
-    listing = Markup(", ").join(label(node if names is None else names[node]) for node in nodes[:LISTED])
-    return listing + (f" and {len(nodes) - LISTED:,} more" if len(nodes) > LISTED else "")
+def labels(nodes: Sequence[Any], names: Sequence[str] | None = None, most: int = LISTED) -> Markup:
+    """Return up to ``most`` labels, or those of nodes, and how many more there are; those of a few are cut shorter."""
+    limit = CHARACTERS if most >= LISTED else CHARACTERS // 2
+    listing = Markup(", ").join(label(node if names is None else names[node], limit) for node in nodes[:most])
+    return listing + (f" and {len(nodes) - most:,} more" if len(nodes) > most else "")
 
 
 # ---------------------------------------------------------------------- numbers
@@ -79,13 +83,15 @@ def rational(x: Fraction) -> str:
 def _near(x: Fraction) -> Markup:
     if abs(x) > 10**300:
         return Markup("beyond {}10<sup>300</sup>").format("" if x > 0 else _MINUS)
-    return "\N{ALMOST EQUAL TO} " + power(f"{nearest_float(x):.6g}")
+    return "\N{ALMOST EQUAL TO}\u00a0" + power(f"{nearest_float(x):.6g}")
 
 
 def power(text: str) -> Markup:
     """Write ``3e-07`` as a product with a power of ten, and a true minus sign."""
     mantissa, _, exponent = text.partition("e")
-    product = Markup("{} \u00d7 10<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
+    product = (
+        Markup("{}\u00a0\u00d7\u00a010<sup>{}</sup>").format(mantissa, int(exponent)) if exponent else Markup(mantissa)
+    )
     return product.replace("-", _MINUS)
 
 
@@ -126,12 +132,58 @@ def symbol(name: str) -> Markup:
     return indexed(f"{letter}_{index}" if index else letter)
 
 
-def equations(protocol: Protocol) -> Markup:
-    """Return the equations of a protocol in MathML; their LaTeX is the text in their place."""
-    source = protocol.latex()
-    latex = re.sub(r"\\(operatorname|mathrm)\b", r"\\text", source.replace("{aligned}", "{align*}"))
-    opening = Markup('<math display="block" alttext="{}">').format(" ".join(source.split()))
-    return opening + Markup(convert(latex, display="block").partition(">")[2])
+def formula_svg(latex: str, inline: bool = True) -> Markup:
+    r"""Draw a formula as inline SVG, in the colour and the size of the text around it; no font is needed.
+
+    Parameters
+    ----------
+    latex : str
+        In LaTeX, without dollar signs; it is the text for who cannot see the picture.
+    inline : bool
+        Whether the formula stands in a line of text; otherwise it is displayed.
+
+    Returns
+    -------
+    Markup
+        A text of HTML, the element ``svg``, the same for the same formula.
+
+    Examples
+    --------
+    >>> print(formula_svg("-x").partition(" style")[0])
+    <svg role="img" aria-label="-x" viewBox="-8 -116 298 138"
+    >>> "<text" in formula_svg(r"\frac{\rho_1}{T - t}", inline=False)
+    False
+    """
+    mathml = tex2mml(latex, inline=inline).replace('rowspacing="3pt"', 'rowspacing="0.4em"')
+    before, ziamath.config.svg2 = ziamath.config.svg2, False
+    try:
+        drawn = ziamath.Math(mathml, size=_EM, margin=_EM / 10).svgxml()
+    finally:
+        ziamath.config.svg2 = before
+    left, top, width, height = (round(float(x)) for x in drawn.attrib["viewBox"].split())
+    shape = f"width:{width / _EM:.4g}em;height:{height / _EM:.4g}em;vertical-align:{-(top + height) / _EM:.4g}em"
+    paths = [_relative_path(path.attrib["d"]) for path in drawn.iter("path")]
+    bars = ({key: round(float(bar.attrib[key])) for key in ("x", "y", "width", "height")} for bar in drawn.iter("rect"))
+    paths += ["M{x} {y}h{width}v{height}h-{width}z".format_map(bar) for bar in bars]
+    picture = Markup('<svg role="img" aria-label="{}" viewBox="{}" style="{}"><path d="{}" fill="currentColor"/></svg>')
+    return picture.format(" ".join(latex.split()), f"{left} {top} {width} {height}", shape, "".join(paths))
+
+
+def _relative_path(path: str) -> str:
+    """Write the whole coordinates of an SVG path from point to point, which takes half the letters."""
+    x = y = 0
+    steps = []
+    for letter, numbers in re.findall("([MLQZ])([^MLQZ]*)", path):
+        values = [round(float(number)) for number in numbers.split()]
+        moved = [value - (y if k % 2 else x) for k, value in enumerate(values)]
+        if values:
+            x, y = values[-2:]
+        if letter == "M":
+            moved = values
+        elif letter == "L" and not any(moved):
+            continue
+        steps.append((letter if letter == "M" else letter.lower()) + " ".join(map(str, moved)).replace(" -", "-"))
+    return "".join(steps)
 
 
 # ---------------------------------------------------------------------- words
@@ -154,18 +206,22 @@ def agent_parts(saved: Certificate) -> list[str]:
 
 
 def state_columns(
-    saved: Certificate, heads: tuple[str, str, str, str], rows: int, written: Callable[[tuple[Fraction, Fraction]], str]
+    saved: Certificate,
+    heads: tuple[str, str, str, str],
+    agents: Sequence[int],
+    written: Callable[[tuple[Fraction, Fraction]], str],
 ) -> dict[str, list[str]]:
-    """Return initial state, ``sigma(0)`` and final state of the first agents, as far as there are, by their heads.
+    """Return initial state, ``sigma(0)`` and final state of agents, as far as there are, by their heads.
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    columns = {heads[0]: [rational(x) for x in (saved.initial_state or ())[:rows]]}
+    x0, sigma0 = saved.initial_state or (), saved.sigma0 or ()
+    columns = {heads[0]: [rational(x0[k]) for k in agents]}
     if not saved.direct:
-        columns[heads[1]] = [rational(x) for x in (saved.sigma0 or ())[:rows]]
-    if saved.final_state is not None:
+        columns[heads[1]] = [rational(sigma0[k]) for k in agents]
+    if saved.final_state is not None and (intervals := saved.final_state.intervals):
         ends = heads[2] if saved.verdict == "certified" else heads[3]
-        columns[ends] = [written(x) for x in (saved.final_state.intervals or ())[:rows]]
+        columns[ends] = [written(intervals[k]) for k in agents]
     return columns
 
 

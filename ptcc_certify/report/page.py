@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
+from datetime import date
 from fractions import Fraction
 from functools import cache
 from importlib import resources
-from itertools import islice
+from itertools import groupby, islice
 from typing import Any
 
 import jinja2
@@ -19,21 +20,27 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
+from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.screen import camps, remarks_on
 from ptcc_certify.theorems.table import THEOREMS
 
-#: Rows of agents, and of leader groups, that are written out.
-ROWS, GROUPS = 200, 40
+#: Agents up to which each has a row, and how many there are of either extreme above; leader groups that have a row.
+ROWS, EXTREMES, GROUPS = 60, 10, 12
+#: Agents up to which the first screen tells where each of them ends, and labels of a list there.
+FEW = 8
 
 
-def report_html(saved: Certificate, *, no_run: str = "no run was asked for") -> str:
+def report_html(saved: Certificate, *, no_run: str = "no run was asked for", day: date | None = None) -> str:
     """Return a certificate as one page of HTML that loads nothing and runs no script.
+
+    The first screen is the answer in words; the same certificate makes the same page on the same day.
 
     Parameters
     ----------
@@ -42,6 +49,8 @@ def report_html(saved: Certificate, *, no_run: str = "no run was asked for") -> 
         (:meth:`Certificate.with_simulation`) there are figures of bound and input.
     no_run : str
         Why there is no trajectory, for the page.
+    day : date, optional
+        The day that the page gives as that of its writing; today by default.
 
     Returns
     -------
@@ -57,16 +66,18 @@ def report_html(saved: Certificate, *, no_run: str = "no run was asked for") -> 
     >>> "<h1>Bipartite consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
-    return _environment().get_template("page.html").render(_view(saved) | {"no_run": no_run})
+    return _environment().get_template("page.html").render(_view(saved) | _written(day) | {"no_run": no_run})
 
 
-def rejected_html(error: RejectedCertificate) -> str:
+def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str:
     """Return the page of a certificate that the independent check rejects: the reason, and no claim.
 
     Parameters
     ----------
     error : RejectedCertificate
         What :func:`ptcc_certify.certificate.certificate.read_certificate` raised.
+    day : date, optional
+        The day that the page gives as that of its writing; today by default.
 
     Returns
     -------
@@ -91,7 +102,12 @@ def rejected_html(error: RejectedCertificate) -> str:
     title = f"REJECTED: {name}"
     command = printable(shlex.quote(error.path.name), 200)
     template = _environment().get_template("rejected.html")
-    return template.render(title=title, name=name, quoted=command, report=error.report)
+    return template.render(title=title, name=name, quoted=command, report=error.report, **_written(day))
+
+
+def _written(day: date | None) -> dict[str, str]:
+    """Return the day of writing, as a page gives it."""
+    return {"written": (day or date.today()).isoformat()}
 
 
 @cache
@@ -103,7 +119,13 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags}
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
-    environment.globals |= {"ROWS": ROWS, "GROUPS": GROUPS, "DRAWN_NODES": DRAWN_NODES}
+    environment.globals |= {
+        "ROWS": ROWS,
+        "EXTREMES": EXTREMES,
+        "GROUPS": GROUPS,
+        "FEW": FEW,
+        "DRAWN_NODES": DRAWN_NODES,
+    }
     return environment
 
 
@@ -124,14 +146,17 @@ def _view(saved: Certificate) -> dict[str, Any]:
         **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
         "remarks": remarks_on(saved.structure),
-        "equations": texts.equations(saved.protocol),
+        "equations": texts.formula_svg(saved.protocol.latex(), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
-        **dict(zip(("states_head", "states"), _states(saved), strict=True)),
+        "states": _states(saved),
+        "endings": _endings(saved),
+        "obligations": _obligations(saved),
+        "group_sizes": sorted(Counter((len(c.nodes), c.balanced) for c in saved.structure.closed_components).items()),
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
-        "figures": draw(saved, ("graph", "decay", "sliding", "input")),
+        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input")) | _distributions(saved),
         "camp_counts": [(word, sizes[camp]) for camp, word in named.items() if sizes[camp]],
         "gap": _gap(saved),
         "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
@@ -151,21 +176,57 @@ def _title(saved: Certificate, invariant: str) -> Markup:
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the table of initial and final states."""
+    """Return head and rows of the table of initial and final states: of all agents, or of those at the extremes."""
     if saved.initial_state is None:
         return [], []
     heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
-    numbers = texts.state_columns(saved, heads, ROWS, enclosed)
-    labels = [texts.label(name) for name in saved.graph.labels[:ROWS]]
-    rows = zip(labels, agent_parts(saved)[:ROWS], *numbers.values(), strict=True)
-    return ["Agent", "Part", *numbers], [list(row) for row in rows]
+    agents, parts = _tabled(saved), agent_parts(saved)
+    numbers = texts.state_columns(saved, heads, agents, enclosed)
+    known = ([texts.label(saved.graph.labels[k]) for k in agents], [parts[k] for k in agents])
+    return ["Agent", "Part", *numbers], [list(row) for row in zip(*known, *numbers.values(), strict=True)]
+
+
+def _tabled(saved: Certificate) -> list[int]:
+    """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
+    if saved.graph.n_nodes <= ROWS:
+        return list(range(saved.graph.n_nodes))
+    states = saved.initial_state if saved.final_state is None else saved.final_state.states
+    order = sorted(range(saved.graph.n_nodes), key=lambda k: (states or ())[k], reverse=True)
+    return order[:EXTREMES] + order[-EXTREMES:]
+
+
+def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
+    """Return agents and where they end, those together that end at the same; of many, the two extremes."""
+    if saved.final_state is None or not (intervals := saved.final_state.intervals):
+        return []
+    agents = sorted(range(len(intervals)), key=lambda k: intervals[k], reverse=True)
+    if len(agents) > FEW:
+        agents = [agents[0], agents[-1]]
+    same = groupby(agents, key=intervals.__getitem__)
+    return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
+
+
+def _obligations(saved: Certificate) -> list[tuple[VerifiedObligation, list[VerifiedObligation]]]:
+    """Return the obligations of one kind and statement together, in the order of the first of each."""
+    kinds: dict[tuple[str, str, str], list[VerifiedObligation]] = {}
+    for obligation in saved.report.obligations:
+        kinds.setdefault((obligation.kind, obligation.statement, obligation.lemma), []).append(obligation)
+    return [(same[0], same) for same in kinds.values()]
+
+
+def _distributions(saved: Certificate) -> dict[str, Any]:
+    """Draw where agents end and whom they listen to, of a graph that is too large to be drawn."""
+    if saved.graph.n_nodes <= DRAWN_NODES:
+        return {}
+    ends = {} if saved.final_state is None else {"final": plot_final_states(saved).figure}
+    return ends | {"degrees": plot_degrees(saved.graph).figure}
 
 
 def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
     if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.initial_state is None):
         return []
-    instants = [(Fraction(str(f)), f"{f} T") for f in FRACTIONS]
+    instants = [(Fraction(str(f)), Markup(f"{f}\u00a0T")) for f in FRACTIONS]
     if not saved.direct:
         share = 1 - saved.protocol.span / saved.protocol.T
         instants = [(share, texts.indexed("T_r")), *(pair for pair in instants if pair[0] > share)]

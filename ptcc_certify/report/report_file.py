@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ def write_report(
     simulation: bool | None = None,
     progress: Callable[[str], None] = lambda step: None,
     memory: float = 1,
+    day: date | None = None,
 ) -> str:
     """Check a certificate's file and write a report of it: a page (``.html``) or a statement in LaTeX (``.tex``).
 
@@ -45,6 +47,8 @@ def write_report(
         Told which of ``independent check``, ``simulation``, ``report`` begins.
     memory : float
         GB that the check may take; see :func:`ptcc_certify.checker.check`.
+    day : date, optional
+        The day that a page gives as that of its writing; today by default.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def write_report(
     except RejectedCertificate as error:
         if suffix == ".tex":
             raise
-        write_atomically(path, rejected_html(error))
+        write_atomically(path, rejected_html(error, day=day))
         return "rejected"
     progress("simulation")
     saved, why = _with_run(saved, simulation)
@@ -102,7 +106,7 @@ def write_report(
             write_atomically(file, content)
         write_atomically(path, text)
     else:
-        write_atomically(path, report_html(saved, no_run=why))
+        write_atomically(path, report_html(saved, no_run=why, day=day))
     return saved.verdict
 
 

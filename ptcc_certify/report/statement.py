@@ -73,9 +73,8 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[s
     if saved.initial_state is None:
         return [], []
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
-    numbers = texts.state_columns(
-        saved, heads, texts.LISTED, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
-    )
+    agents = range(min(saved.graph.n_nodes, texts.LISTED))
+    numbers = texts.state_columns(saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0]))
     labels = [texts.printable(label, texts.CHARACTERS // 2) for label in saved.graph.labels[: texts.LISTED]]
     return list(numbers), list(zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False))
 

@@ -188,7 +188,7 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     if saved.rate is None or saved.effort is None or saved.upper_bound is None or saved.overshoot is None:
         return
     below(re.findall(rf"rate {NUMBER}, ", repr(saved)), saved.rate)
-    page = re.sub(r" \u00d7 10<sup>(.*?)</sup>", r"e\1", report_html(saved)).replace("\u2212", "-")
+    page = re.sub(r"\s\u00d7\s10<sup>(.*?)</sup>", r"e\1", report_html(saved)).replace("\u2212", "-")
     text = re.sub(r" \\cdot 10\^\{(.*?)\}", r"e\1", report_latex(saved))
     text = re.sub(r"\s*\\cdot\s*10\^\{(.*?)\}", r"e\1", text)
 
