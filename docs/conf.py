@@ -43,7 +43,7 @@ myst_heading_anchors = 3
 os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"  # figures of cells are part of the page
 nb_execution_mode = "force"
 nb_execution_in_temp = True
-nb_execution_raise_on_error = True
+nb_execution_raise_on_error = nb_execution_show_tb = True
 nb_execution_timeout = 300
 nb_merge_streams = True
 nb_ipywidgets_js: dict[str, dict[str, str]] = {}  # the scripts of widgets would come from a network
