@@ -18,7 +18,10 @@ ROOMS = {
         "Protocols and disturbances",
         "protocols protocols.gain protocols.gain_limits protocols.disturbance protocols.reaching_time",
     ),
-    "certificate": ("Certificates", "certificate.certificate certificate.request certificate.verdict"),
+    "certificate": (
+        "Certificates",
+        "certificate.certificate certificate.request certificate.verdict certificate.vector_states",
+    ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
         "Bounds: error, final state, input",
@@ -61,15 +64,15 @@ def entry(name: str, thing: Any) -> str:
 def exported(package: Any) -> dict[str, list[str]]:
     """Return the public names of a package by the module within it that defines them."""
     modules: dict[str, list[str]] = {}
-    for name in package.__all__:
-        modules.setdefault(package._EXPORTS[name].removeprefix(f"{package.__name__}."), []).append(name)
+    for name, module in package._EXPORTS.items():
+        modules.setdefault(module.removeprefix(f"{package.__name__}."), []).append(name)
     return modules
 
 
 def further_names(module_name: str) -> list[str]:
     """Return classes and functions of a module that ``ptcc_certify`` does not export and whose docstring has parts."""
     module = import_module(module_name)
-    flat = [getattr(ptcc_certify, name) for name in ptcc_certify.__all__]
+    flat = [getattr(ptcc_certify, name) for name in ptcc_certify._EXPORTS]
     return [
         name
         for name, thing in vars(module).items()
