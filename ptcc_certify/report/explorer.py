@@ -488,7 +488,7 @@ def _figure(certificate: Certificate) -> Figure:
     with style.context(STYLE):
         figure = Figure((width * len(draw), height), dpi=_DPI, layout="none")  # type: ignore[arg-type]
         # Fixed margins in inches, for labels, and for three lines of a legend: finding them takes half the drawing.
-        left, right, bottom, top, gap = 0.65, 0.35, 0.42, 0.55, 1.25
+        left, right, bottom, top, gap = 0.65, 0.35, 0.42, 0.7, 1.25
         whole, panel_width = width * len(draw), (width * len(draw) - left - right - gap * (len(draw) - 1)) / len(draw)
         figure.subplots_adjust(left / whole, bottom / height, 1 - right / whole, 1 - top / height, gap / panel_width)
         for place, panel in enumerate(draw, start=1):

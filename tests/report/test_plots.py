@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import cache
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import same_color, to_hex
+from matplotlib.colors import same_color, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyArrowPatch
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch, Polygon
+from matplotlib.text import Annotation, Text
 from scipy.integrate import quad
 
 import ptcc_certify
-from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
+from ptcc_certify.gain_design import design
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, KAMADA_NODES, LABELLED_NODES
+from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.gain_limits import Actuator
 from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.report.plots.agents import AGENT, CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.graph import EDGE_STYLES, HALO, plot_graph
+from ptcc_certify.report.plots.graph import GROUND, plot_graph
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
 from ptcc_certify.report.plots.input import plot_effort, plot_input
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
-from ptcc_certify.report.plots.style import CAMP_COLOURS, DOUBLE_COLUMN, SINGLE_COLUMN, STYLE, save_figure
-from ptcc_certify.report.plots.trajectory import plot_run, plot_trajectory
+from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.trade_off import plot_trade_off
+from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
@@ -55,6 +65,10 @@ def graph_of(name: str) -> SignedDigraph:
 
 @cache
 def certified(name: str) -> Certificate:
+    if name == "sliding":
+        example = EXAMPLES[5]
+        start, sigma0 = (list(map(float, text.split(","))) for text in (example.x0, example.sigma0 or ""))
+        return certify(graph_of("fig3b"), example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance)
     graph = graph_of(name)
     if name.startswith("fig"):
         example = select(name)[0][0]
@@ -95,24 +109,53 @@ def shows(drawn: np.ndarray, row: np.ndarray, scale: float) -> bool:
 # ---------------------------------------------------------------------- agents over time
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_input_is_drawn_by_camp_under_its_certified_peak(name: str) -> None:
+def agent_lines(ax: Axes) -> list[Line2D]:
+    return [line for line in ax.lines if line.get_gid() == AGENT]
+
+
+def peak_of(ax: Axes) -> Annotation | None:
+    """The text at the line of the certified peak."""
+    return next((text for text in ax.texts if text.get_text().startswith("certified peak")), None)  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("name", ["fig1a", "fig3b", "apart", "single"])
+def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> None:
     cert = certified(name)
     run = cert.trajectory
-    assert run is not None
-    states, ax = drawn(plot_trajectory(run, cert.structure)), drawn(plot_input(run, cert.structure, cert))
-    n, peak = cert.graph.n_nodes, cert.effort and cert.effort.peak
-    assert len(states.lines) == n + 1 and len(ax.lines) == n + 1 + (peak is not None)
+    assert run is not None and cert.graph.n_nodes <= NAMED_AGENTS
+    states, ax = drawn(plot_trajectory(cert)), drawn(plot_input(cert))
     for values, axes in ((run.states, states), (np.abs(run.input), ax)):
         scale = np.abs(values[:, :1]).max()
+        assert len(agent_lines(axes)) == cert.graph.n_nodes
         for row, camp in zip(values, camps(cert.structure), strict=True):
-            colours = [line.get_color() for line in axes.lines[:n] if shows(line.get_ydata(), row, scale)]
-            assert any(same_color(colour, CAMP_COLOURS[camp]) for colour in colours)
-    assert set(labelled(ax)) == {*camps(cert.structure), "deadline"} | ({"certified peak"} if peak else set())
-    if peak is not None:
-        height = labelled(ax)["certified peak"].get_ydata()[0]  # type: ignore[attr-defined]
-        assert height == float(peak.largest) >= np.abs(run.input).max() * (1 - 1e-9)
-        assert ax.get_ylim()[0] < height < ax.get_ylim()[1] and ax.get_yscale() == "log"
+            colours = [line.get_color() for line in agent_lines(axes) if shows(line.get_ydata(), row, scale)]
+            assert any(same_color(colour, CAMP_STYLES[camp][0]) for colour in colours)
+        assert set(labelled(axes)) == {*camps(cert.structure), "deadline $T$"}
+        written = ", ".join(text.get_text() for text in axes.texts if text is not peak_of(axes))
+        assert set(cert.graph.labels) <= set(written.split(", ")) or "+" in written
+    peak, text = cert.effort and cert.effort.peak, peak_of(ax)
+    assert (text is None) == (peak is None)
+    if text is not None and peak is not None:
+        assert float(text.get_text().split()[2].strip(",")) >= peak.largest >= np.abs(run.input).max() * (1 - 1e-9)
+        assert text.xy[1] == float(peak.largest) < ax.get_ylim()[1] or text.get_text().endswith("above")
+
+
+def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
+    cert = certified("fig5b")
+    run, group = cert.trajectory, np.array(camps(cert.structure))
+    assert run is not None and cert.graph.n_nodes > NAMED_AGENTS
+    for ax, values, middle in (
+        (plot_trajectory(cert), run.states, np.median),
+        (plot_input(cert), np.abs(run.input), np.max),
+    ):
+        shown = labelled(drawn(ax))
+        for part in set(group):
+            rows = values[group == part]
+            assert len(rows) > NAMED_OF_PART
+            line = next(handle for label, handle in shown.items() if label.startswith(part))
+            seen = np.asarray(line.get_ydata())  # type: ignore[attr-defined]
+            assert seen[:50] == pytest.approx(middle(rows, axis=0)[:50])
+        assert len(agent_lines(ax)) <= 2 * len(set(group)) and 2 <= len(ax.texts) <= 9
 
 
 def test_the_peak_is_drawn_where_it_holds_only() -> None:
@@ -132,16 +175,17 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
     assert 0 < own < peak
     for options, height in expected:
         run = simulate(graph, protocol, start, **options)
-        ax = drawn(plot_input(run, cert.structure, cert))
-        line = labelled(ax).get("certified peak")
-        assert (line and line.get_ydata()[0]) == height  # type: ignore[attr-defined]
+        ax = drawn(plot_input(run, certificate=cert))
+        text = peak_of(ax)
+        assert (text and not text.get_text().endswith("above") and text.xy[1]) in (height, False)
+        assert (text is None) == (height is None)
         assert height is None or np.abs(run.input).max() <= height * (1 + 1e-9)
-        steps = {line.get_drawstyle() for line in ax.lines[:6]}
+        steps = {line.get_drawstyle() for line in agent_lines(ax)}
         assert steps == {"steps-post" if run.held_input is not None else "default"}
     region = certify(graph, protocol, start, initial_set=5, simulation=False)
     run = simulate(graph, protocol, start)
     assert region.effort is not None and region.effort.peak is not None
-    assert "certified peak" not in labelled(plot_input(run, region.structure, region))
+    assert peak_of(plot_input(run, certificate=region)) is None
 
 
 def test_an_input_without_bound_is_drawn_with_its_start() -> None:
@@ -149,10 +193,10 @@ def test_an_input_without_bound_is_drawn_with_its_start() -> None:
     slow = NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1)
     cert = certify(pair, slow, [1, -1])
     assert cert.trajectory is not None
-    ax = drawn(plot_input(cert.trajectory, cert.structure, cert))
+    ax = drawn(plot_input(cert))
     size = np.abs(cert.trajectory.input)
     assert ax.get_ylim()[0] < size[:, 0].min() < 1e-3 * size.max() < size.max() < ax.get_ylim()[1]
-    assert "certified peak" not in labelled(ax)
+    assert ax.get_yscale() == "log" and peak_of(ax) is None
 
 
 def test_the_input_of_the_sliding_mode() -> None:
@@ -161,97 +205,137 @@ def test_the_input_of_the_sliding_mode() -> None:
     graph = graph_of("fig3b")
     cert = certify(graph, example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance)
     assert cert.trajectory is not None
-    ax = drawn(plot_input(cert.trajectory, cert.structure, cert))
-    assert {"deadline", "$T_r$"} <= set(labelled(ax))
+    ax = drawn(plot_input(cert))
+    assert {"deadline $T$", "$T_r$"} <= set(labelled(ax))
     peak = cert.effort and cert.effort.peak
-    assert ("certified peak" in labelled(ax)) == (peak is not None)
+    assert (peak_of(ax) is not None) == (peak is not None)
     run = cert.trajectory
     assert isinstance(run, SlidingTrajectory)
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
-    answers = {line.get_ydata()[late].round(6).tobytes() for line in ax.lines[:6]}
+    answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
     assert answers == {row.round(6).tobytes() for row in np.abs(run.disturbance[:, late])}
     other = certify(graph, example.protocol(), start, sigma0=[1.0] * 6, simulation=False)
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
-        plot_input(cert.trajectory, cert.structure, other)
+        plot_input(cert.trajectory, certificate=other)
 
 
 def test_a_certificate_of_something_else_is_refused() -> None:
-    cert, structure = certified("fig1a"), certified("fig1a").structure
+    cert = certified("fig1a")
     run = cert.trajectory
     assert run is not None and cert.initial_state is not None
     other = certified("fig3b")
     with pytest.raises(ValueError, match="another graph than"):
-        plot_input(run, structure, other)
+        plot_input(run, certificate=other)
     with pytest.raises(ValueError, match="another protocol than"):
-        plot_input(run, structure, certify(cert.graph, PROTOCOL, cert.initial_state, simulation=False))
+        plot_input(run, certificate=certify(cert.graph, PROTOCOL, cert.initial_state, simulation=False))
     with pytest.raises(ValueError, match="another initial state than"):
-        plot_input(run, structure, certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
+        plot_input(run, certificate=certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
     without = certify(cert.graph, cert.protocol, simulation=False)
-    assert "certified peak" not in labelled(plot_input(run, structure, without))
+    assert peak_of(plot_input(run, certificate=without)) is None
     columns = simulate(cert.graph, cert.protocol, np.eye(6)[:, :2], times=[0])
-    with pytest.raises(ValueError, match="holds 2 initial states; draw the input of one"):
-        plot_input(columns, structure)
+    with pytest.raises(ValueError, match="holds 2 initial states; draw a run of one"):
+        plot_input(columns)
 
 
 # ---------------------------------------------------------------------- graphs
+
+
+def arrows_in(ax: Axes) -> list[FancyArrowPatch]:
+    return [patch for patch in ax.patches if isinstance(patch, FancyArrowPatch)]
+
+
+def nodes_in(ax: Axes) -> dict[tuple[float, float], Line2D]:
+    """The marks of the nodes by their places."""
+    marks = [line for line in ax.lines if line.get_gid() == "nodes"]
+    return {(x, y): line for line in marks for x, y in line.get_xydata()}  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: str) -> None:
     structure = analyse(graph_of(name))
     graph, ax = structure.graph, drawn(plot_graph(structure))
-    assert [text.get_text() for text in ax.texts] == list(graph.labels)
-    place = np.array([text.xy for text in ax.texts])
-    group = camps(structure)
-    found = {}
-    for collection in ax.collections:
-        for point in collection.get_offsets():
-            size = float(collection.get_sizes()[0])
-            found[tuple(point)] = to_hex(collection.get_facecolor()[0]), to_hex(collection.get_edgecolor()[0]), size
+    found, group = nodes_in(ax), camps(structure)
     assert len(found) == graph.n_nodes
-    for point, camp in zip(place, group, strict=True):
-        colour, edge, _ = found[tuple(point)]
-        assert same_color(colour, CAMP_COLOURS[camp])
-        assert (edge == "#000000") == (camp != "followers")
-    sizes = {(found[tuple(p)][2], camp == "followers") for p, camp in zip(place, group, strict=True)}
-    if len(sizes) == 2:
-        assert min(s for s, follows in sizes if not follows) > max(s for s, follows in sizes if follows)
-    arrows = [patch for patch in ax.patches if isinstance(patch, FancyArrowPatch)]
-    assert len(arrows) == graph.n_edges
-    for arrow, source, target, sign in zip(arrows, graph.source, graph.target, graph.sign, strict=True):
-        ends = arrow._posA_posB  # type: ignore[attr-defined]
-        assert np.array_equal(ends, [place[source], place[target]])
-        colour, line, _ = EDGE_STYLES[int(sign)]
-        assert same_color(arrow.get_edgecolor(), colour) and arrow.get_linestyle() == line
+    assert [text.get_text() for text in ax.texts[: graph.n_nodes]] == list(graph.labels)
+    for camp in set(group):
+        own = [line for line in found.values() if same_color(line.get_color(), CAMP_STYLES[camp][0])]
+        assert len(own) == group.count(camp)
+        assert all((line.get_markeredgecolor() == "black") == (camp != "followers") for line in own)
+    heads = [patch.get_arrowstyle() for patch in arrows_in(ax)]
+    assert sum(1 + (type(head).__name__ == "CurveFilledAB") for head in heads) == graph.n_edges
+    for patch, arrow in zip(arrows_in(ax), arrows_of(graph), strict=True):
+        colour, line, _ = EDGE_STYLES[arrow.sign]
+        assert same_color(patch.get_edgecolor(), colour) and patch.get_linestyle() == line
     signs = {EDGE_STYLES[int(sign)][2] for sign in graph.sign}
     ground = {"leader group"} if "followers" in group else set()
     assert set(labelled(ax)) == {*group} | signs | ground
+    assert not {colour for colour, _, _ in EDGE_STYLES.values()} & {colour for colour, _ in CAMP_STYLES.values()}
+
+
+@pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b", "apart", "ring"])
+def test_every_arrow_keeps_away_from_nodes_that_are_not_its_ends(name: str) -> None:
+    graph = ring(LABELLED_NODES) if name == "ring" else graph_of(name)
+    ax = drawn(plot_graph(graph))
+    nodes = nodes_in(ax)
+    places = ax.transData.transform(list(nodes))
+    radius = max(line.get_markersize() for line in nodes.values()) / 2 * ax.figure.dpi / 72
+    for patch in arrows_in(ax):
+        ends = ax.transData.transform(patch._posA_posB)  # type: ignore[attr-defined]
+        curve = arc(*ends, patch.get_connectionstyle().rad, np.linspace(0, 1, 60))  # type: ignore[attr-defined]
+        gaps = np.linalg.norm(places[:, None] - curve, axis=-1).min(axis=1)
+        assert np.sort(gaps)[2:].min(initial=np.inf) > radius  # the two nearest are its ends
+
+
+def test_weights_are_written_where_they_differ_and_there_are_few() -> None:
+    differ = plot_graph([("a", "b", 1), ("b", "c", -2.5), ("c", "a", "1/3")])
+    assert {text.get_text() for text in differ.texts[3:]} == {"1", "2.5", "0.333"}
+    assert len(plot_graph([("a", "b", 2), ("b", "c", -2)]).texts) == 3
+    many = plot_graph(SignedDigraph.from_edges([(k, k % 30 + 1, k) for k in range(1, 31)]))
+    assert len(many.texts) == 30 and len({patch.get_linewidth() for patch in arrows_in(many)}) == 30
 
 
 def test_the_layout_is_the_same_in_every_run_and_separates_the_nodes() -> None:
-    for graph in (graph_of("apart"), ring(KAMADA_NODES + 10)):
-        first, again = (np.vstack([c.get_offsets() for c in plot_graph(analyse(graph)).collections]) for _ in range(2))
+    for graph in (graph_of("apart"), ring(FREE_NODES + 10)):
+        first, again = (np.array(list(nodes_in(plot_graph(graph)))) for _ in range(2))
         assert np.array_equal(first, again)
-        gaps = np.linalg.norm(first[:, None] - first[None], axis=-1) + np.eye(len(first))
-        assert gaps.min() > 0.1 / math.sqrt(len(first))
+        gaps = np.linalg.norm(first[:, None] - first[None], axis=-1) + 100 * np.eye(len(first))
+        assert gaps.min() > 9  # points
 
 
 def ring(n: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(k, k % n + 1, 1) for k in range(1, n + 1)])
 
 
-def test_large_graphs_are_drawn_without_labels_or_refused() -> None:
-    assert len(plot_graph(analyse(ring(LABELLED_NODES))).texts) == LABELLED_NODES
-    assert not plot_graph(analyse(ring(LABELLED_NODES + 1))).texts
-    assert len(drawn(plot_graph(analyse(ring(DRAWN_NODES)))).patches) == DRAWN_NODES
-    with pytest.raises(ValueError, match=r"^graphs are drawn up to 300 nodes; this one has 301$"):
-        plot_graph(analyse(ring(DRAWN_NODES + 1)))
+def test_large_graphs_are_drawn_as_matrices_camp_by_camp() -> None:
+    assert len(plot_graph(ring(LABELLED_NODES)).texts) == LABELLED_NODES
+    camp = [(f"a{j}", f"a{(j + 1) % 30}", 1) for j in range(30)] + [(f"b{j}", f"b{(j + 1) % 30}", 1) for j in range(30)]
+    ax = drawn(plot_graph([*camp, ("a0", "b0", -1), ("b3", "a3", -1), ("a5", "z", 1)]))
+    (image,) = ax.images
+    cells = np.asarray(image.get_array())
+    ally, opponent = (np.all(np.isclose(cells, to_rgb(EDGE_STYLES[sign][0])), axis=-1) for sign in (1, -1))
+    assert ally.sum() == 61 and opponent.sum() == 2
+    assert opponent[30:60, :30].sum() == opponent[:30, 30:60].sum() == 1  # between the camps
+    assert {"first camp (30)", "second camp (30)", "followers (1)"} <= set(labelled(ax))
 
 
 def test_labels_are_drawn_as_they_are() -> None:
     edges = [("$x_1$", r"$\frac$", 1), (r"$\frac$", "lone \ud800", -1), ("lone \ud800", "a very long name", 1)]
-    ax = drawn(plot_graph(analyse(SignedDigraph.from_edges(edges))))
+    ax = drawn(plot_graph(edges))
     assert [text.get_text() for text in ax.texts] == ["$x_1$", r"$\frac$", "lone ?", "a very long ..."]
+
+
+def test_the_ground_of_a_leader_group_has_no_hole() -> None:
+    def grounds(name: str) -> list[Polygon]:
+        ax = drawn(plot_graph(graph_of(name)))
+        return [patch for patch in ax.patches if isinstance(patch, Polygon) and patch.get_gid() == "ground"]
+
+    structure = analyse(graph_of("fig5b"))
+    middles = 0
+    for component in structure.closed_components:
+        middles += len(component.nodes) >= 3
+    triangles = [patch for patch in grounds("fig5b") if len(patch.get_xy()) == 4]
+    assert len(triangles) == middles == 2 and all(same_color(patch.get_facecolor(), GROUND) for patch in triangles)
+    assert not grounds("fig1a") and grounds("apart")
 
 
 # ---------------------------------------------------------------------- spectra and frontiers
@@ -260,7 +344,7 @@ def test_labels_are_drawn_as_they_are() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_spectra_with_the_line_of_a_bounded_input(name: str) -> None:
     cert = certified(name)
-    ax, spectrum = drawn(plot_spectrum(cert.structure, cert.protocol)), laplacian_spectrum(cert.structure)
+    ax, spectrum = drawn(plot_spectrum(cert)), laplacian_spectrum(cert.structure)
     shown = labelled(ax)
     if spectrum.nonzero.size:
         points = shown["nonzero eigenvalues"].get_xydata()  # type: ignore[attr-defined]
@@ -282,7 +366,7 @@ def test_spectra_without_a_line() -> None:
     structure = analyse(graph_of("fig1a"))
     endless = NominalProtocol(T=1, rho1=1, rho2=0, kappa=1)
     for protocol in (None, endless):
-        ax = drawn(plot_spectrum(structure, protocol))
+        ax = drawn(plot_spectrum(structure, protocol=protocol))
         assert not any("kappa" in label for label in labelled(ax))
         assert ax.get_xlabel() == "real part of eigenvalue" and ax.get_ylabel() == "imaginary part of eigenvalue"
 
@@ -315,10 +399,10 @@ def test_figures_are_drawn_into_given_axes() -> None:
     assert run is not None
     axes = Figure().subplots(2, 2).ravel()
     given = [
-        plot_input(run, cert.structure, ax=axes[0]),
-        plot_graph(cert.structure, axes[1]),
+        plot_input(run, ax=axes[0]),
+        plot_graph(cert.graph, ax=axes[1]),
         plot_spectrum(cert.structure, ax=axes[2]),
-        plot_frontier(cert, axes[3]),
+        plot_frontier(cert, ax=axes[3]),
     ]
     assert all(a is b for a, b in zip(given, axes, strict=True))
     drawn(axes[0])
@@ -335,14 +419,16 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
     ax = drawn(plot_decay(cert, axis=axis))
     shown = labelled(ax)
     before = run.remaining > 0
-    place = {"left": run.remaining, "time": 1 - run.remaining, "clock": run.clock}[axis][before]
+    T = float(run.protocol.T)
+    place = {"left": run.remaining, "time": T * (1 - run.remaining), "clock": run.clock}[axis][before]
     bound, seen = shown["proved bound"], shown["simulated (CVODES)"]
     floor = shown["integrator's floor"].get_ydata()[0]  # type: ignore[attr-defined]
     assert np.array_equal(bound.get_xdata(), place)  # type: ignore[attr-defined]
     height, size = bound.get_ydata(), seen.get_ydata()  # type: ignore[attr-defined]
-    assert size[0] == 1 and (size <= height * (1 + 1e-9) + floor).all()
-    functions = [line.get_ydata() for line in ax.lines if line.get_xdata() is not None and len(line.get_ydata()) > 2]
-    functions = [y for y in functions if y is not height and y is not size]
+    there = np.isfinite(size)
+    assert size[0] == 1 and there[: there.sum()].all() and not there.all()
+    assert (size[there] <= height[there] * (1 + 1e-6)).all() and size[there].min() > floor
+    functions = [line.get_ydata() for line in ax.lines if len(line.get_ydata()) > 2 and line not in (bound, seen)]
     assert len(functions) == len(cert.envelope.functions) > 1
     assert np.array_equal(height, np.minimum.reduce(functions))
     if axis == "clock":  # straight lines: the slope is half the rate
@@ -350,27 +436,128 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
             assert y == pytest.approx(y[0] * np.exp(-function.rate_below * place / 2), rel=1e-9)
 
 
-def test_the_decay_needs_a_run_and_a_known_axis() -> None:
+@pytest.mark.parametrize("name", ["fig1a", "fig3a", "fig5b", "apart"])
+def test_no_run_is_drawn_above_a_bound(name: str) -> None:
+    cert = certified(name)
+    shown = labelled(plot_decay(cert))
+    seen, bound = (np.asarray(shown[which].get_ydata()) for which in ("simulated (CVODES)", "proved bound"))  # type: ignore[attr-defined]
+    assert np.isfinite(seen).sum() > 20 and not (seen > bound * (1 + 1e-6)).any()
+    norm = np.linalg.norm(cert.trajectory.error, axis=0) if cert.trajectory else np.zeros(0)
+    alone = np.asarray(labelled(plot_decay(cert.trajectory))["simulated (CVODES)"].get_ydata())  # type: ignore[attr-defined]
+    kept = np.isfinite(alone)
+    assert alone[kept] == pytest.approx((norm / norm[0])[: kept.size][kept])
+
+
+def test_the_decay_needs_a_proved_bound_and_a_known_axis() -> None:
     cert = certified("fig3b")
-    with pytest.raises(ValueError, match='axis "days" is unknown; one of left, time, clock'):
+    with pytest.raises(ParameterError, match='axis "days" is unknown; one of left, time, clock'):
         plot_decay(cert, axis="days")
-    with pytest.raises(ValueError, match="holds no simulated run"):
-        plot_decay(certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
+    with pytest.raises(ParameterError, match="has no initial state"):
+        plot_decay(certify(cert.graph, cert.protocol, simulation=False))
+    with pytest.raises(ParameterError, match="holds no proved bound"):
+        plot_decay(certified("single"))
+    with pytest.raises(ParameterError, match="another initial state"):
+        plot_decay(cert.trajectory, certificate=certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
 
 
-def test_closed_components_have_a_ground_where_there_are_followers() -> None:
-    def grounds(name: str) -> int:
-        return sum(same_color(line.get_color(), HALO[0]) and len(line.get_xdata()) > 0 for line in ax_of(name).lines)
+def test_of_a_certificate_without_a_run_the_bounds_are_drawn_and_states_simulated(tmp_path: Path) -> None:
+    cert = certified("fig3b")
+    cert.save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    assert saved.trajectory is None
+    assert not any(label.startswith("simulated") for label in labelled(drawn(plot_decay(saved))))
+    for plot in (plot_trajectory, plot_input):
+        lines = (agent_lines(plot(one)) for one in (saved, cert))
+        for again, first in zip(*lines, strict=True):
+            assert again.get_ydata()[:50] == pytest.approx(first.get_ydata()[:50], nan_ok=True)  # type: ignore[index]
+    assert drawn(plot_spectrum(saved)) and drawn(plot_graph(saved))
 
-    def ax_of(name: str) -> Axes:
-        return drawn(plot_graph(analyse(graph_of(name))))
 
-    structure = analyse(graph_of("fig5b"))
-    leaders = set(structure.leaders.tolist())
-    pairs = zip(structure.graph.source.tolist(), structure.graph.target.tolist(), strict=True)
-    assert grounds("fig5b") == len(leaders) + sum(s in leaders and t in leaders for s, t in pairs)
-    assert grounds("fig1a") == 0
-    assert "leader group" in labelled(ax_of("fig5b"))
+# ---------------------------------------------------------------------- what an editor of figures asks
+
+
+@cache
+def gallery() -> dict[str, Figure]:
+    """Every figure at the width of a column, of few agents, of many, and of one, drawn."""
+    plots: list[tuple[Callable[..., Any], Sequence[str]]] = [
+        *((plot, ("fig3b", "fig5b", "single", "sliding")) for plot in (plot_trajectory, plot_input, plot_graph)),
+        (plot_decay, ("fig3b", "fig5b", "sliding")),
+        *((plot, ("fig3b",)) for plot in (plot_effort, plot_spectrum, plot_frontier)),
+        *((plot, ("sliding",)) for plot in (plot_run, plot_sliding)),
+    ]
+    figures = {f"{name} {plot.__name__}": plot(certified(name)).figure for plot, names in plots for name in names}
+    pair = design(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), max_input=10, initial_bound=1)
+    figures["pair plot_trade_off"] = plot_trade_off(pair).figure
+    for figure in figures.values():
+        FigureCanvasAgg(figure).draw()
+    return figures
+
+
+def test_no_text_of_a_figure_overlaps_another_or_leaves_the_figure_or_is_small() -> None:
+    for name, figure in gallery().items():
+        texts = {text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()}
+        for ax in figure.axes:
+            texts -= set(unseen_texts(ax))
+        boxes = {text: Text.get_window_extent(text) for text in texts}
+        assert boxes
+        for text, box in boxes.items():
+            assert text.get_fontsize() >= 7, (name, text)
+            inside = box.x0 > -2 and box.y0 > -2 and box.x1 < figure.bbox.width + 2 and box.y1 < figure.bbox.height + 2
+            assert inside, (name, text)
+        for (text, box), (other, near) in combinations(boxes.items(), 2):
+            width = min(box.x1, near.x1) - max(box.x0, near.x0)
+            height = min(box.y1, near.y1) - max(box.y0, near.y0)
+            assert width < 1 or height < 2, (name, text.get_text(), other.get_text())
+
+
+def unseen_texts(ax: Axes) -> list[Text]:
+    """The texts of ticks outside the range, and all of axes that are off: matplotlib keeps, but does not draw them."""
+    unseen = [] if ax.axison else [ax.xaxis.label, ax.yaxis.label]
+    for axis in (ax.xaxis, ax.yaxis):
+        low, high = sorted(axis.get_view_interval())
+        reach = 1e-9 * (high - low)
+        for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
+            if not ax.axison or not low - reach <= tick.get_loc() <= high + reach:
+                unseen += [tick.label1, tick.label2]
+    return unseen
+
+
+def test_every_figure_has_one_legend_above_its_axes() -> None:
+    for name, figure in gallery().items():
+        legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend() is not None)]
+        assert len(legends) == 1, name
+        bottom = legends[0].get_window_extent().y0  # type: ignore[union-attr]
+        assert all(bottom >= ax.get_window_extent().y1 - 2 for ax in figure.axes), name
+
+
+def test_every_figure_names_the_unit_of_time() -> None:
+    cert = certified("sliding")
+    for plot in (plot_trajectory, plot_input, plot_effort, plot_sliding):
+        assert plot(cert, time_unit="ms").get_xlabel() == "time $t$ (ms)"
+        assert plot(cert).get_xlabel() == "time $t$ (unit of $T$)"
+    assert plot_decay(cert, axis="time", time_unit="ms").get_xlabel() == "time $t$ (ms)"
+    assert {ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes} == {"time $t$ (s)"}
+
+
+def test_every_figure_has_one_signature() -> None:
+    names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
+    assert len(names) == 10
+    for name in names:
+        subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
+        assert subject.name == "subject" and subject.default is inspect.Parameter.empty
+        assert all(one.kind is inspect.Parameter.KEYWORD_ONLY for one in keywords)
+        assert name == "plot_run" or (keywords[0].name, keywords[0].default) == ("ax", None)
+
+
+def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
+    with pytest.raises(ParameterError, match="drawn from a trajectory or a certificate, not from str; simulate first"):
+        plot_trajectory("fig1a")
+    with pytest.raises(
+        ParameterError, match="drawn from a certificate, not from SignedDigraph; certify the graph first"
+    ):
+        plot_frontier(graph_of("fig1a"))
+    with pytest.raises(ParameterError, match="no sliding variables; simulate under the sliding-mode protocol"):
+        plot_sliding(certified("fig1a"))
 
 
 def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Path) -> None:
@@ -379,9 +566,9 @@ def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Pat
 
     run = certified("fig1a").trajectory
     assert run is not None
-    ax = drawn(plot_trajectory(run, certified("fig1a").structure))
+    ax = drawn(plot_trajectory(run))
     assert tuple(ax.figure.get_size_inches()) == SINGLE_COLUMN
-    assert plot_run(run, certified("fig1a").structure, wide=True).get_figwidth() == DOUBLE_COLUMN[0]
+    assert plot_run(run, wide=True).get_figwidth() == DOUBLE_COLUMN[0]
     styled = rc_params_from_file(STYLE_FILE, use_default_template=False)
     assert ax.xaxis.label.get_size() == styled["axes.labelsize"]
     assert {tick.get_size() for tick in ax.get_xticklabels()} == {styled["xtick.labelsize"]}
@@ -389,47 +576,20 @@ def test_figures_without_axes_have_the_style_and_a_column_of_width(tmp_path: Pat
     with plt.style.context(STYLE):
         assert plt.rcParams["font.size"] == styled["font.size"]
     own = Figure().add_subplot()
-    plot_trajectory(run, certified("fig1a").structure, own)
+    plot_trajectory(run, ax=own)
     assert own.xaxis.label.get_size() == plt.rcParams["font.size"]
 
 
 def test_saved_figures_appear_whole_and_are_vectors_where_asked(tmp_path: Path) -> None:
-    figure = plot_graph(analyse(graph_of("fig1b"))).figure
+    ax = plot_graph(analyse(graph_of("fig1b")))
     for name, head in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("a.svg", b"<?xml"), ("B.SVG", b"<?xml")):
-        save_figure(figure, tmp_path / name)  # type: ignore[arg-type]
+        save_figure(ax, tmp_path / name)
         assert (tmp_path / name).read_bytes().startswith(head)
     with pytest.raises(ParameterError, match=r"a\.gif: figures are written to \.png, \.pdf, \.svg"):
-        save_figure(figure, tmp_path / "a.gif")  # type: ignore[arg-type]
+        save_figure(ax, tmp_path / "a.gif")
     assert len(list(tmp_path.iterdir())) == 4
-
-
-@pytest.mark.parametrize("name", ["fig1a", "fig3b", "fig5b"])
-def test_no_text_of_a_figure_is_clipped_or_covers_the_data(name: str) -> None:
-    """The legend lies above the axes, and every text inside the figure."""
-    cert = certified(name)
-    run = cert.trajectory
-    assert run is not None
-    axes = [
-        plot_trajectory(run, cert.structure),
-        plot_decay(cert),
-        plot_input(run, cert.structure, cert),
-        plot_graph(cert.structure),
-        plot_spectrum(cert.structure, cert.protocol),
-        plot_frontier(cert),
-    ]
-    for ax in axes:
-        figure = ax.figure
-        assert isinstance(figure, Figure)
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        renderer = canvas.get_renderer()
-        legend = ax.get_legend().get_window_extent(renderer)
-        assert legend.y0 >= ax.get_window_extent(renderer).y1 - 1
-        width, height = canvas.get_width_height()
-        texts = [*ax.get_legend().get_texts(), ax.xaxis.label, ax.yaxis.label]
-        for text in texts if ax.axison else texts[:-2]:
-            box = text.get_window_extent(renderer)
-            assert box.x0 >= -1 and box.x1 <= width + 1 and box.y0 >= -1 and box.y1 <= height + 1, text
+    save_figure(Figure((1, 1)), tmp_path / "a.png")
+    assert int.from_bytes((tmp_path / "a.png").read_bytes()[16:20]) == 300
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -437,7 +597,7 @@ def test_the_energy_grows_and_stays_under_its_bound(name: str) -> None:
     cert = certified(name)
     run = cert.trajectory
     assert run is not None
-    ax = drawn(plot_effort(run, cert))
+    ax = drawn(plot_effort(run, certificate=cert))
     shown = labelled(ax)
     spent = shown["simulated (CVODES)"].get_ydata()  # type: ignore[attr-defined]
     assert spent[0] == 0 and (np.diff(spent) >= 0).all()
@@ -471,7 +631,7 @@ def test_the_energy_is_that_of_the_closed_form_or_refused(gains: tuple[float, ..
     assert np.asarray(spent)[-1] == pytest.approx(quad(power, 0, T, limit=500)[0], rel=5e-3)
 
 
-@pytest.mark.parametrize("size", [1e300, 1e154])
+@pytest.mark.parametrize("size", [1e299, 1e154])
 @pytest.mark.parametrize("actuator", [None, Actuator(gain_cap=50), Actuator(sample_period="0.05")])
 def test_an_energy_beyond_floats_is_refused_without_a_warning(size: float, actuator: Actuator | None) -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
@@ -484,13 +644,13 @@ def test_no_certified_line_for_a_run_from_elsewhere() -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     cert = certify(pair, PROTOCOL, [3, 5], simulation=False)
     late = simulate(pair, PROTOCOL, [300, -500], times=[0.01, 0.1, 0.5, 0.9, 1])
-    for draw in (plot_input(late, cert.structure, cert), plot_effort(simulate(pair, PROTOCOL, [3, 5]), cert)):
+    for draw in (plot_input(late, certificate=cert), plot_effort(simulate(pair, PROTOCOL, [3, 5]), certificate=cert)):
         labels = set(labelled(draw))
         assert ("certified bound" in labels) == draw.get_ylabel().startswith("energy")
-        assert "certified peak" not in labels
+        assert peak_of(draw) is None
     near = certify(pair, PROTOCOL, [10**13, 10**13 + 1], simulation=False)
     with pytest.raises(ValueError, match="another initial state than"):
-        plot_input(simulate(pair, PROTOCOL, [1e13, 1e13 + 8]), near.structure, near)
+        plot_input(simulate(pair, PROTOCOL, [1e13, 1e13 + 8]), certificate=near)
 
 
 @pytest.mark.parametrize("size", ["1e-250", "1e13", "1e155", "1e250"])
@@ -500,7 +660,7 @@ def test_starts_of_any_size_are_drawn(size: str) -> None:
     cert = certify(pair, PROTOCOL, start)
     run = cert.trajectory
     assert run is not None
-    for ax in (plot_trajectory(run, cert.structure), plot_input(run, cert.structure, cert), plot_decay(cert)):
+    for ax in (plot_trajectory(run), plot_input(cert), plot_decay(cert)):
         drawn(ax)
     norm = labelled(plot_decay(cert))["simulated (CVODES)"].get_ydata()  # type: ignore[attr-defined]
     small = certify(pair, PROTOCOL, [x / Fraction(size) for x in start])
@@ -512,4 +672,4 @@ def test_the_start_of_a_certificate_is_known_again_whatever_its_decimals(start: 
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])
     cert = certify(graph, PROTOCOL, start)
     assert cert.trajectory is not None
-    assert "certified peak" in labelled(plot_input(cert.trajectory, cert.structure, cert))
+    assert peak_of(plot_input(cert)) is not None

@@ -12,7 +12,7 @@ from scipy.optimize import isotonic_regression
 
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -102,7 +102,7 @@ def name_agents(
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
     left = (10 + 0.62 * NAME_SIZE * max(len(name) for _, _, name, _ in texts[0])) * point
-    ticks = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(first, last)
+    ticks = MaxNLocator(tick_count(ax.xaxis, 5), steps=STEPS).tick_values(first, last)
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
 

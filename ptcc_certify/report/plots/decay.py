@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import require_same, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -84,18 +85,13 @@ def plot_decay(
     if proved is not None:
         _require_bounds(proved, run)
     remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
-    norm, floor, unit = error_norm(run or subject, proved)
+    norm, floor, unit = error_norm(subject if run is None else run, proved)
     bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
     best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
     scale = float(norm[0]) or (float(best[0]) if bounds else 0.0)
     if scale == 0:
         raise ParameterError("the agents begin where they end: nothing decays")
-    gain = subject.protocol.gain
-    place = {
-        "left": remaining,
-        "time": float(gain.T) * (1 - remaining),
-        "clock": np.asarray(gain.clock_at_remaining(remaining)),
-    }[axis]
+    place = _places(subject.protocol.gain, run, remaining)[axis]
     ax = axes_of(ax)
     for values, looks in bounds.values():
         ax.plot(place, values / scale, **looks)
@@ -145,6 +141,12 @@ def _require_bounds(certificate: Certificate, run: Trajectory | None) -> None:
         raise ParameterError("the certificate holds no proved bound of a decay")
     if run is not None:
         require_same(run, certificate)
+
+
+def _places(gain: Gain, run: Trajectory | None, remaining: np.ndarray) -> dict[str, np.ndarray]:
+    """Return where the instants lie on each of the horizontal axes."""
+    clock = np.asarray(gain.clock_at_remaining(remaining)) if run is None else run.clock[: remaining.size]
+    return {"left": remaining, "time": float(gain.T) * (1 - remaining), "clock": clock}
 
 
 def _bounds(

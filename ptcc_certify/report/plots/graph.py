@@ -45,7 +45,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    subject : Structure, Certificate, Trajectory or graph
+    subject : Structure, Certificate, Trajectory or graph-like
+        As :func:`ptcc_certify.as_graph` takes it: a path, a networkx graph, the name of a packaged graph.
     ax : Axes, optional
 
     Returns
@@ -54,7 +55,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> ax = plot_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)]))
+    >>> ax = plot_graph([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)])
     >>> [text.get_text() for text in ax.texts]
     ['a', 'b', 'c', '1', '2']
     """

@@ -63,7 +63,7 @@ def plot_input(
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
-    >>> ax.get_ylabel(), ax.texts[-1].get_text()
+    >>> ax.get_ylabel(), ax.texts[0].get_text()
     ('input $|u_k|$', 'certified peak 16')
     """
     run, structure = trajectory_of(subject), structure_of(subject)

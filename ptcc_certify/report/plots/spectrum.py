@@ -29,7 +29,7 @@ def plot_spectrum(subject: Any, *, ax: Axes | None = None, protocol: Protocol | 
 
     Parameters
     ----------
-    subject : Certificate, Trajectory, Structure or graph
+    subject : Certificate, Trajectory, Structure or graph-like
         Of strong components above 500 nodes only the eigenvalues nearest to 0 are computed.
     ax : Axes, optional
     protocol : NominalProtocol or SlidingModeProtocol, optional
@@ -46,7 +46,7 @@ def plot_spectrum(subject: Any, *, ax: Axes | None = None, protocol: Protocol | 
 
     Examples
     --------
-    >>> ax = plot_spectrum(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 4)]))
+    >>> ax = plot_spectrum([(1, 2, 1), (2, 1, 1), (2, 3, 4)])
     >>> [(line.get_label(), line.get_xdata().round(6).tolist()) for line in ax.lines]
     [('nonzero eigenvalues', [2.0, 4.0]), ('zero eigenvalues', [0.0])]
     """

@@ -30,7 +30,7 @@ RUN, BOUND, BEHIND = "#0072B2", "#D55E00", "#7F7F7F"
 #: Colour and line of an edge from an ally (+1) or an opponent (-1); no camp has them.
 EDGE_STYLES = {1: ("#117733", "-", "from an ally"), -1: ("#882255", "--", "from an opponent")}
 #: Between ticks lie these numbers of units, times a power of ten.
-_STEPS = [1, 2, 2.5, 5, 10]
+STEPS = [1, 2, 2.5, 5, 10]
 
 
 def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
@@ -111,6 +111,11 @@ def time_label(quantity: str, unit: str, unknown: str = "unit of $T$") -> str:
     return f"{quantity} ({unit or unknown})"
 
 
+def tick_count(axis: Axis, most: int = 6) -> int:
+    """Return how many ticks with labels an axis has room for."""
+    return min(most, max(2, int(0.7 * axis.get_tick_space())))
+
+
 def place_ticks(axis: Axis) -> None:
     """Place ticks that do not collide: on a logarithmic axis at decades, over two or so at 1, 2, 5 too.
 
@@ -119,16 +124,16 @@ def place_ticks(axis: Axis) -> None:
     if isinstance(axis.get_major_locator(), FixedLocator):
         return
     if axis.get_scale() != "log":
-        axis.set_major_locator(MaxNLocator(6, steps=_STEPS))
+        axis.set_major_locator(MaxNLocator(tick_count(axis), steps=STEPS))
         return
     low, high = sorted(axis.get_view_interval())
     decades = math.log10(high / low) if low > 0 else math.inf
     axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())
-    if decades > 2.5:
-        axis.set_major_locator(LogLocator(numticks=7))
+    if decades > 2.5 or (decades > 1 and tick_count(axis) < 6):
+        axis.set_major_locator(LogLocator(numticks=tick_count(axis, 7)))
         return
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)) if decades > 0.7 else MaxNLocator(5, steps=_STEPS))
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)) if decades > 0.7 else MaxNLocator(tick_count(axis), steps=STEPS))
     axis.set_major_formatter("{x:g}")
 
 
@@ -140,7 +145,7 @@ def finished(ax: Axes, x: str, y: str) -> Axes:
         place_ticks(axis)
     if ax.get_legend_handles_labels()[0]:
         width = ax.get_window_extent().width / ax.figure.dpi
-        columns = 2 if width < 4 else 3
+        columns = 1 if width < 2.2 else 2 if width < 4 else 3
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2)
     return ax
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -65,7 +65,7 @@ def trajectory_of(subject: Any) -> Trajectory:
 
 
 def structure_of(subject: Any) -> Structure:
-    """Return the structure of a certificate, a trajectory, a graph, or anything that reads as a graph.
+    """Return the structure of a certificate, a trajectory, or anything that :func:`~ptcc_certify.as_graph` takes.
 
     Examples
     --------
@@ -75,12 +75,7 @@ def structure_of(subject: Any) -> Structure:
     """
     if isinstance(subject, Structure):
         return subject
-    if isinstance(subject, Certificate):
-        return subject.structure
-    graph = subject.graph if isinstance(subject, Trajectory) else subject
-    if not isinstance(graph, SignedDigraph):
-        raise ParameterError(f"this figure is drawn from a graph, not from {type(subject).__name__}")
-    return analyse(graph)
+    return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:

@@ -57,7 +57,7 @@ def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = ""
     >>> run = simulate(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_trajectory(run, time_unit="s")
     >>> ax.get_xlabel(), [text.get_text() for text in ax.texts]
-    ('time $t$ (s)', ['ann', 'bob', 'bob', 'ann'])
+    ('time $t$ (s)', ['ann', 'bob', 'ann', 'bob'])
     """
     run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
     named = draw_agents(ax, run, run.states, structure)
