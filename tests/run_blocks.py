@@ -33,8 +33,9 @@ def run_commands(session: str, folder: Path, elsewhere: Container[str] = ()) -> 
 
     Those in ``elsewhere`` have a test of their own. What an option names as a file to write is there afterwards.
     """
-    for command in re.sub(r"\\\n\s*", "", session).splitlines():
-        words = shlex.split(command, comments=True)
+    for match in re.finditer(r".*<<'(\w+)'[\s\S]*?^\1$|.+", re.sub(r"\\\n\s*", "", session), re.MULTILINE):
+        command = match[0]
+        words = shlex.split(command.splitlines()[0], comments=True)
         if not words or shlex.join(words) in elsewhere:
             continue
         if words[0] != "ptcc":

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -45,11 +46,23 @@ def runs_something(page: Path) -> bool:
     return bool(blocks(page.read_text(encoding="utf-8"), "sh", "python"))
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all pages, in their order: a review takes the certificate of the page before."""
+    return tmp_path_factory.mktemp("pages")
+
+
 @pytest.mark.docs
 @pytest.mark.parametrize("page", [*filter(runs_something, PAGES)], ids=lambda page: page.stem)
-def test_commands_and_python_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.chdir(tmp_path)
-    run_page(page.read_text(encoding="utf-8"), tmp_path)
+def test_commands_and_python_of_a_page_run(page: Path, folder: Path, request, monkeypatch: pytest.MonkeyPatch):
+    text = page.read_text(encoding="utf-8")
+    monkeypatch.chdir(folder)
+    if network := re.search(r"soc-[\w.-]+gz", text):
+        published = request.getfixturevalue("real_data") / network[0]
+        if not published.exists():
+            pytest.skip(f"{network[0]} is not among the real graphs")
+        shutil.copy(published, folder)
+    run_page(text, folder)
 
 
 def test_the_reference_has_every_public_name(tmp_path: Path):
