@@ -1,4 +1,7 @@
-"""The notebooks run from start to end."""
+"""The notebooks run from start to end: ``python -m pytest -m docs tests/test_notebooks.py``.
+
+Not in the default run, because the build of the site runs them too; this needs less than the site does.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbclient import NotebookClient
+
+pytestmark = pytest.mark.docs
 
 NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
 

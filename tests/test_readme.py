@@ -1,28 +1,19 @@
-"""Everything the README shows is run, and shows what it says.
-
-Commands are run in this process, for speed; that ``ptcc`` is one of its own is told in ``tests/cli``.
-"""
+"""Everything the README shows is run, and shows what it says."""
 
 from __future__ import annotations
 
 import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from bad_inputs import Run
-from bad_inputs import ptcc as called
+from run_blocks import blocks, ptcc, run_commands
 
 from ptcc_certify.cli import cli
 
 README = Path(__file__).parent.parent / "README.md"
 TEXT = README.read_text(encoding="utf-8") if README.exists() else ""
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
 @pytest.fixture(autouse=True)
@@ -31,14 +22,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def ptcc(command: str) -> Run:
-    words = shlex.split(command, comments=True)
-    assert words[0] == "ptcc"
-    return called(*words[1:])
-
-
 #: Blocks of commands, each run from top to bottom in one folder as a reader would; those that set up are CI's own.
-SESSIONS = [block for block in blocks("sh") if "ptcc " in block and "pip install" not in block]
+SESSIONS = [block for _, block in blocks(TEXT, "sh") if "ptcc " in block and "pip install" not in block]
 #: Commands with a test of their own. The first costs as much as all others: tests/cli, test_all_examples_behave_*; the
 #: second ends at Ctrl-C only: tests/report/test_explorer_page.py, test_ctrl_c_ends_the_explorer_at_once_*.
 RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a"}
@@ -46,17 +31,7 @@ RUN_ELSEWHERE = {"ptcc examples all -o figures", "ptcc explore fig3a"}
 
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda text: text.splitlines()[0][:30])
 def test_commands_run(session: str, folder: Path):
-    for command in session.splitlines():
-        if command.startswith("printf "):
-            subprocess.run(["sh", "-c", command], check=True)
-            continue
-        if command.partition("#")[0].strip() in RUN_ELSEWHERE:
-            continue
-        done = ptcc(command)
-        assert done.code == 0, (command, done.err)
-        words = shlex.split(command, comments=True)
-        for option in {"-o", "--write-graphs", "--curve"} & set(words):
-            assert (folder / words[words.index(option) + 1]).exists()
+    run_commands(session, folder, RUN_ELSEWHERE)
 
 
 def test_there_are_commands():
@@ -65,7 +40,7 @@ def test_there_are_commands():
     assert shown == set(cli.commands)
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize("code", [block for _, block in blocks(TEXT, "python")])
 def test_python_runs(code: str):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
@@ -73,7 +48,7 @@ def test_python_runs(code: str):
 
 
 def test_the_transcript_is_what_ptcc_prints():
-    (block,) = blocks("console")
+    ((_, block),) = blocks(TEXT, "console")
     command, shown = block.split("\n", 1)
     done = ptcc(command.removeprefix("$ "))
     assert (done.code, done.out) == (0, shown)
@@ -92,7 +67,7 @@ def test_the_line_of_an_unbounded_input_is_what_ptcc_prints():
 
 
 def test_the_set_up_commands_are_there():
-    first, second = [line for block in blocks("sh") if block not in SESSIONS for line in block.splitlines()]
+    first, second = [line for _, block in blocks(TEXT, "sh") if block not in SESSIONS for line in block.splitlines()]
     assert "pip install" in first and first.endswith("ptcc certify fig1b")
     assert second == "bash .ci/run"
     assert (README.parent / ".ci" / "run").exists()

@@ -1,0 +1,155 @@
+"""The site in ``docs/``: what its pages show is run, its links lead somewhere, and it loads nothing from elsewhere.
+
+``python -m sphinx -W -b html docs site`` builds it, which runs the notebooks and every code cell. Then
+``PTCC_SITE=site python -m pytest -m docs tests/test_site.py`` runs the commands of its pages, and looks at what was
+built.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from run_blocks import blocks, run_page
+
+import lmi
+import ptcc_certify
+
+pytest.importorskip("sphinx", reason="the site needs the extra docs")
+
+from docstring_equations import literal
+from local_links import faults
+from reference_pages import write_reference
+from sphinx.application import Sphinx
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if "generated" not in page.parts)
+
+
+@pytest.fixture
+def site() -> Path:
+    """The built site."""
+    if "PTCC_SITE" not in os.environ:
+        pytest.skip("no site: set PTCC_SITE to the folder where it was built")
+    return Path(os.environ["PTCC_SITE"]).resolve()
+
+
+# ---------------------------------------------------------------------- pages and code
+
+
+def runs_something(page: Path) -> bool:
+    return bool(blocks(page.read_text(encoding="utf-8"), "sh", "python"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all pages, in their order: a review takes the certificate of the page before."""
+    return tmp_path_factory.mktemp("pages")
+
+
+@pytest.mark.docs
+@pytest.mark.parametrize("page", [*filter(runs_something, PAGES)], ids=lambda page: page.stem)
+def test_commands_and_python_of_a_page_run(page: Path, folder: Path, request, monkeypatch: pytest.MonkeyPatch):
+    text = page.read_text(encoding="utf-8")
+    monkeypatch.chdir(folder)
+    if network := re.search(r"soc-[\w.-]+gz", text):
+        published = request.getfixturevalue("real_data") / network[0]
+        if not published.exists():
+            pytest.skip(f"{network[0]} is not among the real graphs")
+        shutil.copy(published, folder)
+    run_page(text, folder)
+
+
+def test_the_reference_has_every_public_name(tmp_path: Path):
+    write_reference(tmp_path / "reference")
+    named = set(
+        re.findall(r"^\.\. auto\w+:: (\S+)", "".join(page.read_text() for page in tmp_path.rglob("*.rst")), re.M)
+    )
+    assert {f"lmi.{name}" for name in lmi.__all__} <= named
+    functions = {name for name in ptcc_certify._EXPORTS if callable(getattr(ptcc_certify, name))}
+    assert {f"ptcc_certify.{name}" for name in functions} <= named
+    assert {name.rpartition(".")[2] for name in named} >= set(ptcc_certify._EXPORTS)
+
+
+def test_the_gallery_has_every_figure():
+    gallery = (ROOT / "docs" / "gallery" / "figures.md").read_text(encoding="utf-8")
+    assert [name for name in ptcc_certify.__all__ if name.startswith("plot_") and f"ptcc.{name}(" not in gallery] == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "kept"),
+    [
+        (["With", "", "    a + b", "    c"], 2),
+        (["- a point", "", "  of two"], 0),
+        (["Parameters", "---", "", "  x"], 0),
+    ],
+)
+def test_equations_of_docstrings_are_literal(lines: list[str], kept: int):
+    assert len(literal(lines)) == len(lines) + kept
+    assert [line for line in literal(lines) if line != "::"][-1] == lines[-1]
+
+
+# ---------------------------------------------------------------------- formulas and links
+
+
+def built(folder: Path, text: str) -> tuple[str, str]:
+    """Build a site of one page with the extensions of the site; return its HTML and the warnings."""
+    (folder / "index.rst").write_text(f"Page\n====\n\n{text}\n", encoding="utf-8")
+    warnings = StringIO()
+    settings = {"extensions": ["formulas", "local_links"], "html_math_renderer": "svg", "html_theme": "basic"}
+    app = Sphinx(folder, None, folder / "out", folder / "doctrees", "html", settings, status=None, warning=warnings)
+    app.build()
+    return (folder / "out" / "index.html").read_text(encoding="utf-8"), warnings.getvalue()
+
+
+def test_formulas_are_drawings_with_a_name(tmp_path: Path):
+    page, warnings = built(tmp_path, r"The rate :math:`\lambda_{\min}(A)` and ``x``." + "\n\n.. math:: x' = -A x")
+    assert not warnings
+    assert page.count('role="img"') == 2
+    assert r'aria-label="\lambda_{\min}(A)"' in page and "currentColor" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "warning"),
+    [
+        (r":math:`\nosuch a`", r"unknown command \nosuch"),
+        (r":math:`\frac{a}`", "formula"),
+        ("`a <#nowhere>`_", "no such anchor: #nowhere"),
+        ("`a <there.html>`_", "no such file: there.html"),
+        (".. raw:: html\n\n   <script src='https://example.org/a.js'></script>", "loads https://example.org/a.js"),
+    ],
+)
+def test_a_page_with_a_fault_is_told(tmp_path: Path, text: str, warning: str):
+    assert warning in built(tmp_path, text)[1]
+
+
+@pytest.mark.docs
+def test_the_built_site_has_its_figures_and_no_fault(site: Path):
+    assert list(faults(site)) == []
+    for page in (
+        "gallery/figures",
+        "gallery/paper",
+        *(f"tutorial/{one.stem}" for one in ROOT.glob("notebooks/*.ipynb")),
+    ):
+        html = (site / f"{page}.html").read_text(encoding="utf-8")
+        assert "cell_output" in html and "_images/" in html, page
+        assert "<Figure size" not in html and "VBox(" not in html, page
+
+
+@pytest.mark.docs
+def test_no_request_leaves_the_site_and_no_page_is_wider_than_a_phone(site: Path, browser: Any):
+    requests: list[str] = []
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.on("request", lambda request: requests.append(request.url))
+    for path in sorted(site.rglob("*.html")):
+        page.goto(path.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
+    page.goto((site / "search.html").as_uri() + "?q=overshoot")
+    page.wait_for_selector("#search-results li")
+    page.close()
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
