@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify import Actuator, Certificate, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
+from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
 from ptcc_certify.checker import digest
 from ptcc_certify.examples import EXAMPLES, load_graph
 
@@ -88,8 +88,8 @@ def hostile() -> Certificate:
 
 MADE = {
     "nominal": nominal,
-    "limits": lambda: nominal(limits=[Actuator(gain_cap=50)], noise="1/100", delta="1/3"),
-    "initial_set": lambda: nominal(initial_set=5, limits=[Actuator(sample_period="1/1000", gain_cap=20)]),
+    "limits": lambda: nominal(limits=[GainLimits(gain_cap=50)], noise="1/100", delta="1/3"),
+    "initial_set": lambda: nominal(initial_set=5, limits=[GainLimits(sample_period="1/1000", gain_cap=20)]),
     "not bounded": lambda: certify(load_graph("fig5b"), NominalProtocol(T=1, rho1=1, rho2="1/10", kappa=1), [1] * 16),
     "no start": lambda: certify(load_graph("fig1a"), NOMINAL),
     "sliding": sliding_mode,
