@@ -25,48 +25,17 @@ from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
 from ptcc_certify.examples import GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.disturbance import Disturbance, as_disturbance
+from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png
+from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
 from ptcc_certify.report.explorer.settings import GIVEN, Settings, refuse_unknown
 from ptcc_certify.simulation.run import simulate
 
 #: Instants of a run that is drawn while a control is moved.
 _SAMPLES = 61
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """What ``certify`` is asked for some settings.
-
-    Attributes
-    ----------
-    settings : Settings
-    source : mapping or None
-        Where the graph was read from and how (``path``, ``orientation``, ...); None of a packaged graph or an object.
-    graph : SignedDigraph
-    protocol : NominalProtocol or SlidingModeProtocol
-    x0 : list of N int
-    sigma0 : list of N int, or None
-        None for the nominal protocol.
-    disturbance : Disturbance or None
-    """
-
-    settings: Settings
-    source: Mapping[str, Any] | None
-    graph: SignedDigraph
-    protocol: Protocol
-    x0: list[int]
-    sigma0: list[int] | None
-    disturbance: Disturbance | None
-
-    @property
-    def sliding(self) -> dict[str, Any]:
-        """What is asked under the sliding-mode protocol alone."""
-        return {} if self.sigma0 is None else {"sigma0": self.sigma0, "disturbance": self.disturbance}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,7 +28,7 @@ _LEAST = 1e-8
 #: Decades that are named on the axes of the decay.
 _TICKS = {4: "10⁴", 2: "100", 0: "1", -2: "0.01", -4: "10⁻⁴", -6: "10⁻⁶", -8: "10⁻⁸"}
 #: A panel in inches, and its margins: left, bottom, right, top (with room for a legend of four lines).
-_SIZE, _MARGINS = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.14, 0.74)
+_SIZE, _MARGINS = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56, 0.74)
 
 
 def panel_svg(certificate: Certificate, name: str) -> str:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING
 
-from ptcc_certify.examples import GRAPHS
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.protocols import SlidingModeProtocol
-
-if TYPE_CHECKING:
-    from ptcc_certify.report.explorer.model import Question
+from ptcc_certify.report.explorer.question import Question
 
 #: How a graph was read, unless it says otherwise: option of ``read_graph`` and flag of ``ptcc``.
 _READING = {"duplicates": "refuse", "drop_self_loops": False, "undirected": False}
@@ -20,7 +17,7 @@ def python_of(question: Question) -> str:
     settings, source, name = question.settings, question.source, question.settings.graph
     lines = ["import ptcc_certify as ptcc"]
     if source is None and name in GRAPHS:
-        lines += ["from ptcc_certify.examples import load_graph", "", f'g = load_graph("{name}")']
+        lines += ["", f'g = "{name}"']
     elif source is None:
         lines += ["", "g = ...  # the graph that was given to explore()"]
     else:
@@ -34,7 +31,7 @@ def python_of(question: Question) -> str:
     if settings.method != "best":
         arguments.append(f'method="{settings.method}"')
     lines += ["cert = ptcc.certify(", "    g,", "    p,", *(f"    {argument}," for argument in arguments), ")"]
-    lines += ["print(cert)", 'ptcc.save_figure(ptcc.plot_decay(cert).figure, "decay.png")']
+    lines += ["print(cert)", 'ptcc.save_figure(ptcc.plot_decay(cert), "decay.png")']
     return "\n".join(lines)
 
 
