@@ -42,10 +42,27 @@ def run_commands(session: str, folder: Path, elsewhere: Container[str] = ()) -> 
             subprocess.run(["sh", "-c", command], check=True, cwd=folder)
             continue
         done = ptcc(command)
-        said = re.search(r"# exit code (\d)$", command)
-        assert done.code == (int(said[1]) if said else 0), (command, done.err)
+        assert done.code == _exit_code(command), (command, done.err)
         for option in {"-o", "--write-graphs", "--curve"} & set(words):
             assert (folder / words[words.index(option) + 1]).exists(), command
+
+
+def check_transcripts(text: str) -> int:
+    """Run what is shown after ``$ ptcc``, and compare to the letter; ``...`` stands for lines. Return how many."""
+    transcripts = [block for _, block in blocks(text, "console") if block.startswith("$ ptcc ")]
+    for block in transcripts:
+        command, shown = block.split("\n", 1)
+        done = ptcc(command.removeprefix("$ "))
+        assert done.code == _exit_code(command), (command, done.err)
+        first, _, last = shown.rpartition("...\n")
+        assert done.out.startswith(first) and done.out.endswith(last), done.out
+        assert first or "..." in shown or done.out == shown
+    return len(transcripts)
+
+
+def _exit_code(command: str) -> int:
+    code = re.search(r"# exit code (\d)$", command)
+    return int(code[1]) if code else 0
 
 
 def run_page(text: str, folder: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from run_blocks import blocks, run_page
+from run_blocks import blocks, check_transcripts, run_page
 
 import lmi
 import ptcc_certify
@@ -63,6 +63,11 @@ def test_commands_and_python_of_a_page_run(page: Path, folder: Path, request, mo
             pytest.skip(f"{network[0]} is not among the real graphs")
         shutil.copy(published, folder)
     run_page(text, folder)
+
+
+@pytest.mark.parametrize("page", ["guide/answer.md", "guide/input.md"])
+def test_transcripts_are_what_ptcc_prints(page: str):
+    assert check_transcripts((ROOT / "docs" / page).read_text(encoding="utf-8"))
 
 
 def test_the_reference_has_every_public_name(tmp_path: Path):
