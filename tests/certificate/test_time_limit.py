@@ -256,7 +256,7 @@ def test_without_a_limit_nothing_is_cut_off():
 
 
 def test_the_default_grows_with_the_graph():
-    assert certify(ring(3), PROTOCOL, simulation=False).time_limit == pytest.approx(60.003)
+    assert certify(ring(3), PROTOCOL, simulation=False).time_limit == 60
 
 
 @pytest.mark.parametrize("seconds", [0, -1, math.nan])
@@ -281,6 +281,6 @@ def test_the_integrator_ends_at_the_limit_and_leaves_signals_as_they_were():
 
 
 def test_the_screen_names_what_was_cut_off():
-    run = ptcc("certify", "fig1a", "--time-limit", "1e-9")
+    run = ptcc("certify", "fig1a", "--time-limit", "1e-9", "-v")
     assert run.code == 4
     assert "cut off" in run.out and "the paper's certificate" in run.out
