@@ -1,6 +1,7 @@
 """Facts about trajectories: X(t) = exp(-L s(t)) X(0), whatever the graph, the start, and how they are written."""
 
 import csv
+import gc
 import io
 import os
 import signal
