@@ -432,7 +432,7 @@ def test_without_widgets_there_is_a_static_view(
     assert "\nverdict    certified" in repr(view)
 
 
-@pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib")
+@pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib|pyparsing")
 @pytest.mark.parametrize("settings", [Settings("fig5a"), Settings("fig5a", kind="sliding-mode", seed=2)])
 def test_no_text_of_the_figure_is_clipped_or_on_another_panel(explorer: Explorer, settings: Settings):
     view = explorer.view(settings)

@@ -46,7 +46,7 @@ from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
-pytestmark = pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib")
+pytestmark = pytest.mark.filterwarnings("error", "ignore::DeprecationWarning:matplotlib|pyparsing")
 
 STYLE_FILE = Path(ptcc_certify.__file__).with_name("ptcc.mplstyle")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
