@@ -204,7 +204,8 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 def _short_final_state(certificate: Certificate) -> Lines:
     result = certificate.final_state
     if result is not None:
-        kind = f"({_accuracy(result)}{'; degenerate x(0)' if result.degenerate else ''})"
+        accuracy = _accuracy(result)
+        kind = f"({accuracy}; degenerate x(0))" if result.degenerate and len(accuracy) < 10 else f"({accuracy})"
         values = value_list(certificate.graph.labels, result.states, TEXT - len(kind) - 1)
         if len(result.states) > 1 and len(set(result.states)) == 1:
             values = f"every agent at {five_digits(result.states[0])}"

@@ -82,7 +82,7 @@ def _rate(certificate: Certificate) -> str:
     rate, limit = certificate.rate, certificate.upper_bound
     if certificate.constant or rate is None:
         return NOTHING
-    return f"{down(rate)} per unit of s" + ("" if limit is None else f"; no rate exceeds {up(limit)}")
+    return f"{down(rate)} per unit of s" + ("" if limit is None else f"; upper bound {up(limit)}")
 
 
 def _input(certificate: Certificate) -> str:
