@@ -76,7 +76,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     -------
     list of str
         Graph, how it was read, protocol, claim, final state, error bound, input, verdict. Where that takes too many
-        lines, error bound and input share one, and tell less.
+        lines, error bound and input tell less, and share one.
 
     Examples
     --------
@@ -94,7 +94,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     """
     claims = _component_claims(certificate)
     room = SHORT + len(claims) - 1
-    for bounds, verdict in ((_bounds, _full_verdict), (_brief_bounds, _full_verdict), (_brief_bounds, _brief_verdict)):
+    shorter = ((_bounds, _full_verdict), (_short_bounds, _full_verdict), (_joint_bounds, _full_verdict))
+    for bounds, verdict in (*shorter, (_joint_bounds, _brief_verdict)):
         entries = [
             *graph_entries(certificate.structure, name),
             ("protocol", _protocol_text(certificate, origins)),
@@ -226,7 +227,13 @@ def _bounds(certificate: Certificate) -> Lines:
         yield "INPUT" if certificate.effort.bounded is False else "input", "; ".join(filter(None, (bounded, size)))
 
 
-def _brief_bounds(certificate: Certificate) -> Lines:
+def _short_bounds(certificate: Certificate) -> Lines:
+    """Tell the same of no single agent."""
+    for head, text in _bounds(certificate):
+        yield head, text.partition(", every agent" if head == "error" else ", the largest")[0]
+
+
+def _joint_bounds(certificate: Certificate) -> Lines:
     """Tell the same in one line."""
     if certificate.constant or certificate.effort is None:
         yield from _bounds(certificate)
