@@ -24,7 +24,8 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
     """Open a page in the browser on which graph, run, input and proved bound follow the parameters.
 
     GRAPH has up to 120 nodes and stands beside the packaged ones. The page is served to this machine only, under an
-    address with a random token, and loads nothing from elsewhere. Ctrl-C ends it, with exit code 0.
+    address with a random token, and loads nothing from elsewhere. Ctrl-C ends it, with exit code 0
+    once the address is printed.
     """
     from ptcc_certify.report.explorer.model import Explorer
     from ptcc_certify.report.explorer.reproduction import reading_of

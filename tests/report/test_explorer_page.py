@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,8 @@ def test_a_view_is_text_figures_and_code(server: ExplorerServer):
     [
         ("T=0", "T = 0 is outside its domain"),
         ("T=__import__('os')", "is not a finite number"),
-        ("rho3=1", 'parameter "rho3" is unknown'),
+        ("rho3=1", 'setting "rho3" is unknown'),
+        ("self=1", 'setting "self" is unknown'),
         ("seed=-1", 'seed "-1" is not a whole number'),
         ("graph=/etc/passwd", 'graph "/etc/passwd" is unknown; one of fig1a'),
         ("reaching=1", 'reaching "1" is unknown'),
@@ -139,6 +141,20 @@ def test_a_certificate_in_the_making_gives_way_to_a_control_that_is_moved():
             server.view(FEW)
         server.explorer.view = explorer_view  # type: ignore[method-assign]
         assert server.view(FEW)["checked"]
+        with ThreadPoolExecutor(1) as other:
+            with server._drawing:  # something else is at work
+                waiting = other.submit(server.view, FEW)
+                while not other._work_queue.empty():
+                    time.sleep(0.01)
+                time.sleep(0.1)
+                server._moves += 1
+            assert isinstance(waiting.exception(), Superseded)
+
+
+def test_an_address_that_is_none_is_refused(server: ExplorerServer):
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=60) as connection:
+        connection.sendall(b"GET http://[::1 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        assert connection.recv(100).startswith(b"HTTP/1.1 400")
 
 
 def test_a_port_that_is_taken_leaves_the_next_one():

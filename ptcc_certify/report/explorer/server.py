@@ -153,13 +153,14 @@ class ExplorerServer(ThreadingHTTPServer):
         Superseded
             A control was moved meanwhile.
         """
+        moves = self._moves
+
+        def give_way(step: str) -> None:
+            if self._moves != moves:
+                raise Superseded
+
         with self._drawing:
-            moves = self._moves
-
-            def give_way(step: str) -> None:
-                if self._moves != moves:
-                    raise Superseded
-
+            give_way("waiting")
             return self._shown(self.explorer.view(settings, give_way))
 
     def _shown(self, view: View) -> dict[str, Any]:
@@ -182,10 +183,14 @@ class _Handler(BaseHTTPRequestHandler):
     server: ExplorerServer
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "ptcc", ""
+    timeout = 60  # seconds that an idle connection is kept
 
     def do_GET(self) -> None:
         """Answer with the page, a part of it, or what it asks to be computed."""
-        parts = urlsplit(self.path)
+        try:
+            parts = urlsplit(self.path)
+        except ValueError:
+            return self._send(HTTPStatus.BAD_REQUEST, "this is no address", ".txt")
         if (why := self._foreign(parts.path)) is not None:
             return self._send(HTTPStatus.FORBIDDEN, why, ".txt")
         name = parts.path.removeprefix(self.server.root)

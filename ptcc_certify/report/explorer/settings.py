@@ -127,6 +127,8 @@ class Settings:
         '0.6'
         """
         values: dict[str, Any] = dict(texts)
+        for name in values:
+            refuse_unknown("setting", name, cls().to_dict())
         if "reaching" in values:
             refuse_unknown("reaching", values["reaching"], ("true", "false"))
             values["reaching"] = values["reaching"] == "true"
