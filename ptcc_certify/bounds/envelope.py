@@ -435,7 +435,9 @@ class Envelope:
         """
         if trajectory.forcing is not None or trajectory.held_input is not None:
             raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
-        if trajectory.graph != self.structure.graph or trajectory.protocol.gain != self.gain:
+        if trajectory.graph.labels != self.structure.graph.labels or trajectory.graph != self.structure.graph:
+            raise ParameterError("the run is of another graph, or has its agents in another order, than the envelope")
+        if trajectory.protocol.gain != self.gain:
             raise ParameterError("the run is of another graph or protocol than the envelope")
         if not np.isfinite(trajectory.clock[0]):
             raise ParameterError("the run has no sample before the deadline, where a bound could be compared")

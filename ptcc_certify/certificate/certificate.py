@@ -312,6 +312,10 @@ def read_certificate(
             path.save(Path(folder, "certificate.json"))
             return read_certificate(Path(folder, "certificate.json"), stdlib=stdlib, memory=memory)
     if isinstance(path, Mapping):
+        try:
+            path = json.loads(_json(dict(path)))
+        except (TypeError, ValueError, RecursionError):
+            raise FormatError("the mapping is no JSON object; parse the file with json.load") from None
         document, report = read_and_check(path, stdlib=stdlib, memory=memory)
         file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
         if not report.accepted:

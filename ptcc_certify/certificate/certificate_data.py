@@ -141,7 +141,9 @@ class Content:
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
-            values[name] = replace(group, **own)
+            values[name] = replace(group, **own) if own else group
+        if self.source is not None and any(values[k] is not getattr(self, k) for k in values if k != "observed"):
+            raise ParameterError("a certificate that was read is what its file says; certify the graph again")
         return replace(self, **values)
 
     # ------------------------------------------------------------------ parts by their short names

@@ -51,7 +51,7 @@ def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **opt
     from ptcc_certify.certificate.procedure import certify as run
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
-    refuse_output(output, graph)
+    refuse_output(output)
     protocol = shared.protocol_of(options)
     signed = shared.read(graph, options)
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))

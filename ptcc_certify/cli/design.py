@@ -55,7 +55,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
 
     _refuse_incomplete(options)
     for path in (output, curve):
-        refuse_output(path, graph)
+        refuse_output(path)
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
     request: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}

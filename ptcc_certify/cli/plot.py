@@ -66,7 +66,7 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
     output = output or f"{PurePath(graph).stem.lstrip('-') or 'graph'}-{what}.png"
     if PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
-    refuse_output(output, graph)
+    refuse_output(output)
     try:
         subject = _of_certificate(graph, what, options["memory"]) if certified else _of_graph(graph, what, options)
     except RejectedCertificate as error:

@@ -20,6 +20,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_graph
+from ptcc_certify.cli.terminal import SCENARIO
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.rationals import shorten
 
@@ -261,7 +262,8 @@ def _state(value: Any, folder: Path, place: str) -> str:
     """Return an initial state as ``--x0`` takes it."""
     if isinstance(value, str):
         path = folder / value
-        return str(path) if os.path.isfile(path) else value  # noqa: PTH113 - Path.is_file may raise
+        is_list = value == "random" or any(sign in value for sign in ",=") or value.replace(".", "").isdecimal()
+        return value if is_list and not os.path.isfile(path) else str(path)  # noqa: PTH113 - Path.is_file may raise
     entries = list(value.items()) if isinstance(value, dict) else value if isinstance(value, list) else [value]
     texts = []
     for entry in entries:
@@ -307,7 +309,7 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: str) -> 
             refuse_as_graph(scenario.graph)
         except FormatError as error:
             raise FormatError(f"{scenario.place('graph')}: {error}") from None
-    context.meta.update({MEMORY: scenario, COMMAND: context})
+    context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: graph})
     own = {parameter.name for parameter in context.command.params}
     context.default_map = {name: value for name, value in scenario.options.items() if name in own}
     kind_of_protocol(context, None, context.params.get("kind"))

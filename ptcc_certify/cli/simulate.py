@@ -41,7 +41,7 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
     if suffix in FIGURES and vectors:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
-    refuse_output(output, graph)
+    refuse_output(output)
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
     nominal = options["kind"] == "nominal"
     if vectors and not nominal:

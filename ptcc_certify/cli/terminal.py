@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import json
 import logging
+import os
 import shutil
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,8 @@ from ptcc_certify.errors import ParameterError, PTCCError, one_line
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")
+#: Options that name a file to write, and where the path of the scenario of a call is kept.
+WRITTEN, SCENARIO = ("output", "log", "curve"), "ptcc_certify.scenario_file"
 #: Seconds after which a command that writes to no terminal tells where it is, and between two such lines.
 FIRST_WORD, NEXT_WORD = 10, 30
 
@@ -45,7 +48,7 @@ class Screen:
         from ptcc_certify.report.text_layout import WIDTH, wrap_lines
 
         if not self.quiet:
-            width = shutil.get_terminal_size((WIDTH, 24)).columns if sys.stdout.isatty() else WIDTH
+            width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
             print_lines(wrap_lines(long(), width) if self.verbose else short())
 
     def note(self, text: str) -> None:
@@ -64,11 +67,15 @@ def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def wrapped(*args: Any, verbose: bool, quiet: bool, log: str | None, **options: Any) -> Any:
         if verbose and quiet:
             raise ParameterError("-v asks for more and -q for nothing; leave one out")
-        inputs = [options.get(name) for name in ("graph", "certificate", "output")]
-        with log_to(log, [path for path in inputs if path]):
+        with log_to(log):
             return command(*args, screen=Screen(verbose, quiet), **options)
 
     return wrapped
+
+
+def _on_terminal(stream: Any) -> bool:
+    """Tell whether a stream is a terminal; one that was closed before the start is None."""
+    return stream is not None and stream.isatty()
 
 
 def print_lines(lines: Sequence[str]) -> None:
@@ -81,7 +88,7 @@ def print_json(data: Any) -> None:
     click.echo(json.dumps(data, allow_nan=False))
 
 
-def refuse_output(output: str | None, graph: str = "") -> None:
+def refuse_output(output: str | None) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
     if not output:
         return
@@ -89,24 +96,32 @@ def refuse_output(output: str | None, graph: str = "") -> None:
         raise ParameterError("-o names a file; for standard output leave it out (certify: and say --json)")
     if not Path(output).parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")
-    if Path(output).is_file() and Path(graph).is_file() and Path(output).samefile(graph):
-        raise ParameterError(f"{output}: is the graph itself; name another file")
+    _refuse_input(output, output)
+
+
+def _refuse_input(path: str, place: str) -> None:
+    """Refuse to write to a file that the command reads: graph, certificate, states, scenario."""
+    context = click.get_current_context()
+    texts = [text for name, text in context.params.items() if name not in WRITTEN and isinstance(text, str)]
+    for text in (*texts, context.meta.get(SCENARIO)):
+        if text and (path == text or (os.path.isfile(path) and os.path.isfile(text) and os.path.samefile(path, text))):  # noqa: PTH113, PTH121 - Path.is_file may raise
+            raise ParameterError(f"{place}: is read by the command itself; name another file")
 
 
 # ---------------------------------------------------------------------- the log
 
 
 @contextmanager
-def log_to(path: str | None, others: Sequence[str] = ()) -> Iterator[None]:
+def log_to(path: str | None) -> Iterator[None]:
     """Append to a file what is logged inside: the command, its steps, and how it ended."""
     if path is None:
         yield
         return
-    for other in others:
-        if Path(path) == Path(other) or (Path(path).exists() and Path(other).exists() and Path(path).samefile(other)):
-            raise ParameterError(f"--log {path}: is a file of the command itself; name another file")
+    if path == click.get_current_context().params.get("output"):
+        raise ParameterError(f"--log {path}: is written by -o; name another file")
+    _refuse_input(path, f"--log {path}")
     try:
-        handler = logging.FileHandler(path, encoding="utf-8", errors="backslashreplace")
+        handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise ParameterError(f"--log {path}: cannot be written ({error.strerror}); name another file") from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
@@ -125,7 +140,14 @@ def log_to(path: str | None, others: Sequence[str] = ()) -> Iterator[None]:
     finally:
         LOG.setLevel(level)
         LOG.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Refuse a file that cannot be written, as on a full disk."""
+        raise ParameterError(f"--log {self.baseFilename}: cannot be written; name another file")
 
 
 # ---------------------------------------------------------------------- progress
@@ -181,7 +203,7 @@ def _bar(*columns: str, quiet: bool = False) -> Iterator[Callable[..., Callable[
     if quiet:
         yield lambda description, **task: lambda **now: None
         return
-    if not sys.stderr.isatty():
+    if not _on_terminal(sys.stderr):
         with _plain_lines() as add:
             yield add
         return

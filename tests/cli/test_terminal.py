@@ -119,3 +119,37 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
         begin("one step")
         threading.Event().wait(0.05)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("certify", "s.toml", "--log", "s.toml"),
+        ("certify", "s.toml", "--log", "st.csv"),
+        ("certify", "fig3a", "--x0", "st.csv", "--log", "./st.csv"),
+        ("certify", "fig3a", "--x0", "state", "-o", "state"),
+        ("simulate", "fig3a", "--x0", "st.csv", "-o", "st.csv"),
+    ],
+)
+def test_nothing_is_written_over_what_a_command_reads(words: tuple[str, ...]):
+    state = "".join(f"{node},1\n" for node in range(1, 7))
+    texts = {"st.csv": state, "state": state, "s.toml": '[graph]\nfile = "fig3a"\n[initial_state]\nx0 = "st.csv"\n'}
+    for name, text in texts.items():
+        Path(name).write_text(text, encoding="utf-8")
+    done = ptcc(*words)
+    assert done.code == 2 and done.err.count("\n") == 1 and "read by the command itself" in done.err
+    assert {name: Path(name).read_text(encoding="utf-8") for name in texts} == texts
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_log_on_a_full_disk_is_one_line():
+    done = ptcc("certify", "fig1a", *FAST, "--log", "/dev/full")
+    assert done.code == 2 and done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_a_closed_stream_is_no_defect(monkeypatch: pytest.MonkeyPatch, stream: str):
+    monkeypatch.setattr(f"sys.{stream}", None)
+    assert terminal.Screen().show(lambda: ["a line"], list) is None
+    with terminal.progress(["a step"]) as begin:
+        begin("a step")
