@@ -263,3 +263,31 @@ def test_without_a_start_there_is_no_bound_from_it(tmp_path: Path):
         with pytest.raises(ParameterError, match="no initial state"):
             ask()
     assert math.isfinite(saved.envelope.residual(0.5))
+
+
+@pytest.mark.parametrize(
+    "part", [{"protocol": ptcc.NominalProtocol(T=100)}, {"initial_state": (Fraction(1),) * 6}, {"final_state": None}]
+)
+def test_a_certificate_that_was_read_is_what_its_file_says(tmp_path: Path, part: dict[str, Any]):
+    ptcc.certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    with pytest.raises(ParameterError, match="certify the graph again"):
+        saved.changed(**part)
+    assert saved.changed(trajectory=None).verdict == "certified"
+
+
+@pytest.mark.parametrize("value", [math.nan, {1}, 10**5000], ids=["nan", "set", "long"])
+def test_a_mapping_that_is_no_json_is_refused(value: Any):
+    document = json.loads(ptcc.certify("fig1a", NOMINAL, simulation=False).to_json())
+    document["unverified"]["value"] = value
+    with pytest.raises(FormatError, match="JSON"):
+        read_certificate(document)
+
+
+def test_a_run_whose_agents_stand_in_another_order_is_refused():
+    edges = [("a", "b", 1), ("b", "c", -2), ("c", "a", 1), ("c", "d", 3)]
+    certificate = ptcc.certify(edges, NOMINAL, [1, 2, 3, 4], simulation=False)
+    run = ptcc.simulate(edges[::-1], NOMINAL, dict(zip("abcd", [1, 2, 3, 4], strict=True)))
+    assert run.graph == certificate.graph and run.graph.labels != certificate.graph.labels
+    with pytest.raises(ParameterError, match="another order"):
+        certificate.envelope.compare(run)
