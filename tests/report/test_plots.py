@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from itertools import combinations
@@ -452,6 +453,20 @@ def test_no_run_is_drawn_above_a_bound(name: str) -> None:
     alone = np.asarray(labelled(plot_decay(cert.trajectory))["simulated (CVODES)"].get_ydata())  # type: ignore[attr-defined]
     kept = np.isfinite(alone)
     assert alone[kept] == pytest.approx((norm / norm[0])[: kept.size][kept])
+
+
+@pytest.mark.parametrize(("first", "factor"), [(0.0, 50.0), (0.0, 1e6), (0.999, 1e4)])
+def test_a_run_that_violates_its_bound_is_seen_to_do_so(first: float, factor: float) -> None:
+    cert = certified("fig3b")
+    run = cert.trajectory
+    assert run is not None
+    late = 1 - run.remaining > first
+    states = np.where(late, run.states[:, -1:] + factor * (run.states[:, :1] - run.states[:, -1:]), run.states)
+    ax = plot_decay(replace(run, states=states), certificate=cert)
+    x, y = labelled(ax)["simulated (CVODES)"].get_data()  # type: ignore[attr-defined]
+    inside = (y > labelled(ax)["proved bound"].get_ydata()) & (y < ax.get_ylim()[1])  # type: ignore[attr-defined]
+    inside &= (x <= max(ax.get_xlim())) & (x >= min(ax.get_xlim()))
+    assert inside.sum() > 20
 
 
 def test_the_decay_needs_a_proved_bound_and_a_known_axis() -> None:

@@ -88,7 +88,7 @@ def plot_decay(
     norm, floor, unit = error_norm(subject if run is None else run, proved)
     bounds = {} if proved is None else _bounds(proved, remaining, unit, each)
     best = bounds.get(_BEST, (np.full(remaining.size, np.inf), {}))[0]
-    scale = float(norm[0]) or (float(best[0]) if bounds else 0.0)
+    scale = float(norm[0]) or (float(best[0]) if bounds else 0.0) or (0.0 if run is None else float(norm.max()))
     if scale == 0:
         raise ParameterError("the agents begin where they end: nothing decays")
     place = _places(subject.protocol.gain, run, remaining)[axis]
@@ -96,12 +96,15 @@ def plot_decay(
     for values, looks in bounds.values():
         ax.plot(place, values / scale, **looks)
     bottom, last = max(float(np.nanmin(best)), 1e-16 * scale), remaining.size - 1
-    if run is not None and norm[0] > 0:
+    top = float(max(scale, best[np.isfinite(best)].max(initial=0.0)))
+    if run is not None and norm.any():
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
-        _draw_run(ax, place, resolved(norm, best, floor) / scale, floor / scale, bottom / scale)
-        last = int(np.flatnonzero((best if bounds else norm) >= bottom)[-1])
+        seen = resolved(norm, best, floor)
+        _draw_run(ax, place, seen / scale, floor / scale, bottom / scale)
+        last = int(np.flatnonzero(((best if bounds else norm) >= bottom) | (seen > best))[-1])
+        top = max(top, float(np.nan_to_num(seen).max()))  # a violated bound stays in sight
     ax.set_yscale("log")
-    ax.set_ylim(bottom / scale, 3 * max(1.0, float(best[0]) / scale if bounds else 0.0))
+    ax.set_ylim(bottom / scale, 3 * top / scale)
     ax.set_xscale("log" if axis == "left" else "linear")
     ax.set_xlim(place[0], place[max(last, 1)])
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
