@@ -164,6 +164,17 @@ def test_vector_valued_states_have_one_certificate_for_each_component(tmp_path):
     assert (np.linalg.norm(run.input, axis=1)[:, before] <= certs.peak_input[:, None] + 1e-6).all()
 
 
+def test_the_peak_input_of_vectors_counts_disturbances_and_is_never_rounded_down():
+    fast = {"method": "perron", "simulation": False}
+    protocol = PROTOCOL.replace(rho2=2)
+    calm = ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], **fast).peak_input
+    assert (ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], delta=1, **fast).peak_input > calm).all()
+    tiny = ptcc.certify_vectors(TEAM, protocol, [["1e-399", 0], [0, 0], [0, 0]], **fast).peak_input
+    assert tiny.max() > 0
+    limits = ptcc.GainLimits(gain_cap=50)
+    assert ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], limits=limits, **fast).peak_input is None
+
+
 def test_a_certificate_of_vector_valued_states_is_refused_with_the_mend():
     with pytest.raises(ParameterError, match="certify_vectors"):
         ptcc.certify(TEAM, PROTOCOL, [[5, 1], [2, 0], [-4, 2]])
@@ -174,6 +185,7 @@ def test_a_certificate_of_vector_valued_states_is_refused_with_the_mend():
 def test_a_norm_of_tiny_or_huge_bounds_is_not_below_them():
     from ptcc_certify.certificate.vector_states import _norm
 
+    assert _norm([np.array([5e-324]), np.array([5e-324])]) > 5e-324
     for size in (1e-300, 1.0, 1e200):
         assert (_norm([np.array([3 * size]), np.array([4 * size])]) >= 5 * size).all()
     assert _norm([np.array([np.inf]), np.array([1.0])]) == np.inf and _norm([np.zeros(1), np.zeros(1)]) == 0

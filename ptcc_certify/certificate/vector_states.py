@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down
+from lmi.exact.decimal_rounding import down, float_up
 from ptcc_certify.bounds.envelope import Comparison
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -84,17 +84,28 @@ class VectorCertificate:
 
     @property
     def peak_input(self) -> np.ndarray | None:
-        """(N,) array: proved bound of ``||u_k(t)||_2`` at all times; None where none is proved."""
-        peaks = [None if one.effort is None else one.effort.peak for one in self.components]
-        if any(peak is None for peak in peaks):
-            return None
-        return _norm([np.array([float(x) for x in peak.agents]) for peak in peaks if peak is not None])
+        """(N,) array: proved bound of ``||u_k(t)||_2`` at all times; None where none is proved, or under limits.
+
+        With what disturbances within ``delta`` of the nominal protocol add, if they were asked for.
+        """
+        peaks = []
+        for one in self.components:
+            if one.effort is None or one.effort.peak is None or one.limits:
+                return None
+            disturbed = one.effort.disturbed
+            if one.delta is not None and disturbed is None:
+                return None
+            added = [Fraction(0)] * len(one.effort.peak.agents) if disturbed is None else disturbed.inputs
+            peaks.append([float_up(u + d) for u, d in zip(one.effort.peak.agents, added, strict=True)])
+        return _norm([np.array(peak) for peak in peaks])
 
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of the Frobenius norm ``||E(t)||_F`` (or ``||eps(t)||_F``) where ``1 - t/T`` is ``remaining``.
 
         See :meth:`ptcc_certify.Certificate.norm_bound`.
         """
+        if len({one.envelope.coordinates for one in self.components}) > 1:
+            raise ParameterError("a time limit left some components with bounds of E and others of eps; raise it")
         return _norm([one.norm_bound(remaining) for one in self.components])
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -193,4 +204,6 @@ def _norm(bounds: Sequence[np.ndarray]) -> np.ndarray:
     stack = np.array(bounds)
     largest = stack.max(axis=0)
     unit = np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
-    return unit * np.sqrt(((stack / unit) ** 2).sum(axis=0)) * _MORE
+    with np.errstate(over="ignore"):
+        norm = unit * np.sqrt(((stack / unit) ** 2).sum(axis=0)) * _MORE
+    return np.where(norm > 0, np.nextafter(norm, np.inf), 0.0)

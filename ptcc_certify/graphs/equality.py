@@ -27,7 +27,7 @@ class ByValue:
         return all(_same(mine, its) for mine, its in zip(_values(self), _values(other), strict=True))
 
     def __hash__(self) -> int:
-        return hash(tuple(x.tobytes() if isinstance(x, np.ndarray) else x for x in _values(self)))
+        return hash(tuple(x.shape if isinstance(x, np.ndarray) else x for x in _values(self)))
 
 
 def _values(one: Any) -> list[Any]:
