@@ -38,7 +38,10 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
         there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
         there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
-    return {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
+    drawn = [name for name in wanted if there.get(name)]
+    # the input of the run that the other figures show, without limits of the gain
+    axes = (plot_input(run, certificate=saved) if name == "input" else PLOTS[name](saved) for name in drawn)
+    return {name: ax.figure for name, ax in zip(drawn, axes, strict=True)}
 
 
 def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:

@@ -185,10 +185,40 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         assert height is None or np.abs(run.input).max() <= height * (1 + 1e-9)
         steps = {line.get_drawstyle() for line in agent_lines(ax)}
         assert steps == {"steps-post" if run.held_input is not None else "default"}
-    region = certify(graph, protocol, start, initial_set=5, simulation=False)
-    run = simulate(graph, protocol, start)
+
+
+@pytest.mark.parametrize("radius", [5, 1])
+def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
+    graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
+    region = certify(graph, EXAMPLES[2].protocol(), start, initial_set=radius)
     assert region.effort is not None and region.effort.peak is not None
-    assert peak_of(plot_input(run, certificate=region)) is None
+    text = peak_of(drawn(plot_input(region)))
+    assert text is not None and f"(all |x_k(0)| <= {radius}" in text.get_text()
+    assert float(text.get_text().split()[2]) >= region.effort.peak.largest
+    assert ("not from where this run begins" in text.get_text()) == (radius < 5)
+
+
+def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_named() -> None:
+    graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
+    held, capped = GainLimits(sample_period="0.01"), GainLimits(gain_cap="0.5")
+    titles = {}
+    for name, limits in {"held": [held], "capped": [capped], "both": [held, capped]}.items():
+        cert = certify(graph, EXAMPLES[2].protocol(), start, limits=limits)
+        ax = drawn(plot_input(cert))
+        legend = ax.get_legend()
+        assert legend is not None and cert.trajectory is not None
+        titles[name] = legend.get_title().get_text()
+        first = np.nanmax([line.get_ydata()[0] for line in agent_lines(ax)])  # type: ignore[index]
+        ideal = np.abs(cert.trajectory.input[:, 0]).max()
+        assert (first == pytest.approx(ideal)) == (name != "capped")
+    assert titles == {"held": "held over 0.01", "capped": "gain at most 0.5", "both": "without the limits of the gain"}
+
+
+def test_a_held_input_is_drawn_in_steps_where_every_period_is_sampled() -> None:
+    graph, protocol = graph_of("fig1a"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+    for period, style in (("0.05", "steps-post"), ("0.001", "default")):
+        run = simulate(graph, protocol, range(6), actuator=GainLimits(sample_period=period))
+        assert {line.get_drawstyle() for line in agent_lines(plot_input(run))} == {style}
 
 
 def test_an_input_without_bound_is_drawn_with_its_start() -> None:
@@ -270,7 +300,8 @@ def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: st
         colour, line, _ = EDGE_STYLES[arrow.sign]
         assert same_color(patch.get_edgecolor(), colour) and patch.get_linestyle() == line
     signs = {EDGE_STYLES[int(sign)][2] for sign in graph.sign}
-    ground = {"leader group"} if "followers" in group else set()
+    several = any(len(component.nodes) > 1 for component in structure.closed_components)
+    ground = {"leader group"} if "followers" in group and several else set()
     assert set(labelled(ax)) == {*group} | signs | ground
     assert not {colour for colour, _, _ in EDGE_STYLES.values()} & {colour for colour, _ in CAMP_STYLES.values()}
 
@@ -295,6 +326,31 @@ def test_weights_are_written_where_they_differ_and_there_are_few() -> None:
     assert len(plot_graph([("a", "b", 2), ("b", "c", -2)]).texts) == 3
     many = plot_graph(SignedDigraph.from_edges([(k, k % 30 + 1, k) for k in range(1, 31)]))
     assert len(many.texts) == 30 and len({patch.get_linewidth() for patch in arrows_in(many)}) == 30
+
+
+def test_a_weight_stands_where_no_other_arrow_crosses() -> None:
+    edges = [("L", "1", 1), ("1", "L", 1), ("L", "2", -1), ("1", "3", 2), ("2", "4", 1), ("3", "5", -1), ("4", "5", 1)]
+    graph = SignedDigraph.from_edges(edges)
+    ax = drawn(plot_graph(graph))
+    weights = ax.texts[graph.n_nodes :]
+    curves = []
+    for patch in arrows_in(ax):
+        ends = patch._posA_posB  # type: ignore[attr-defined]
+        curve = arc(*ends, patch.get_connectionstyle().rad, np.linspace(0, 1, 200))  # type: ignore[attr-defined]
+        curves.append(ax.transData.transform(curve))
+    assert len(weights) == len(curves) == 6
+    for k, weight in enumerate(weights):
+        box = Text.get_window_extent(weight)
+        others = np.concatenate(curves[:k] + curves[k + 1 :])
+        assert not box.count_contains(others), weight
+
+
+def test_a_flat_graph_has_a_flat_figure() -> None:
+    heights = [
+        plot_graph([(k, k + 1, 1) for k in range(4)]).figure.get_figheight(),
+        plot_graph(graph_of("fig1a")).figure.get_figheight(),
+    ]
+    assert heights[0] < 1.2 < 3 < heights[1] <= 3.4
 
 
 def test_the_layout_is_the_same_in_every_run_and_separates_the_nodes() -> None:
@@ -435,6 +491,7 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
     there = np.isfinite(size)
     assert size[0] == 1 and there[: there.sum()].all() and not there.all()
     assert (size[there] <= height[there] * (1 + 1e-6)).all() and size[there].min() > floor
+    assert f"bound of Theorem {cert.theorem.number}" in shown
     functions = [line.get_ydata() for line in ax.lines if len(line.get_ydata()) > 2 and line not in (bound, seen)]
     assert len(functions) == len(cert.envelope.functions) > 1
     assert np.array_equal(height, np.minimum.reduce(functions))
@@ -555,7 +612,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
     cert = certified("sliding")
     for plot in (plot_trajectory, plot_input, plot_effort, plot_sliding):
         assert plot(cert, time_unit="ms").get_xlabel() == "time $t$ (ms)"
-        assert plot(cert).get_xlabel() == "time $t$ (unit of $T$)"
+        assert plot(cert).get_xlabel() == "time $t$"
     assert plot_decay(cert, axis="time", time_unit="ms").get_xlabel() == "time $t$ (ms)"
     assert {ax.get_xlabel() for ax in plot_run(cert, time_unit="s").axes} == {"time $t$ (s)"}
 

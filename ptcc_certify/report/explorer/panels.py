@@ -1,4 +1,4 @@
-"""The figures of the explorer, whose axes stay where they are whatever they show."""
+"""The figures of the explorer, whose axes keep their places as long as their legends keep their rows."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ PANELS = {
 _LEAST = 1e-8
 #: Decades that are named on the axes of the decay.
 _TICKS = {4: "10⁴", 2: "100", 0: "1", -2: "0.01", -4: "10⁻⁴", -6: "10⁻⁶", -8: "10⁻⁸"}
-#: A panel in inches, and its margins: left, bottom, right, top (with room for a legend of four lines).
-_SIZE, _MARGINS = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56, 0.74)
+#: A panel in inches, and its margins: left, bottom, right; that at the top has room for each row of a legend.
+_SIZE, _MARGINS, _GRAPH_MARGINS, _ROW = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56), (0.1, 0.1, 0.1), 0.17
 
 
 def panel_svg(certificate: Certificate, name: str) -> str:
@@ -47,11 +47,13 @@ def draw_panels(certificate: Certificate, names: tuple[str, ...]) -> Figure:
         for place, name in enumerate(names, start=1):
             ax = new_axes(figure, (rows, columns, place))
             row, column = divmod(place - 1, columns)
-            left, bottom, right, top = (0.1, 0.1, 0.1, _MARGINS[3]) if name == "graph" else _MARGINS
+            left, bottom, right = _GRAPH_MARGINS if name == "graph" else _MARGINS
             corner = (column * _SIZE[0] + left, (rows - 1 - row) * _SIZE[1] + bottom) / size
-            extent = (_SIZE[0] - left - right, _SIZE[1] - bottom - top) / size
-            ax.set_position((*corner, *extent))
+            extent = np.array([_SIZE[0] - left - right, _SIZE[1] - bottom])
+            ax.set_position((*corner, *(extent - [0, 3 * _ROW]) / size))
             _draw(certificate, name, ax)
+            entries = len(ax.get_legend_handles_labels()[0])  # in two columns
+            ax.set_position((*corner, *(extent - [0, (0.5 + math.ceil(entries / 2)) * _ROW]) / size))
     return figure
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
@@ -41,23 +43,26 @@ def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
             row, column = np.nonzero(own & (depth == level))
             corners = np.stack([column, row], axis=1)[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
             squares = Path.make_compound_path_from_polys(side * corners)
-            looks = {"facecolor": EDGE_STYLES[sign][0], "alpha": 0.4 + 0.6 * level / DEPTHS, "linewidth": 0}
-            ax.add_patch(PathPatch(squares, **looks))
+            cell = {"facecolor": EDGE_STYLES[sign][0], "alpha": 0.4 + 0.6 * level / DEPTHS, "linewidth": 0}
+            ax.add_patch(PathPatch(squares, **cell))
     ends = np.cumsum([(group == name).sum() for name in parts])
+    margin = 0.04 * n  # for the bars of the camps
     for end in ends[:-1]:
         ax.axhline(end, color="black", linewidth=0.7)
         ax.axvline(end, color="black", linewidth=0.7)
     for name, low, high in zip(parts, [0, *ends[:-1]], ends, strict=True):
-        ax.plot([0, 0], [low, high], color=CAMP_STYLES[name][0], linewidth=5, solid_capstyle="butt", clip_on=False)
-        ax.plot([low, high], [0, 0], color=CAMP_STYLES[name][0], linewidth=5, solid_capstyle="butt", clip_on=False)
-        ax.plot([], [], color=CAMP_STYLES[name][0], linewidth=5, label=f"{name} ({high - low:,})")
+        looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "linewidth": 5, "solid_capstyle": "butt"}
+        ax.plot([-margin / 2] * 2, [low, high], **looks)
+        ax.plot([low, high], [-margin / 2] * 2, **looks)
+        ax.plot([], [], **looks, label=f"{name} ({high - low:,})")
     for sign, (colour, _, name) in EDGE_STYLES.items():
         if (graph.sign == sign).any():
             ax.plot([], [], "s", color=colour, markersize=4, label=name)
-    ax.set_xlim(0, n)
-    ax.set_ylim(n, 0)
+    ax.set_xlim(-margin, n)
+    ax.set_ylim(n, -margin)
     ax.set_aspect("equal")
     ax.grid(False)
+    ax.spines[:].set_visible(False)
     finished(ax, f"who is listened to (the {n:,} nodes)", "who listens")
     ax.set_xticks([])
     ax.set_yticks([])

@@ -40,7 +40,7 @@ def plot_decay(
     r"""Draw ``||E(t)|| / ||E(0)||``, ``E = -L X``, of a run under its proved bounds; the vertical axis is logarithmic.
 
     Thick: the bound ``min_i sqrt(e^(-rate_i s(t)) V_i(0) / lmin(P_i))``, the best of all proved Lyapunov functions at
-    every instant. Thin: each of them. Dashed: the paper's. If only Theorem 1.1's own coordinates were proved,
+    every instant. Thin: each of them. Dashed: the theorem's own. If only Theorem 1.1's own coordinates were proved,
     ``||eps(t)||`` instead. The run, with circles, is drawn down to the integrator's floor, its tolerance times the
     size of the states times what ``E`` multiplies them by: below, a run says nothing.
 
@@ -74,7 +74,7 @@ def plot_decay(
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> [plot_decay(cert, axis=name).get_xlabel() for name in ("left", "time", "clock")]
-    ['remaining time, $1 - t/T$', 'time $t$ (unit of $T$)', 'stretched clock $s(t)$']
+    ['remaining time, $1 - t/T$', 'time $t$', 'stretched clock $s(t)$']
     >>> [line.get_label() for line in plot_decay(cert.trajectory).lines]
     ['simulated (CVODES)', "integrator's floor"]
     """
@@ -166,7 +166,8 @@ def _bounds(
     for function in functions if each and len(functions) > 1 else ():
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
-            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "label": "the paper's"}
+            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
+            looks["label"] = f"bound of Theorem {certificate.theorem.number}"
         else:
             looks = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None

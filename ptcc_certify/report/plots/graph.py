@@ -27,6 +27,8 @@ GROUND, REACH = "#E2E2E2", 1.5
 TEXT_SIZE, INSIDE = 7, 3
 #: Arrows of which each has its weight written at it.
 WEIGHED_ARROWS = 24
+#: Where a weight may stand, as shares of its arrow; the first is best.
+WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
 #: Height of the drawing in inches.
 _HEIGHT = 3.4
 
@@ -37,7 +39,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
 
     Solid arrows come from allies (``w_kj > 0``), dashed ones from opponents; two opposite ones of the same weight are
     one with two heads. Where weights differ, ``|w_kj|`` is written at up to 24 arrows, and told by widths. Nodes have
-    the colours of their camps; leaders are outlined, and a grey ground lies under each of their groups, the closed
+    the colours of their camps; leaders are outlined, and a grey ground lies under each group of several, the closed
     strong components. The layout is the same in every run.
 
     Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
@@ -60,7 +62,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     ['a', 'b', 'c', '1', '2']
     """
     structure = structure_of(subject)
-    graph, ax = structure.graph, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
+    graph, own, ax = structure.graph, ax is None, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
@@ -73,18 +75,34 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     arrows = arrows_of(graph)
     place, bends = places_and_bends(arrows, part, radius, (width - margin, height - 4 * radius))
     if structure.followers.size:
-        for component in structure.closed_components:
-            _draw_ground(ax, graph, place, component.nodes, radius)
-        ax.fill([], [], color=GROUND, label="leader group")
+        groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1]
+        for nodes in groups:
+            _draw_ground(ax, graph, place, nodes, radius)
+        if groups:
+            ax.fill([], [], color=GROUND, label="leader group")
     _draw_nodes(ax, structure, place, radius)
     _draw_arrows(ax, arrows, place, bends, radius)
-    written = _draw_labels(ax, graph.labels, place, radius, None if inside else _boxes_along(arrows, place, bends))
-    _draw_weights(ax, arrows, place, bends, written)
+    lines = _boxes_along(arrows, place, bends)
+    written = _draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
+    _draw_weights(ax, arrows, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
     ax.set_ylim(-height / 2, height / 2)
     ax.set_axis_off()
-    return finished(ax, "", "")
+    finished(ax, "", "")
+    if own:
+        _fit_height(ax, np.concatenate([written, *lines]), radius)
+    return ax
+
+
+def _fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
+    """Make a figure as high as what is drawn and its legend need."""
+    low, high = boxes[:, 1].min() - radius, boxes[:, 3].max() + radius
+    figure, legend = ax.figure.figure, ax.get_legend()  # type: ignore[union-attr]
+    scale = figure.get_figwidth() / np.ptp(ax.get_xlim())
+    room = 0.1 + (0 if legend is None else legend.get_window_extent().height / figure.dpi)
+    ax.set_ylim(low, high)
+    figure.set_figheight(min(_HEIGHT, room + scale * (high - low)))
 
 
 def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
@@ -134,35 +152,42 @@ def _draw_labels(
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
-        box = _least_covered(spots, half, taken)
+        taken.append(box := _least_covered(spots, half, taken))
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
     return nodes + taken[len(nodes) + len(lines) :]
 
 
 def _draw_weights(
-    ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, taken: list[np.ndarray]
+    ax: Axes,
+    arrows: Sequence[Arrow],
+    place: np.ndarray,
+    bends: np.ndarray,
+    taken: list[np.ndarray],
+    lines: list[list[np.ndarray]],
 ) -> None:
-    """Write the sizes of the weights at their arrows, if they differ and there are few."""
+    """Write the sizes of the weights at their arrows, where no other one crosses, if they differ and there are few."""
     if len({arrow.size for arrow in arrows}) < 2 or len(arrows) > WEIGHED_ARROWS:
         return
     ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-    for arrow, bend in zip(arrows, bends, strict=True):
+    for k, (arrow, bend) in enumerate(zip(arrows, bends, strict=True)):
         text = f"{arrow.size:.3g}"
-        half = np.array([0.33 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
-        shares = np.array([0.5, 0.42, 0.58, 0.34, 0.66, 0.28, 0.72])
-        box = _least_covered(list(arc(place[arrow.source], place[arrow.target], bend, shares)), half, taken)
+        half = np.array([0.33 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE]) + 2
+        spots = list(arc(place[arrow.source], place[arrow.target], bend, WEIGHT_SHARES))
+        foreign = [box for line in lines[:k] + lines[k + 1 :] for box in line]
+        box = _least_covered(spots, half, taken + foreign)
+        taken.append(box)
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=TEXT_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
-def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[np.ndarray]:
-    """Return small boxes along the arrows."""
+def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[list[np.ndarray]]:
+    """Return small boxes along each arrow."""
     curves = [arc(place[a.source], place[a.target], bend) for a, bend in zip(arrows, bends, strict=True)]
-    return [np.array([*(p - 1.5), *(p + 1.5)]) for curve in curves for p in curve]
+    return [[np.array([*(p - 1.5), *(p + 1.5)]) for p in curve] for curve in curves]
 
 
 def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
-    """Return the box about the first of some spots that covers least of the boxes taken, and take it."""
+    """Return the box about the first of some spots that covers least of the boxes taken."""
     boxes = [np.array([*(spot - half), *(spot + half)]) for spot in spots]
     others = np.array(taken)
 
@@ -170,8 +195,7 @@ def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np
         sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
         return float(np.prod(np.maximum(sides, 0), axis=1).sum())
 
-    taken.append(min(boxes, key=covered))
-    return taken[-1]
+    return min(boxes, key=covered)
 
 
 def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:

@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
 
-from lmi.exact.decimal_rounding import up
+from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.report.input_lines import initial_states_text
 from ptcc_certify.report.plots.agents import NAME_SIZE, draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import require_same, structure_of, trajectory_of
@@ -36,8 +39,9 @@ def plot_input(
     the graph is drawn, with a line for the agent whose input is the largest at first. The axis is linear; logarithmic
     for an input that grows to three times its initial size. Behind an actuator it is the input that acts. Nothing is
     drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
-    that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Under caps
-    and stops that the certificate judges, theirs is drawn.
+    that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Of a
+    certificate with one set of limits of the gain the run under these is drawn, and their peak; the legend names them.
+    A held input is drawn in steps if every period is sampled.
 
     Parameters
     ----------
@@ -45,7 +49,8 @@ def plot_input(
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
     certificate : Certificate, optional
-        Of the same graph, protocol and initial state as a trajectory. One of a set of initial states adds nothing.
+        Of the same graph, protocol and initial state as a trajectory. Beside the peak of one of a set of initial
+        states the set is named.
     time_unit : str
         Of the deadline, for the label of the axis.
 
@@ -66,12 +71,12 @@ def plot_input(
     >>> ax.get_ylabel(), ax.texts[0].get_text()
     ('input $|u_k|$', 'certified peak 16.1')
     """
-    run, structure = trajectory_of(subject), structure_of(subject)
+    run, structure = _run_under_limits(subject), structure_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     peak = None if certificate is None else _certified_peak(run, certificate)
     ax, size = axes_of(ax), np.abs(_resolved_input(run))
-    hold = run.held_input is not None
-    named = draw_agents(ax, run, size, structure, size=True, drawstyle="steps-post" if hold else "default")
+    steps = "steps-post" if _every_period_sampled(run) else "default"
+    named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
     largest = np.nan_to_num(size)
     first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
     shown = peak is not None and (peak <= HIGH_PEAK * top or top == 0)
@@ -81,23 +86,69 @@ def plot_input(
         ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
     else:
         ax.set_ylim(0, 1.12 * height or 1)
-    if peak is not None:
-        _draw_peak(ax, peak, shown)
+    if peak is not None and certificate is not None:
+        _draw_peak(ax, peak, shown, _set_text(run, certificate))
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
-    return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$")
+    finished(ax, time_label("time $t$", time_unit), "input $|u_k|$")
+    limits, legend = _limits_text(run, certificate), ax.get_legend()
+    if limits and legend is not None:
+        legend.set_title(limits, FontProperties(size=NAME_SIZE))
+    return ax
 
 
-def _draw_peak(ax: Axes, peak: float, shown: bool) -> None:
+def _run_under_limits(subject: Any) -> Trajectory:
+    """Return the run of a subject; of a certificate with one set of limits of the gain, that under these."""
+    if isinstance(subject, Certificate) and len(subject.limits) == 1 and subject.direct:
+        run, (limits,) = subject.trajectory, subject.limits
+        if run is None or run.actuator is None:
+            return subject.simulate(actuator=GainLimits(limits.gain_cap, limits.stop_before, limits.sample_period))
+    return trajectory_of(subject)
+
+
+def _every_period_sampled(run: Trajectory) -> bool:
+    """Whether the input is held, and known in each period up to the deadline."""
+    if run.actuator is None or run.actuator.sample_period is None:
+        return False
+    longest = np.diff(run.t[run.t <= float(run.protocol.T)]).max(initial=0)
+    return bool(longest <= (1 + 1e-9) * float(run.actuator.sample_period))
+
+
+def _limits_text(run: Trajectory, certificate: Certificate | None) -> str:
+    """Name what limits the gain of a run, or say that a certificate's limits do not."""
+    limits = run.actuator
+    if limits is None:
+        return "without the limits of the gain" if certificate is not None and certificate.limits else ""
+    names = {
+        "gain at most ": limits.gain_cap,
+        "off from $T$ - ": limits.stop_before,
+        "held over ": limits.sample_period,
+    }
+    return ", ".join(f"{name}{near(number)}" for name, number in names.items() if number is not None)
+
+
+def _set_text(run: Trajectory, certificate: Certificate) -> str:
+    """Name the set of initial states for which a peak is proved, and say whether a run begins outside a box."""
+    region = certificate.effort and certificate.effort.initial_set
+    if not region:
+        return ""
+    outside = False
+    if region.radius:
+        center, radius = (np.array(list(map(float, numbers))) for numbers in (region.center, region.radius))
+        outside = bool((np.abs(run.states[:, 0] - center) > radius * (1 + 1e-12)).any())
+    return f" ({initial_states_text(region)}" + (",\nnot from where this run begins)" if outside else ")")
+
+
+def _draw_peak(ax: Axes, peak: float, shown: bool, whom: str) -> None:
     """Draw the certified peak with its value, rounded up; at the top, if it is far above what is drawn."""
     ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
     looks: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
     if not shown:
-        text = f"certified peak {up(peak, 3)}, above"
+        text = f"certified peak {up(peak, 3)}{whom}, above"
         ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **looks)
         return
     ax.axhline(peak, color="black", linewidth=0.9, linestyle="--")
-    text = f"certified peak {up(peak, 3)}"
+    text = f"certified peak {up(peak, 3)}{whom}"
     ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **looks)
 
 
@@ -141,7 +192,7 @@ def plot_effort(
     run = trajectory_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     effort, bound = None if certificate is None else _certified_effort(run, certificate), None
-    if effort is not None and effort.energy is not None and not (run.actuator or run.sliding):
+    if effort and effort.energy and not (effort.initial_set or run.actuator or run.sliding):
         bound = float(effort.energy.value)
     ax, energy = axes_of(ax), _energy(run)
     ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
@@ -236,7 +287,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
 
 
 def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effort | None:
-    """Return what is proved about the input of a run; None if that is of other initial states, or the run is disturbed.
+    """Return what is proved about the input of a run; None if the run is disturbed, or does not begin at 0.
 
     Raises
     ------
@@ -247,5 +298,4 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     effort, slid = certificate.effort, trajectory.sliding
     unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     unknown = unknown or (slid is not None and slid.boundary_layer is not None)
-    unknown = unknown or effort is None or effort.initial_set is not None or certificate.initial_state is None
     return None if unknown else effort

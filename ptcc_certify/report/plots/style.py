@@ -106,9 +106,9 @@ def axes_of(ax: Axes | None, size: tuple[float, float] = SINGLE_COLUMN) -> Axes:
     return new_axes(Figure(size, layout="constrained")) if ax is None else ax
 
 
-def time_label(quantity: str, unit: str, unknown: str = "unit of $T$") -> str:
-    """Return the label of an axis of time, with the unit, which without a name is that of the deadline."""
-    return f"{quantity} ({unit or unknown})"
+def time_label(quantity: str, unit: str) -> str:
+    """Return the label of an axis of time, with the unit if one is given."""
+    return f"{quantity} ({unit})" if unit else quantity
 
 
 def tick_count(axis: Axis, most: int = 6) -> int:

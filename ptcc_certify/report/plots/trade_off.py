@@ -48,4 +48,4 @@ def plot_trade_off(subject: Design, *, ax: Axes | None = None, time_unit: str = 
             [float(found.protocol.T)], [float(found.peak)], "o", color=RUN, markeredgecolor="black", label="this design"
         )
     norm = r"peak input $\|u\|_2$" if found.asked.input_norm == 2 else "peak input, largest $|u_k|$"
-    return finished(ax, time_label("deadline $T$", time_unit, "unit of time"), norm)
+    return finished(ax, time_label("deadline $T$", time_unit), norm)
