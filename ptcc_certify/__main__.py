@@ -1,6 +1,20 @@
-"""``python -m ptcc_certify``: the command line ``ptcc``."""
+"""``python -m ptcc_certify``: the command line ``ptcc``, where the packages that it needs are installed."""
 
-from ptcc_certify.cli import main
+import sys
+
+
+def main() -> None:
+    """Run ``ptcc``; where a package is missing tell so, and what works without any."""
+    try:
+        from ptcc_certify.cli import main as run
+
+        run()
+    except ModuleNotFoundError as error:
+        what = f"ptcc needs the package {error.name}, which is not installed; pip install ptcc-certify"
+        without = "without other packages: python -m ptcc_certify.checker CERTIFICATE"
+        print(f"ptcc: {what}, or, {without}", file=sys.stderr)
+        sys.exit(2)
+
 
 if __name__ == "__main__":
     main()

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -42,7 +43,7 @@ def check(
     Raises
     ------
     FormatError
-        The file cannot be read as a certificate; one line.
+        The file cannot be read as a certificate, or one of its side files is missing; one line.
 
     Examples
     --------
@@ -70,6 +71,10 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker
     elif not isinstance(source, str | os.PathLike | Mapping):
         raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
     try:
-        return checker.read_and_check(source, **options)
+        document, report = checker.read_and_check(source, **options)
     except checker.UnreadableError as error:
         raise FormatError(str(error)) from None
+    if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
+        mend = "ask the sender for all files beside it"
+        raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
+    return document, report

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from typing import Any
 
@@ -90,7 +91,7 @@ class _Commands(click.Group):
         try:
             return super().invoke(ctx)
         except (PTCCError, click.BadParameter) as error:
-            raise placed(ctx, error) from None
+            raise placed(ctx, _with_near_choices(error)) from None
         except click.NoSuchOption as error:
             files = [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]  # noqa: PTH110
             if not files:
@@ -104,8 +105,8 @@ def cli() -> None:
     """Certify prescribed-time coordination control on signed digraphs.
 
     GRAPH is a file (a table source,target,weight, or any common format of graphs), - for standard input, or the name
-    of a packaged graph: fig1a, fig1b, fig3a, fig3b, fig5a, fig5b. A scenario file, SCENARIO.toml, stands for a graph
-    with all that is asked about it.
+    of a packaged graph: fig1a, fig1b, fig3a, fig3b, fig5a, fig5b, highland_tribes. A scenario file, SCENARIO.toml,
+    stands for a graph with all that is asked about it.
 
     Begin with: ptcc certify fig1b
     """
@@ -127,6 +128,15 @@ for command in (
     completion.completion,
 ):
     cli.add_command(command)
+
+
+def _with_near_choices(error: PTCCError | click.BadParameter) -> PTCCError | click.BadParameter:
+    """Return the refusal of a value that is none of an option's, with those that are near it."""
+    if not isinstance(error, click.BadParameter) or not error.param or not isinstance(error.param.type, click.Choice):
+        return error
+    given = re.match("'(.*)' is not one of", error.message)
+    hint = did_you_mean(given[1], map(str, error.param.type.choices)) if given else ""
+    return click.BadParameter(error.message.rstrip(".") + hint, error.ctx, error.param) if hint else error
 
 
 def main() -> None:
@@ -155,6 +165,8 @@ def main() -> None:
         sys.stderr.close()
     except OSError as error:
         code = _refuse(f"the result cannot be written ({error.strerror or error})")
+    except ModuleNotFoundError:
+        raise  # what is told of a package that is missing is in ptcc_certify.__main__
     except Exception as error:
         click.echo(f"ptcc: {explain(error)}", err=True)
         code = ExitCode.INTERNAL_ERROR

@@ -72,7 +72,7 @@ def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **opt
     case = certificate, graph, _origins(options)
     screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))
     if output:
-        screen.note(f"written    {output}")
+        screen.note(shared.written(certificate, output))
     return assessment.exit_code
 
 

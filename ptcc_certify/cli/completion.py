@@ -15,8 +15,9 @@ GRAPHS = (
     *(".csv", ".tsv", ".txt", ".edges", ".edgelist", ".graphml", ".gml", ".net", ".pajek", ".mtx", ".npz", ".npy"),
     *(".mat", ".gz", ".toml"),
 )
-#: Names of packaged graphs; their module would load NumPy.
-PACKAGED = tuple(sorted(path.stem for path in (Path(__file__).parents[1] / "examples").glob("fig*.csv")))
+#: Names of packaged graphs, and of those of the paper's examples; their module would load NumPy.
+PACKAGED = tuple(sorted(path.stem for path in (Path(__file__).parents[1] / "examples").glob("*.csv")))
+PAPER = tuple(name for name in PACKAGED if name.startswith("fig"))
 THEOREMS = tuple(f"{chapter}.{row}" for chapter in range(1, 7) for row in (1, 2))
 #: Most names that a shell is told.
 MOST = 1000

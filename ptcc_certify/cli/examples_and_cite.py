@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from ptcc_certify.cli.completion import PACKAGED, THEOREMS, complete
+from ptcc_certify.cli.completion import PAPER, THEOREMS, complete
 from ptcc_certify.errors import ParameterError, did_you_mean
 
 
 @click.command()
-@click.argument("name", default="all", shell_complete=complete((), ("all", *"123456", *PACKAGED)))
+@click.argument("name", default="all", shell_complete=complete((), ("all", *"123456", *PAPER)))
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 @click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:

@@ -20,6 +20,7 @@ from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, r
 from ptcc_certify.errors import NumberError, ParameterError, PTCCError
 
 if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.protocols.gain_limits import GainLimits
@@ -38,6 +39,8 @@ _SLIDING = {
     "mu3": ("1", "Sliding mode: factor of its growing part."),
     "delta": ("1", "Bound of every disturbance."),
 }
+#: Options that are times.
+_TIMES = ("--sample-period", "--stop-before", "--deadline", "--at")
 
 
 def flag_of(name: str) -> str:
@@ -57,7 +60,8 @@ def exact_number(text: str, flag: str) -> Fraction:
     try:
         return parse_exact(text)
     except PTCCError as error:
-        raise ParameterError(f"{flag}: {error}") from None
+        mend = "; give a number in your unit of time, such as 0.001" if flag in _TIMES else ""
+        raise ParameterError(f"{flag}: {error}{mend}") from None
 
 
 def _behaviour(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
@@ -91,7 +95,8 @@ _OTHER_OUTPUTS = {
 def _certificate_output(context: click.Context, parameter: click.Parameter, output: str | None) -> str | None:
     """Return the file for a certificate, or refuse what another command writes."""
     mend = _OTHER_OUTPUTS.get(PurePath(output or "").suffix.lower())
-    if output and mend and not context.resilient_parsing:
+    if output and not context.resilient_parsing and PurePath(output).suffix.lower() not in ("", ".json"):
+        mend = mend or "let the name end in .json"
         raise ParameterError(f"{output}: -o writes the certificate, which is JSON; {mend.format(shell_word(output))}")
     return output
 
@@ -190,6 +195,9 @@ memory_option = click.option(
     metavar="GB",
     help="What the check may take; a certificate that may take more is refused.",
 )
+time_unit_option = click.option(
+    "--time-unit", metavar="UNIT", default="", show_default=False, help="Of time on the axes of figures, such as s."
+)
 time_limit_option = click.option(
     "--time-limit",
     type=float,
@@ -203,6 +211,15 @@ output_option = click.option(
     callback=_certificate_output,
     help="Write the certificate to this file, such as FILE.json.",
 )
+
+
+def written(certificate: Certificate, output: str) -> str:
+    """Return what is said of a certificate that was saved, with its side files."""
+    count = len(certificate.for_check()[1])
+    beside = f" and {count} side file{'s' * (count > 1)} in the same folder, which go with it" if count else ""
+    return f"written    {output}{beside}"
+
+
 json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
 
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.simulation.trajectory import Trajectory
 
+#: Options that a certificate takes; the others are for graphs.
+_OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x0", "seed")
 #: Figures of a simulated run.
 OF_A_RUN = ("states", "input", "decay")
 
@@ -45,7 +47,7 @@ OF_A_RUN = ("states", "input", "decay")
     help="FILE.png, .pdf or .svg.  [default: NAME-WHAT.png, in this folder]",
 )
 @click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
-@click.option("--time-unit", metavar="UNIT", default="", show_default=False, help="Of time on the axes, such as s.")
+@shared.time_unit_option
 @shared.reading_options
 @shared.protocol_options
 @shared.limit_options
@@ -55,8 +57,9 @@ OF_A_RUN = ("states", "input", "decay")
 def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit: str, **options: Any) -> int:
     """Draw one figure of a certificate, a graph or a scenario.
 
-    A certificate is checked first, and its run is repeated. A graph is simulated, for its decay certified, with the
-    options about protocol and initial state that `certify` has too.
+    A certificate is checked first, and its run is repeated; that of one without an initial state, as `design` makes,
+    begins at --x0. A graph is simulated, for its decay certified, with the options about protocol and initial state
+    that `certify` has too.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.report.plots.style import save_figure
@@ -68,7 +71,7 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
     try:
-        subject = _of_certificate(graph, what, options["memory"]) if certified else _of_graph(graph, what, options)
+        subject = _of_certificate(graph, what, options) if certified else _of_graph(graph, what, options)
     except RejectedCertificate as error:
         click.echo(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
@@ -77,20 +80,30 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, memory: float) -> Certificate:
+def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate:
     """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
     from ptcc_certify.certificate.certificate import read_certificate
 
     context = click.get_current_context()
     for parameter in context.command.params:
         given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
-        if given and parameter.name not in ("graph", "what", "output", "wide", "time_unit", "memory"):
+        if given and parameter.name not in _OF_CERTIFICATES:
             raise ParameterError(f"{parameter.opts[0]} is for a graph; the certificate {path} has its own")
+    begins = any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in ("x0", "seed"))
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
-        certificate = read_certificate(path, memory=memory)
+        certificate = read_certificate(path, memory=options["memory"])
+        if begins and certificate.initial_state is not None:
+            raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
+        if what not in OF_A_RUN:
+            return certificate
+        if begins:
+            x0 = shared.read_initial_state(options["x0"], options["seed"], certificate.graph)
+            certificate = certificate.changed(initial_state=tuple(x0))
+        elif certificate.initial_state is None:
+            raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")
-        return certificate.with_simulation() if what in OF_A_RUN else certificate
+        return certificate.with_simulation()
 
 
 def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,11 @@ _TABLES = ("", ".csv", ".txt")
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T.")
 @click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
+@shared.number_option("--noise", metavar="NU", help="Nominal: telegraph noise of size NU on every measurement.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
+@shared.time_unit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
-def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
+def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **options: Any) -> int:
     """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
 
     The columns are t, remaining (1 - t/T, accurate near the deadline), the state of every agent headed by its label,
@@ -44,23 +47,31 @@ def simulate(graph: str, wide: bool, output: str | None, **options: Any) -> int:
     refuse_output(output)
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
     nominal = options["kind"] == "nominal"
+    if options["noise"] is not None and not nominal:
+        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
     if vectors and not nominal:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = shared.read(graph, options)
     more = shared.sliding_keywords(protocol, options, signed)
     if nominal:
         more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
+        if options["noise"] is not None:
+            more |= {"noise": "telegraph", "noise_bound": options["noise"]}
     more |= {name: options[name] for name in ("samples", "boundary_layer")}
     trajectory = run(signed, protocol, shared.read_initial_states(options, signed), **more)
     if output and suffix in FIGURES:
         from ptcc_certify.report.plots.style import save_figure
         from ptcc_certify.report.plots.trajectory import plot_run
 
-        save_figure(plot_run(trajectory, wide=wide), output)
+        save_figure(plot_run(trajectory, wide=wide, time_unit=time_unit), output)
     elif output:
         write_atomically(output, trajectory.to_csv())
     else:
         click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
+        if sys.stdout.isatty():
+            click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
+    if output:
+        click.echo(f"written    {output}")
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK

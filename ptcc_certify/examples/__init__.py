@@ -13,7 +13,8 @@ from importlib import resources
 from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
+from ptcc_certify.graphs.io.packaged import PAPER as GRAPHS
+from ptcc_certify.graphs.io.packaged import graph_path
 from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
 
 __all__ = ["EXAMPLES", "GRAPHS", "Example", "graph_path", "load_graph", "select"]

@@ -16,6 +16,9 @@ from lmi.exact import numbers
 from lmi.exact.numbers import MAX_CHARACTERS, shorten
 from ptcc_certify.errors import NumberError, ParameterError
 
+#: The sign that typesetting and spreadsheets write, which is no hyphen.
+MINUS = "\N{MINUS SIGN}"
+
 
 def parse_exact(text: str) -> Fraction:
     """Read a number of the exact grammar.

@@ -10,6 +10,7 @@ import math
 import os
 import pickle
 import pkgutil
+import re
 import signal
 import subprocess
 import sys
@@ -1091,3 +1092,9 @@ def test_a_row_takes_one_thread_of_linear_algebra(monkeypatch: pytest.MonkeyPatc
     with threadpool_limits(2, user_api="blas"):
         row = rows_module.certified_row("fig1a", load_graph("fig1a"), Settings(NominalProtocol(1, 1, 1, 1)))
         assert (row["verdict"], seen) == ("certified", [{1}]) and max(threads()) == 2
+
+
+def test_the_guide_tells_every_column():
+    guide = (Path(__file__).parents[2] / "docs" / "guide" / "many-graphs.md").read_text("utf-8")
+    heads = [row.split("|")[1] for row in guide.splitlines() if row.startswith("| `")]
+    assert re.findall("`([a-z0-9_]+)`", "".join(heads)) == [*COLUMNS]

@@ -707,7 +707,7 @@ def test_simulate_says_when_the_run_has_not_settled():
 )
 def test_simulate_draws_figures(name: str, magic: bytes, folder: Path):
     run = ptcc("simulate", "fig5a", "-o", name)
-    assert (run.code, run.out, run.err) == (0, "", "")
+    assert (run.code, run.out, run.err) == (0, f"written    {name}\n", "")
     data = Path(name).read_bytes()
     assert data.startswith(magic) and len(data) > 5000
     assert listing(folder) == [name]
@@ -715,7 +715,7 @@ def test_simulate_draws_figures(name: str, magic: bytes, folder: Path):
 
 @pytest.mark.parametrize("name", ["run.csv", "run.txt", "run"])
 def test_simulate_writes_tables(name: str):
-    assert ptcc("simulate", "fig1a", "-o", name).out == ""
+    assert ptcc("simulate", "fig1a", "-o", name).out == f"written    {name}\n"
     assert Path(name).read_text(encoding="utf-8") == ptcc("simulate", "fig1a").out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 from bad_inputs import Run, ptcc
 from click.shell_completion import BashComplete, ShellComplete
+from side_files import with_side_files
 
 import ptcc_certify
 from ptcc_certify.cli import GROUPS, cli
-from ptcc_certify.cli.completion import PACKAGED, THEOREMS
-from ptcc_certify.examples import GRAPHS
+from ptcc_certify.cli.completion import PACKAGED, PAPER, THEOREMS
+from ptcc_certify.examples import GRAPHS as EXAMPLES
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.theorems.table import THEOREMS as TABLE
 
 TEAM = "ann,bob,1\nbob,ann,1\nbob,eve,-2\neve,dan,1\ndan,eve,1\n"
@@ -153,6 +156,36 @@ def test_a_certificate_is_checked_from_standard_input(certificate: str):
     assert tight.code == 2 and "--memory" in tight.err
 
 
+def test_a_side_file_that_is_missing_is_no_rejection():
+    protocol = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    document, files = with_side_files(ptcc_certify.certify("team.csv", protocol, simulation=False).to_dict())
+    Path("c.json").write_text(json.dumps(document))
+    for name, content in files.items():
+        Path(name).write_bytes(content)
+    assert ptcc("check", "c.json").code == 0
+    Path(next(iter(files))).unlink()
+    run = ptcc("check", "c.json")
+    assert run.code == 2 and run.err.startswith("ptcc: c.json: incomplete: side file ")
+
+
+def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certificate: str):
+    for package in ("click", "numpy"):
+        code = f"import sys; sys.modules['{package}'] = None; from ptcc_certify.__main__ import main; main()"
+        run = process("-c", code, "check", certificate)
+        assert run.code == 2 and run.err.startswith(f"ptcc: ptcc needs the package {package},"), run
+        assert "python -m ptcc_certify.checker" in run.err and len(run.err.splitlines()) == 1
+
+
+def test_a_run_tells_what_was_written_and_meets_noise():
+    words = ("simulate", "team.csv", "--gain-cap", "20", "--noise", "0.1", "-o", "run.csv")
+    assert ptcc(*words).out == "written    run.csv\n"
+    assert "gain_cap or stop_before" in ptcc("simulate", "team.csv", "--noise", "0.1").err
+
+
+def test_a_value_near_a_choice_is_told():
+    assert "did you mean listens?" in ptcc("classify", "team.csv", "--edges", "listen").err
+
+
 # ---------------------------------------------------------------------- plot
 
 
@@ -164,6 +197,15 @@ def test_every_figure_of_a_certificate_a_graph_and_a_scenario_is_drawn(certifica
     for what in ("states", "graph"):
         assert ptcc("plot", "team.csv", "--what", what, "--x0", "1,2,3,4").out == f"written    team-{what}.png\n"
     assert ptcc("plot", "s.toml").code == 0 and Path("team-graph.png").exists()
+
+
+def test_a_certificate_without_an_initial_state_is_drawn_from_the_one_that_is_given(certificate: str):
+    protocol = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    ptcc_certify.certify("team.csv", protocol, simulation=False).save("none.json")
+    for what in ("input", "decay", "states"):
+        assert ptcc("plot", "none.json", "--what", what, "--x0", "1,2,3,4").out == f"written    none-{what}.png\n"
+    assert "give one with --x0" in ptcc("plot", "none.json", "--what", "input").err
+    assert "has its own" in ptcc("plot", certificate, "--x0", "1,2,3,4,5,6").err
 
 
 def test_what_cannot_be_drawn_is_refused_in_one_line(certificate: str):
@@ -220,7 +262,7 @@ def test_what_is_half_typed_is_completed_without_complaint():
 
 
 def test_completion_knows_the_names_of_the_package():
-    assert PACKAGED == GRAPHS
+    assert (PACKAGED, PAPER) == (GRAPHS, EXAMPLES)
     assert tuple(theorem.number for theorem in TABLE) == THEOREMS
 
 

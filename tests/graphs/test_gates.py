@@ -57,6 +57,7 @@ def test_a_path_and_a_packaged_name_are_read(tmp_path):
     write_graph(TEAM, tmp_path / "team.csv")
     assert as_graph(tmp_path / "team.csv") == as_graph(str(tmp_path / "team.csv")) == TEAM
     assert as_graph("fig1a").n_nodes == 6
+    assert as_graph("highland_tribes").n_edges == 2 * (29 + 29)
 
 
 def test_a_file_counts_before_a_packaged_graph_of_its_name(tmp_path, monkeypatch):

@@ -22,7 +22,8 @@ import ptcc_certify as ptcc
 from ptcc_certify.certificate import certificate as certificates
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError, SimulationError
-from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.examples import load_graph
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.report.explorer import GIVEN, Explorer, Settings, View, explore, model, widgets
 from ptcc_certify.report.explorer.reproduction import reading_of

@@ -31,7 +31,8 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
     graph : graph-like
         - a :class:`~ptcc_certify.graphs.digraph.SignedDigraph`, or what holds one as ``graph``: a structure, a
           certificate, a run;
-        - a path, a file object, or the name of a packaged graph, ``"fig1a"`` .. ``"fig5b"``, where no such file exists;
+        - a path, a file object, or the name of a packaged graph, ``"fig1a"`` .. ``"fig5b"`` or ``"highland_tribes"``,
+          where no such file exists;
         - a ``networkx.DiGraph`` with the edge attribute ``weight``;
         - an adjacency matrix, whose orientation must be said: a NumPy array, a SciPy sparse matrix or array, a list of
           rows, or a DataFrame with the same labels on rows and columns;

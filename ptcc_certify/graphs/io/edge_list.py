@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain
 
 import numpy as np
@@ -114,6 +115,10 @@ def read_edge_list(data: bytes, name: str) -> Rows:
                 named, width, (s, t, w) = True, len(row), columns
                 ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
                 continue
+            if "".join(row[2:3]).strip().lower() in _WEIGHT:
+                titles = ", ".join(shorten(field.strip()) for field in row[:3])
+                mend = "name the column of who is heard source, that of who listens target"
+                raise FormatError(f"{name}, line {number}: the header {titles} names no source and target; {mend}")
         if len(row) > width and any(map(str.strip, row[width:])):
             ignored["beyond the header" if named else "after the third"] = None
         try:
@@ -127,9 +132,20 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         codes.append(code)
         numbers.append(number)
     notes = ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
+    if not named and len(numbers) > 2:
+        _refuse_matrix(data, len(numbers), name)
     rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
     rows.headerless, rows.notes = not named, notes
     return rows
+
+
+def _refuse_matrix(data: bytes, n: int, name: str) -> None:
+    """Refuse n rows of n numbers with zeros on the diagonal: as edges, the third would have weight 0."""
+    with suppress(NumberError):
+        rows = (row for _, row in records(data, name) if row[1:])
+        if all(len(row) == n and [*map(parse_exact, row)][k] == 0 for k, row in enumerate(rows)):
+            mend = "save it as .npy or .mtx, or write rows source,target,weight"
+            raise FormatError(f"{name}: looks like a {n} x {n} matrix, not like a table of edges; {mend}")
 
 
 def _declared(row: list[str], columns: tuple[int, int, int], place: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.digraph import LARGEST_WEIGHT, SMALLEST_WEIGHT, SignedDigraph, Weights, ordered_labels
-from ptcc_certify.graphs.rationals import nearest_float, parse_exact, shorten
+from ptcc_certify.graphs.rationals import MINUS, nearest_float, parse_exact, shorten
 
 
 @dataclass
@@ -116,8 +116,14 @@ class _Draft:
             message, mend = " is outside the range of float64", "rescale the weights"
         except NumberError as error:
             message = str(error).removeprefix(quoted) if str(error).startswith(quoted) else f": {error}"
-            mend = "write decimals with a point" if "," in text else "remove the row or give a weight"
-            if code == 0 and self.rows.headerless and "finite" not in message:
+            mend = "remove the row or give a weight"
+            if "," in text:
+                mend = "write decimals with a point"
+            elif text in ("+", "-", MINUS):
+                mend = "write 1 or -1"
+            elif MINUS in text:
+                mend = f"write {text.replace(MINUS, '-')[:40]}"
+            elif code == 0 and self.rows.headerless and "finite" not in message:
                 mend += "; if this row is a header, name its columns source, target, weight"
         edge = int(np.argmax(self.codes == code))
         return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
@@ -135,7 +141,7 @@ class _Draft:
         if edges.size:
             named = ", ".join(self.edge(edge) for edge in edges[:5].tolist())
             which = f"{what} of edge {named}{_in_all(edges.size)}"
-            self.refuse(edges[0], f"{which}, and an unknown sign is not an edge; remove it or give a weight")
+            self.refuse(edges[0], f"{which}: an unknown sign is not an edge; remove it or give a weight")
 
     def merge_duplicates(self, duplicates: str, undirected: bool) -> tuple[str, ...]:
         """Refuse or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
@@ -15,7 +16,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import column, records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
-from ptcc_certify.graphs.rationals import as_fraction, parse_exact, shorten
+from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")
@@ -166,7 +167,11 @@ def read_state(
         items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
     except csv.Error as error:
         raise ParameterError(f"{place}: unclear quotes ({error}); close each") from None
-    if any("=" in item for item in items):
+    bare, labelled = text_or_path.strip(), any("=" in item for item in items)
+    if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or (len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", bare)):
+        mend = "separate the values by commas, without brackets, such as 5,2,-4 or a=5,b=2,c=-4"
+        raise ParameterError(f"{place}: no such file; {mend}")
+    if labelled:
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
     elif len(items) == graph.n_nodes:
@@ -308,7 +313,8 @@ def _in_node_order(
         try:
             state[label] = parse_exact(text)
         except NumberError as error:
-            raise refusal(f"{place}: value of node {shorten(label)}: {error}; give a finite number") from None
+            mend = "write the minus as -" if MINUS in text else "give a finite number"
+            raise refusal(f"{place}: value of node {shorten(label)}: {error}; {mend}") from None
     if missing := [label for label in graph.labels if label not in state]:
         count = f"{len(missing)} of {graph.n_nodes} nodes have no value"
         raise refusal(f"{name}: {count}: {_some(missing)}; give one to each node")

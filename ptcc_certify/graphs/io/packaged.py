@@ -8,8 +8,9 @@ from pathlib import Path
 
 from ptcc_certify.errors import ParameterError, did_you_mean
 
-#: Names of the packaged graphs.
-GRAPHS = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
+#: Names of the graphs of the paper's examples, and of all packaged ones.
+PAPER = ("fig1a", "fig1b", "fig3a", "fig3b", "fig5a", "fig5b")
+GRAPHS = (*PAPER, "highland_tribes")
 
 
 def graph_path(name: str) -> Path:

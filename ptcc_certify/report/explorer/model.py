@@ -22,8 +22,9 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import refuse
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
-from ptcc_certify.examples import GRAPHS, load_graph
+from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
