@@ -304,25 +304,31 @@ class Design(Shown):
             return ""
         size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {up(self.peak)}"
         ends = f"within {up(self.residual)} of" if self.residual else "at"
-        return f"{size}, every agent {ends} its final state at T"
+        exact = " (deviation 0)" * (self.asked.residual is not None and not self.residual)
+        return f"{size}, every agent {ends} its final state at T{exact}"
+
+    @property
+    def gains_text(self) -> str:
+        """The gains, exact, in one line; empty where there are none."""
+        if self.protocol is None:
+            return ""
+        text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
+        return text + ("" if self.gain_cap is None else f", gain saturated at {short_exact(self.gain_cap)} from t = 0")
 
     @property
     def deadline_text(self) -> str:
         """What is proved of shorter deadlines, in one line; empty where nothing is."""
         least, most = self.shortest_possible, self.shortest_certified
         parts = [] if most is None else [f"{up(most, DIGITS)} is met"]
+        if most is not None and self.asked.deadline is not None and most < self.asked.deadline:
+            parts = [f"every one from {up(most, DIGITS)} on is met (a search for the shortest may go lower)"]
         parts += [] if least is None else [f"no gains meet one below {down(least)}"]
         return "; ".join(parts)
 
     def lines(self) -> list[str]:
         """Return everything as text: request, verdict, what binds, gains, bounds, deadlines, the largest input."""
         rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
-        if self.protocol is not None:
-            gains = (f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
-            rows.append(("gains", ", ".join(gains)))
-        if self.gain_cap is not None:
-            rows.append(("", f"gain saturated at {short_exact(self.gain_cap)}, from t = 0 on"))
-        rows += [("proved", self.bounds_text), ("deadline", self.deadline_text)]
+        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
         if self.ratio is not None:
             rows.append(("", f"ratio of the two at most {up(self.ratio, 3)}"))
         if self.worst is not None and self.protocol is not None:

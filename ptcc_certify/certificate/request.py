@@ -58,7 +58,7 @@ class Expectations:
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
     >>> print(certify(pair, protocol, expectations=asked).assessment.text)
-    refuted: rate >= 5 (upper bound 4, proved); certified; met: bipartite consensus
+    refuted: rate >= 5 (upper bound 4, proved); met: bipartite consensus; the rest is certified
     """
 
     behaviour: str | None = None

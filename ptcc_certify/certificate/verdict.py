@@ -41,6 +41,7 @@ _LARGEST_CLOCK = 1e12
 MANY_DECADES = 8
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
+VIOLATED = "VIOLATED: the simulated run exceeds the proved bound; please report this graph"
 
 
 @dataclass(frozen=True)
@@ -119,23 +120,35 @@ class Assessment:
         return f"{self.verdict}, says little by T" if self.useful is False else self.verdict
 
     @property
+    def certified_part(self) -> str:
+        """What is certified where something asked is not."""
+        return f"the rest is {CERTIFIED}" if self.asked in (REFUTED, OPEN) else CERTIFIED
+
+    @property
     def text(self) -> str:
         """The verdict line: what is not as one would wish comes first, and agrees with the exit code."""
-        parts = ["VIOLATED: the simulated run exceeds the proved bound; please report this graph"] * self.violated
-        for status in (REFUTED, OPEN):
-            unmet = [str(answer) for answer in self.answers if answer.status == status]
-            parts += [f"{status}: {', '.join(unmet)}"] if unmet else []
-        crowded = bool(parts)
-        if self.useful is False:
-            little = f"{self.verdict}, but with these gains the bound says little by T"
-            advice = f"; {self.advice}" if self.advice else ""
-            parts.append(f"{little}{advice}" if crowded else f"{little}: {self.remark}{advice}")
-        else:
-            colon = ": " if self.verdict != CERTIFIED else "; "
-            parts.append(f"{self.verdict}{colon}{self.remark}" if self.remark and not crowded else self.verdict)
-        met = [str(answer) for answer in self.answers if answer.status == MET]
-        parts += [f"{MET}: {', '.join(met)}"] if met else []
-        return "; ".join(parts)
+        crowded = self.violated or self.asked in (REFUTED, OPEN)
+        if self.verdict != CERTIFIED:
+            return self.line(f"{self.verdict}: {self.remark}")
+        if self.useful is not False:
+            return self.line(self.certified_part, "" if crowded else self.remark)
+        little = f"{self.certified_part}, but with these gains the bound says little by T"
+        return self.line(little if crowded else f"{little}: {self.remark}", self.advice)
+
+    def line(self, *verdict: str) -> str:
+        """Return a verdict in its place among what became of what was asked.
+
+        Parameters
+        ----------
+        *verdict : str
+            Its parts; empty ones are left out.
+        """
+        told = {
+            status: ", ".join(str(a) for a in self.answers if a.status == status) for status in (REFUTED, OPEN, MET)
+        }
+        *unmet, met = (f"{status}: {texts}" if texts else "" for status, texts in told.items())
+        order = (met, *verdict) if self.verdict == CERTIFIED else (*verdict, met)
+        return "; ".join(filter(None, (VIOLATED * self.violated, *unmet, *order)))
 
 
 def verdict_of(report: CheckReport | None) -> str:
@@ -249,7 +262,7 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
     if least > most:
         first = effort is not None and effort.first is not None and effort.first >= least
         size = f"up to {down(least)}" if least < math.inf else "without limit"
-        return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by noise alone'}, proved")
+        return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by the noise alone'}, proved")
     solid = (
         effort is not None and effort.initial_set is not None and all(r > 0 for r in effort.initial_set.radius or (0,))
     )
@@ -296,9 +309,14 @@ def judge_limits(certificate: Content) -> list[Answer]:
         answers.append(Answer(OPEN, "limits", why))
     silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
     if certificate.noise is not None and silent and not certificate.constant:
-        answers.append(Answer(OPEN, "noise", "not certified"))
+        why = "without a limit it meets an infinite gain: add --gain-cap or --stop-before"
+        if any(entry.sample_period is not None for entry in certificate.limits):
+            why = "together with a sample period it has no proved bound: ask for each alone"
+        elif certificate.limits:
+            why = "nothing is certified under the limits"
+        answers.append(Answer(OPEN, "noise", why))
     if certificate.delta is not None and (effort is None or effort.disturbed is None):
-        answers.append(Answer(OPEN, "delta", "not certified"))
+        answers.append(Answer(OPEN, "delta", "the rate proves no bounded input"))
     return answers
 
 

@@ -52,7 +52,10 @@ def check(
         print_json(report.to_dict() | how)
     else:
         lines = [f"graph      {how[key]}" for key in how]
-        screen.show(lambda: wrap_lines(lines) + check_summary(document, report), lambda: lines + report.lines())
+        screen.show(
+            lambda: wrap_lines(lines) + check_summary("" if stdlib else certificate, document, report),
+            lambda: lines + report.lines(),
+        )
     if not report.accepted:
         return ExitCode.VIOLATED
     return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED

@@ -79,10 +79,11 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
             screen.note(f"written    {output}")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
+            again += "; of the deviation see its line error" * (answer.gain_cap is not None)
             screen.note("\n".join([f"to prove it again{again}:", *wrap_command(command)]))
-        elif answer.protocol is not None and not screen.quiet:
-            why = "certify finds other functions for these gains, which prove less"
-            click.echo(f"note: {why}; the proof is the certificate that -o writes", err=True)
+        elif answer.protocol is not None:
+            where = f"the proof is in {output}" if output else "add -o design.json to keep the proof"
+            screen.note(f"note       {where}; certify alone proves less of these gains")
     return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 
@@ -91,9 +92,9 @@ def _refuse_incomplete(options: Options) -> None:
     names = {"max_input": "--max-input U", "initial_bound": "--initial-bound R"}
     missing = [flag for name, flag in names.items() if options[name] is None]
     if options["deadline"] is None and not options["shortest_deadline"]:
-        missing.append("--deadline T or --shortest-deadline")
+        missing = [*filter(None, [", ".join(missing)]), "one of --deadline T, --shortest-deadline"]
     if missing:
-        raise ParameterError(f"design needs {', '.join(missing)}; e.g. {_EXAMPLE}")
+        raise ParameterError(f"design needs {' and '.join(missing)}; e.g. {_EXAMPLE}")
     if options["deadline"] is not None and options["shortest_deadline"]:
         raise ParameterError("--deadline and --shortest-deadline ask for two things; leave one out")
 
@@ -117,7 +118,7 @@ def _save_curve(answer: Design, path: str) -> None:
     if Path(path).suffix.lower() == ".csv":
         curve = answer.trade_off(answer.deadlines())
         rows = zip(*(values.tolist() for values in curve), strict=True)
-        lines = ["deadline,certified_peak,no_gains_below", *(",".join(map(repr, row)) for row in rows)]
+        lines = ["deadline,certified_peak,least_possible_peak", *(",".join(map(repr, row)) for row in rows)]
         write_atomically(path, "\n".join(lines) + "\n")
     else:
         from ptcc_certify.report.plots.style import save_figure

@@ -37,7 +37,7 @@ _SLIDING = {
     "mu1": ("2", "Sliding mode: switching gain, above delta."),
     "mu2": ("1", "Sliding mode: constant part of the reaching gain."),
     "mu3": ("1", "Sliding mode: factor of its growing part."),
-    "delta": ("1", "Bound of every disturbance."),
+    "delta": ("sliding mode: 1; nominal: none", "Bound of every disturbance."),
 }
 #: Options that are times.
 _TIMES = ("--sample-period", "--stop-before", "--deadline", "--at")
@@ -260,7 +260,8 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
         return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
     if options["T"] is not None:
         raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
-    own = {name: default if options[name] is None else options[name] for name, (default, _) in _SLIDING.items()}
+    defaults = {name: default for name, (default, _) in _SLIDING.items()} | {"delta": "1"}
+    own = {name: default if options[name] is None else options[name] for name, default in defaults.items()}
     return SlidingModeProtocol(**own, **shared)
 
 

@@ -12,13 +12,14 @@ from ptcc_certify.report.text_layout import format_lines, wrap_lines
 def design_summary(answer: Design, graph: SignedDigraph, name: str) -> list[str]:
     """Return the short screen: graph, how it was read, what was asked, verdict, deadlines; 8 lines of 80 columns.
 
-    The gains are in the command that proves them again; where there is none, they are here.
+    Gains that meet it stand between verdict and deadlines.
     """
     why = answer.bounds_text if answer.protocol is not None else answer.binding
     entries = [
         *graph_entries(analyse(graph), name),
         ("asked", answer.request_text),
         ("verdict", f"{answer.verdict}: {why}"),
+        ("gains", answer.gains_text),
         ("deadline", answer.deadline_text),
     ]
     return wrap_lines(format_lines((head, text) for head, text in entries if text))

@@ -56,14 +56,19 @@ def input_lines(certificate: Certificate) -> Lines:
     if effort.sliding is not None and not effort.sliding.bounded:
         yield "", "mu3 kappa < 1: the sliding part of the input is not bounded for every sigma(0)"
     yield from _limited_lines(certificate, effort)
-    if effort.disturbed is not None:
-        d, drift = effort.disturbed, effort.disturbed.drift
-        ends = "" if drift is None else ", and all end where they would without"
-        if drift is not None and any(drift):
-            ends = f", every agent ends within {up(max(drift), 4)} of its final state"
-        yield "disturbed", f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|{ends}"
-    elif certificate.delta is not None:
-        yield "disturbed", "nothing is certified: the rate proves no bounded input"
+    yield from disturbed_lines(certificate)
+
+
+def disturbed_lines(certificate: Certificate) -> Lines:
+    """Tell what disturbances add to the input under the nominal protocol, and without limits to the final state."""
+    effort = certificate.effort
+    if effort is not None and (d := effort.disturbed) is not None:
+        held = any(entry.sample_period is not None for entry in certificate.limits)
+        text = f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|" + ", without the hold" * held
+        if d.drift is not None and not certificate.limits:
+            most = max(d.drift)
+            text += f" and moves x_k(T) by at most {up(most, 4)}" if most else " and moves no x_k(T)"
+        yield "disturbed", text
 
 
 def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
@@ -75,12 +80,6 @@ def _limited_lines(certificate: Certificate, effort: Effort) -> Lines:
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
             yield "", f"{noise}, |u_k| <= {up(entry.noisy_largest, 4)}"
-    if certificate.noise is not None and not any(entry.noise for entry in effort.residual):
-        yield "noise", "not certified: noise times an infinite gain; saturate the gain, or switch it off before T"
-    if effort.longest_period is not None:
-        yield "limited", f"not certified with this period; with {down(effort.longest_period, 4)} it is"
-    elif len(effort.residual) < len(certificate.limits):
-        yield "limited", "nothing is certified under these limits"
 
 
 def limits_text(entry: Limited) -> str:

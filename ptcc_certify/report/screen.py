@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
-from itertools import chain, repeat
-from pathlib import PurePath
+from itertools import chain, dropwhile, repeat, takewhile
+from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
+from ptcc_certify.errors import PTCCError
+from ptcc_certify.graphs.io.edge_list import BY_HEADER
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.report.input_lines import initial_states_text, input_lines, limits_text
+from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.text_layout import (
     TEXT,
-    WIDTH,
     columns,
     counted,
-    five_digits,
     format_lines,
     printable,
+    short_number,
     shorten_list,
     shorten_text,
     value_list,
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state import FinalState
     from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.verdict import Answer
     from ptcc_certify.checker import CheckReport
 
 _ORIENTATION = {
@@ -48,10 +49,11 @@ _SHORT_ORIENTATION = _ORIENTATION | {
     "information": "row a,b: information flows a -> b",
     "listens": "row a,b: a listens to b",
 }
+_BY_HEADER = {"information": "information flows source -> target", "listens": "source listens to target"}
 #: Remarks for the long screen alone: "(0 negative)" tells the one, and the other is about pairs of edges.
 _LONG_REMARKS = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
-#: Lines of a short screen of a connected graph, at most.
-SHORT = 8
+#: Lines of a short screen of a connected graph, and of one whose answers take more.
+SHORT, LONGEST = 8, 10
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
@@ -62,7 +64,9 @@ Lines = Iterator[tuple[str, str]]
 
 
 def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
-    r"""Return the short screen of ``ptcc certify``: at most 8 lines of 80 columns, 12 of a disconnected graph.
+    r"""Return the short screen of ``ptcc certify``: 8 lines of 80 columns, 10 or so rather than cut an answer.
+
+    Of a disconnected graph there are up to 4 more.
 
     Parameters
     ----------
@@ -75,8 +79,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     Returns
     -------
     list of str
-        Graph, how it was read, protocol, claim, final state, error bound, input, verdict. Where that takes too many
-        lines, error bound and input tell less, and share one.
+        Graph, how it was read, protocol, claim, final state, error bound, input, disturbances, verdict. Where that
+        takes more than 8 lines, error bound and input tell of no single agent.
 
     Examples
     --------
@@ -93,34 +97,30 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     verdict    certified; checked without a solver
     """
     claims = _component_claims(certificate)
-    room = SHORT + len(claims) - 1
-    shorter = ((_bounds, _full_verdict), (_short_bounds, _full_verdict), (_joint_bounds, _full_verdict))
-    for bounds, verdict in (*shorter, (_joint_bounds, _brief_verdict)):
+    drawn = _is_set_asked(certificate, origins)
+    for room, bounds in ((SHORT, _bounds), (SHORT, _short_bounds), (LONGEST, _bounds), (LONGEST, _short_bounds)):
         entries = [
             *graph_entries(certificate.structure, name),
             ("protocol", _protocol_text(certificate, origins)),
             *zip(chain(["claim"], repeat("")), claims, strict=False),
-            *_short_final_state(certificate),
-            *bounds(certificate),
-            ("verdict", verdict(certificate)),
+            *([] if drawn else _short_final_state(certificate)),
+            *bounds(certificate, drawn),
+            *disturbed_lines(certificate),
+            ("verdict", _short_verdict(certificate)),
         ]
         lines = wrap_lines(format_lines(entries))
-        if len(lines) <= room:
-            return lines
-    return [*lines[: room - 1], shorten_text(f"{lines[room - 1]} ...", WIDTH)]
+        if len(lines) < room + len(claims):
+            break
+    return lines
 
 
 def structure_summary(structure: Structure, name: str) -> list[str]:
     """Return the short screen of ``ptcc classify``: at most 8 lines of 80 columns, 12 of a disconnected graph."""
-    labels, closed = structure.graph.labels, structure.closed_components
+    labels = structure.graph.labels
 
     def lines() -> Lines:
         yield from graph_entries(structure, name)
-        for number, component in enumerate(closed[:3], start=1):
-            head = "leaders" if len(closed) == 1 else f"leaders {number}"
-            yield head, shorten_text(_leaders_text(component, labels, 20), TEXT)
-        if len(closed) > 3:
-            yield "", f"... {len(closed)} leader groups in all, {sum(c.balanced for c in closed)} balanced"
+        yield from ((head, shorten_text(text, TEXT)) for head, text in _leader_lines(structure, 3, 20))
         if structure.followers.size:
             yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()], TEXT)
         claims = [component.claim for component in structure.components]
@@ -129,14 +129,25 @@ def structure_summary(structure: Structure, name: str) -> list[str]:
     return format_lines(lines())
 
 
-def check_summary(document: Mapping[str, Any], report: CheckReport) -> list[str]:
-    """Return the short screen of ``ptcc check``: what is claimed, and whether all of it was verified."""
-    entries = []
+def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
+    """Return the short screen of ``ptcc check``: what is claimed, as ``certify`` tells it, and whether it was verified.
+
+    Without a path, and where a number is beyond float64, nothing but the claim itself.
+    """
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.format import read_document
+
+    lines = []
     if report.accepted:
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
-        entries = [("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))]
-    return wrap_lines([*format_lines(entries), report.lines()[-1]])
+        lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
+        with suppress(PTCCError):
+            certificate = Certificate(**read_document(Path(path), document, "", report)) if path else None
+            told = [] if certificate is None else summary_lines(certificate, path)
+            told = list(dropwhile(lambda line: not line.startswith("protocol"), told))
+            lines = list(takewhile(lambda line: not line.startswith("verdict"), told)) or lines
+    return wrap_lines([*lines, report.lines()[-1]])
 
 
 def graph_entries(structure: Structure, name: str) -> list[tuple[str, str]]:
@@ -163,6 +174,9 @@ def _reading_text(structure: Structure) -> str:
     """Tell how the rows were read, and what is particular about the graph, as far as it fits."""
     text = _SHORT_ORIENTATION[structure.graph.read["orientation"]]
     remarks = [remark for remark in remarks_on(structure) if remark not in _LONG_REMARKS]
+    if BY_HEADER in remarks:
+        remarks.remove(BY_HEADER)
+        text = f"{BY_HEADER}: {_BY_HEADER[structure.graph.read['orientation']]}"
     return shorten_text("; ".join([text, *remarks]), TEXT)
 
 
@@ -171,6 +185,8 @@ def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     p = certificate.protocol
     names = [name for name in p.to_dict() if name != "kind"]
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
+    if certificate.initial_set is not None and (not begin or _is_set_asked(certificate, origins)):
+        begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
     text = f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
@@ -203,17 +219,28 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
-    result = certificate.final_state
-    if result is not None:
-        accuracy = _accuracy(result)
-        kind = f"({accuracy}; degenerate x(0))" if result.degenerate and len(accuracy) < 10 else f"({accuracy})"
-        values = value_list(certificate.graph.labels, result.states, TEXT - len(kind) - 1)
-        if len(result.states) > 1 and len(set(result.states)) == 1:
-            values = f"every agent at {five_digits(result.states[0])}"
-        yield "x(T)", f"{values} {kind}"
+    """Tell where the agents end, in two lines if all of them fit there, else the least and the largest state."""
+    result, labels = certificate.final_state, certificate.graph.labels
+    if result is None:
+        return
+    kind = f"({_accuracy(result, ', rounded')}{'; degenerate x(0)' * bool(result.degenerate)})"
+    if len(result.states) > 1 and len(set(result.states)) == 1:
+        yield "x(T)", f"every agent at {short_number(result.states[0])} {kind}"
+        return
+    text = f"{value_list(labels, result.states, 2 * TEXT)} {kind}"
+    if ", ... (" in text or len(wrap_text(text)) > 2:
+        order = sorted(range(len(labels)), key=result.states.__getitem__)
+        least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
+        text = f"least {least}, largest {most}, of {len(labels):,} agents {kind}"
+    yield "x(T)", text
 
 
-def _bounds(certificate: Certificate) -> Lines:
+def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
+    """Tell whether the question is of a set of initial states, and the one at hand drawn for the simulated run."""
+    return certificate.initial_set is not None and "x(0)" in origins
+
+
+def _bounds(certificate: Certificate, drawn: bool) -> Lines:
     """Tell how near the agents are by when, and how large the input gets."""
     if certificate.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
@@ -221,28 +248,16 @@ def _bounds(certificate: Certificate) -> Lines:
         return
     norm, agents = _error_texts(certificate)
     if norm:
-        yield "error", norm + agents
+        yield "error", norm + agents * (not drawn)
     if certificate.effort is not None:
         bounded, size = _input_texts(certificate, certificate.effort)
         yield "INPUT" if certificate.effort.bounded is False else "input", "; ".join(filter(None, (bounded, size)))
 
 
-def _short_bounds(certificate: Certificate) -> Lines:
+def _short_bounds(certificate: Certificate, drawn: bool) -> Lines:
     """Tell the same of no single agent."""
-    for head, text in _bounds(certificate):
+    for head, text in _bounds(certificate, drawn):
         yield head, text.partition(", every agent" if head == "error" else ", the largest")[0]
-
-
-def _joint_bounds(certificate: Certificate) -> Lines:
-    """Tell the same in one line."""
-    if certificate.constant or certificate.effort is None:
-        yield from _bounds(certificate)
-        return
-    bounded, size = _input_texts(certificate, certificate.effort)
-    second = (
-        size.partition(", the")[0] if certificate.effort.bounded and size else f"input {bounded}".partition(" from")[0]
-    )
-    yield "bounds", shorten_text(f"{_error_texts(certificate)[0]}; {second}", TEXT)
 
 
 def _error_texts(certificate: Certificate) -> tuple[str, str]:
@@ -297,40 +312,25 @@ def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
             label = certificate.graph.labels[max(range(len(agents)), key=agents.__getitem__)]
             states_text = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
             size = f"|u_k| <= {up(effort.peak.largest, 4)}{states_text}, the largest of agent {shorten_text(label, 20)}"
-    if effort.disturbed is not None:
-        size += f"; |d_k| <= {near(effort.disturbed.delta)} adds {up(max(effort.disturbed.inputs), 4)} at most"
     return text, size
 
 
-def _full_verdict(certificate: Certificate) -> str:
+def _short_verdict(certificate: Certificate) -> str:
     """Tell the verdict; what is not as one would wish comes first, and agrees with the exit code."""
-    cut_off = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-    return _verdict_text(certificate, str, cut_off)
-
-
-def _brief_verdict(certificate: Certificate) -> str:
-    """Tell the same without reasons."""
-    return _verdict_text(certificate, lambda answer: answer.what, "time limit reached")
-
-
-def _verdict_text(certificate: Certificate, tell: Callable[[Answer], str], cut_off: str) -> str:
-    from ptcc_certify.certificate.verdict import CERTIFIED, MET, OPEN, REFUTED
+    from ptcc_certify.certificate.verdict import CERTIFIED
 
     assessment = certificate.assessment
-    parts = ["VIOLATED: the simulated run exceeds the proved bound; please report this graph"] * assessment.violated
-    for status in (REFUTED, OPEN):
-        unmet = [tell(answer) for answer in assessment.answers if answer.status == status]
-        parts += [f"{status}: {', '.join(unmet)}"] * bool(unmet)
     if assessment.verdict != CERTIFIED:
-        parts.append(f"{assessment.verdict}: {assessment.remark}")
-    elif assessment.useful is False:
-        option = assessment.advice.partition(" (")[0]
-        parts.append(f"{CERTIFIED}, but says little by T" + (f"; {option} leaves 1 %" if option else ""))
-    else:
-        parts.append(CERTIFIED if parts else f"{CERTIFIED}; checked without a solver")
-    parts += [cut_off] * bool(certificate.cut_off and assessment.verdict == CERTIFIED)
-    met = [answer.what for answer in assessment.answers if answer.status == MET]
-    return "; ".join([*parts, *[f"{MET}: {', '.join(met)}"] * bool(met)])
+        return assessment.line(f"{assessment.verdict}: {assessment.remark}")
+    certified = assessment.certified_part + " without disturbances" * (certificate.delta is not None)
+    option = assessment.advice.partition(" (")[0]
+    more = f"{option} leaves 1 %" if option else ""
+    if assessment.useful is False:
+        certified += ", but says little by T"
+    elif not assessment.answers and certificate.delta is None:
+        more = "checked without a solver"
+    ended = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
+    return assessment.line(certified, more, ended * bool(certificate.cut_off))
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -341,10 +341,7 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
         yield from _graph_lines(structure, name)
         yield "nodes", shorten_list(labels)
         yield "structure", structure_text(structure)
-        for number, component in enumerate(structure.closed_components[:4], start=1):
-            yield f"leaders {number}", _leaders_text(component, labels)
-        if len(structure.closed_components) > 4:
-            yield "", f"... {len(structure.closed_components)} closed components in all"
+        yield from _leader_lines(structure, 4)
         if structure.followers.size:
             yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()])
         yield from _claim_lines([component.claim for component in structure.components])
@@ -367,8 +364,10 @@ def certificate_lines(
         yield "protocol", f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
         if certificate.initial_state is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
-            yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn
-        for part in (_sliding_lines, _final_state_lines, _rate_lines, input_lines):
+            alone = ", of the simulated run alone" * _is_set_asked(certificate, origins)
+            yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn + alone
+        states = () if _is_set_asked(certificate, origins) else (_final_state_lines, _deviation_lines)
+        for part in (_sliding_lines, *states, _rate_lines, input_lines):
             yield from part(certificate)
         yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
         if certificate.cut_off:
@@ -384,6 +383,25 @@ def _graph_lines(structure: Structure, name: str) -> Lines:
     graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
     yield "graph", f"{name}: {counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')}, {negative} negative"
     yield "read", "; ".join([_ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])
+
+
+def _leader_lines(structure: Structure, most: int, width: int = 40) -> Lines:
+    """Tell of the groups of leaders; of many, the largest that are more than single leaders."""
+    closed, labels = structure.closed_components, structure.graph.labels
+    numbered = sorted(enumerate(closed, start=1), key=lambda item: -len(item[1].nodes))[:most]
+    many = len(closed) > most
+    if many:
+        single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
+        size = counted(len(numbered[0][1].nodes), "member")
+        yield (
+            "leaders",
+            f"{len(closed):,} groups, {balanced:,} balanced; {single:,} of one member, the largest of {size}",
+        )
+    for number, component in sorted(numbered):
+        if not many or len(component.nodes) > 1:
+            text = _leaders_text(component, labels, width)
+            head = "leaders" if len(closed) == 1 else f"leaders {number}"
+            yield ("", f"group {number}: {text}") if many else (head, text)
 
 
 def _leaders_text(component: ClosedComponent, labels: Sequence[str], width: int = 40) -> str:
@@ -410,21 +428,20 @@ def _final_state_lines(certificate: Certificate) -> Lines:
     result = certificate.final_state
     if result is None:
         return
-    kind = _accuracy(result)
-    if kind != "floating point" and any(Fraction(five_digits(x)) != x for x in result.states[:100]):
-        kind += "; here to 5 digits"
-    yield "x(T)", f"{value_list(certificate.graph.labels, result.states)} ({kind})"
+    yield "x(T)", f"{value_list(certificate.graph.labels, result.states)} ({_accuracy(result)})"
     if result.degenerate:
         groups = ", ".join(map(str, result.degenerate))
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
-def _accuracy(result: FinalState) -> str:
-    """Tell how exactly a final state is known."""
-    if result.radius is not None:
-        widest = max(result.radius)
-        return f"to within {up(widest, 2)}, proved" if widest else "exact"
-    return "exact" if result.exact else "floating point"
+def _accuracy(result: FinalState, rounded: str = "; here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and if it is written with fewer digits."""
+    if result.radius is None and not result.exact:
+        return "floating point"
+    widest = max(result.radius or (0,))
+    known = f"to within {up(widest, 2)}, proved" if widest else "exact"
+    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
+    return known + rounded * cut
 
 
 def _rate_lines(certificate: Certificate) -> Lines:
@@ -444,7 +461,6 @@ def _rate_lines(certificate: Certificate) -> Lines:
     yield "rate", f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
     yield from _class_lines(certificate)
     yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
-    yield from _deviation_lines(certificate)
     arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
     text, report = f"{len(certificate.obligations)} proof obligations proved in {arithmetic}", certificate.checked
     if report is not None:

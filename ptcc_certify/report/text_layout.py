@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 
 #: Columns of a screen, and of the head of a line on it, blank included.
 WIDTH, HEAD = 80, 11
@@ -79,13 +80,23 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
 
 def value_list(labels: Sequence[str], values: Iterable[object], width: int = 90) -> str:
     """List the value of every node, long labels shortened."""
-    entries = (f"{shorten_text(label, 24)}={five_digits(value)}" for label, value in zip(labels, values, strict=True))
+    entries = (f"{shorten_text(label, 24)}={short_number(value)}" for label, value in zip(labels, values, strict=True))
     return shorten_list([printable(entry) for entry in entries], width)
 
 
-def five_digits(value: object) -> str:
-    """Write a number with five digits, to nearest."""
-    return f"{float(value):.5g}"  # type: ignore[arg-type]
+def short_number(value: object) -> str:
+    """Write a number with five digits, to nearest, a rational as a quotient if that is short and exact alone.
+
+    Examples
+    --------
+    >>> short_number(Fraction(-1, 3)), short_number(Fraction(1, 2)), short_number(Fraction(2, 3001))
+    ('-1/3', '0.5', '0.00066644')
+    """
+    decimal = f"{float(value):.5g}"  # type: ignore[arg-type]
+    if not isinstance(value, Fraction) or Fraction(decimal) == value:
+        return decimal
+    short = abs(value.numerator) < 1000 and value.denominator < 1000
+    return str(value) if short else decimal
 
 
 def wrap_text(text: str, width: int = TEXT) -> list[str]:

@@ -224,7 +224,7 @@ def test_a_refuted_expectation_is_3(command: str):
     assert run.code == 3
     said = "refuted: stability (it is bipartite consensus)"
     if command == "certify":
-        assert run.out.splitlines()[-1] == f"verdict    {said}; certified" and run.err == ""
+        assert run.out.splitlines()[-1] == f"verdict    {said}; the rest is certified" and run.err == ""
     else:
         assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
 
@@ -372,7 +372,7 @@ def test_a_rate_beyond_the_upper_bound_is_3_and_one_below_it_4():
         run = detailed("certify", "fig1b", "--min-rate", str(wanted))
         assert run.code == code
         verdict = run.out.splitlines()[-1].removeprefix("verdict    ")
-        assert verdict.startswith({0: "certified; ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
+        assert verdict.startswith({0: "met: rate >= ", 3: "refuted: rate >= ", 4: "left open: rate >= "}[code])
         bound = re.search(r"upper bound ([0-9.]+), proved|at most ([0-9.]+) can be|met: rate", verdict)
         assert bound is not None and (code == 0 or Fraction(bound[1] or bound[2]) >= limit)
 
@@ -471,7 +471,7 @@ def test_json_is_exactly_one_object(command: str, name: str):
 
 def test_json_goes_out_also_when_an_expectation_is_refuted():
     run = ptcc("certify", "fig1a", "--json", "--expect", "consensus", "-o", "c.json")
-    assert run.code == 3 and run.err == "verdict    refuted: consensus (it is stability); certified\n"
+    assert run.code == 3 and run.err == "verdict    refuted: consensus (it is stability); the rest is certified\n"
     assert one_object(run.out) == read("c.json")
 
 
@@ -743,11 +743,11 @@ def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
             ("--gain-cap", "30", "--noise", "10"),
             "400",
             3,
-            "(it is up to 1200 by noise alone, proved)",
+            "(it is up to 1200 by the noise alone, proved)",
         ),
         (("--gain-cap", "30", "--noise", "10"), "4000", 4, "left open: |u_k| <= 4000"),
         (("--gain-cap", "30", "--noise", "10"), "7000", 0, ""),
-        (("--noise", "1"), "1e9", 3, "(it is without limit by noise alone, proved)"),
+        (("--noise", "1"), "1e9", 3, "(it is without limit by the noise alone, proved)"),
         (("--delta", "5"), "20", 4, "left open: |u_k| <= 20"),
         (("--delta", "5"), "400", 0, ""),
         (("--delta", "5", "--gain-cap", "30"), "20", 4, "left open: |u_k| <= 20"),
@@ -789,7 +789,7 @@ def test_limits_of_actuators_are_judged_and_simulated(folder: Path):
     )
     assert run.code == 0 and "zero-order hold 0.001" in run.out and "disturbed  |d_k| <= 0.1" in run.out
     coarse = detailed("certify", "fig1a", "--no-simulation", "--gain-cap", "20", "--sample-period", "0.5")
-    assert "not certified with this period; with 0.00" in coarse.out and coarse.code == 4
+    assert "(certified with a period of 0.00" in coarse.out and coarse.code == 4
     assert "verdict    left open: limits (certified with a period of 0.00" in coarse.out
     rows = ptcc("simulate", "fig1a", "--gain-cap", "20", "--samples", "11").out.splitlines()
     assert rows != ptcc("simulate", "fig1a", "--samples", "11").out.splitlines()
@@ -802,7 +802,7 @@ def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
     assert met.code == 0 and "verdict    met: |u_k| <= " in met.out
     assert ptcc("check", "d.json", "fig1a").code == 0
     lines = Path("d.csv").read_text().splitlines()
-    assert lines[0] == "deadline,certified_peak,no_gains_below" and len(lines) == 62
+    assert lines[0] == "deadline,certified_peak,least_possible_peak" and len(lines) == 62
     assert ptcc(*asked, "--deadline", "0.7").code == 3
     assert ptcc(*asked, "--deadline", "0.9", "-o", "none.json").code == 4
     assert not Path("none.json").exists()

@@ -38,17 +38,18 @@ def test_design_says_what_was_asked_what_is_met_and_how_to_prove_it_again():
     for task, code in (("--shortest-deadline",), 0), (("--deadline", "0.7"), 3), (("--deadline", "0.9"), 4):
         short, long = ptcc(*DESIGN, *task), ptcc(*DESIGN, *task, "-v")
         assert short.code == long.code == code
-        assert len(short.out.splitlines()) <= 8 and long.out != short.out
+        assert len(short.out.splitlines()) <= 9 and long.out != short.out
+        assert ("gains      T=1.26" in short.out) == (code == 0)
         assert max(map(len, (short.out + long.out).splitlines())) <= 80
         assert ("to prove it again:" in short.out) == (code == 0)
 
 
 def test_design_names_everything_that_is_missing_at_once():
     assert (
-        "needs --max-input U, --initial-bound R, --deadline T or --shortest-deadline; e.g."
+        "needs --max-input U, --initial-bound R and one of --deadline T, --shortest-deadline; e.g."
         in ptcc("design", "fig1a").err
     )
-    assert "needs --deadline T or --shortest-deadline;" in ptcc(*DESIGN).err
+    assert "needs one of --deadline T, --shortest-deadline;" in ptcc(*DESIGN).err
     both = ptcc(*DESIGN, "--deadline", "1", "--shortest-deadline")
     assert both.code == 2 and "leave one out" in both.err
 

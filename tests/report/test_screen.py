@@ -1,4 +1,4 @@
-"""The short screens: at most 8 lines of 80 columns whatever the graph, and a verdict that the exit code agrees with."""
+"""The short screens: at most 11 lines of 80 columns whatever the graph, and a verdict the exit code agrees with."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LABELS = (str, lambda k: f"agent number {k} of a rather long list of agents", la
 HEADS = ["graph", "read", "protocol", "claim", "x(T)", "error", "input", "verdict"]
 #: The beginning of the verdict line by exit code.
 VERDICTS = {
-    ExitCode.OK: "certified",
+    ExitCode.OK: "(met: .*)?certified",
     ExitCode.VIOLATED: "VIOLATED",
     ExitCode.REFUTED: "refuted",
     ExitCode.UNDECIDED: "(undecided|left open)",
@@ -45,7 +45,7 @@ def assert_short(lines: list[str], most: int) -> None:
 def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[str]:
     """The screen is short, and its verdict is that of the exit code."""
     lines = summary_lines(certificate, name)
-    assert_short(lines, 8 if len(certificate.claims) == 1 else 12)
+    assert_short(lines, 11 if len(certificate.claims) == 1 else 14)
     (verdict,) = [line for line in lines if line.startswith("verdict ")]
     assert re.match(rf"verdict    {VERDICTS[certificate.assessment.exit_code]}\b", verdict), verdict
     return lines

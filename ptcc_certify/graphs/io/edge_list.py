@@ -21,6 +21,8 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _SOURCE = ("source", "from", "fromnodeid", "src")
 _TARGET = ("target", "to", "tonodeid", "dst")
 _WEIGHT = ("weight", "sign", "rating", "value", "w")
+#: The note of a file whose header puts source and target elsewhere than source first.
+BY_HEADER = "columns by header"
 
 
 def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
@@ -131,7 +133,8 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         second.append(target)
         codes.append(code)
         numbers.append(number)
-    notes = ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
+    notes = (BY_HEADER,) * (s > 0)
+    notes += ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
     if not named and len(numbers) > 2:
         _refuse_matrix(data, len(numbers), name)
     rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
