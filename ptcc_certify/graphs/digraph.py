@@ -11,6 +11,7 @@ import json
 import math
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from fractions import Fraction
 from functools import cached_property
@@ -612,14 +613,11 @@ def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
 
 
 def _without_texts(entries: np.ndarray) -> np.ndarray:
-    """Return entries of a matrix with rationals in the place of texts."""
+    """Return entries of a matrix with rationals in the place of texts that are numbers."""
     for place, entry in np.ndenumerate(entries):
         if isinstance(entry, str):
-            try:
+            with suppress(NumberError):
                 entries[place] = as_fraction(entry)
-            except NumberError as error:
-                row, column = (i + 1 for i in place)
-                raise GraphError(f"row {row}, column {column} of the matrix: {error}") from None
     return entries
 
 

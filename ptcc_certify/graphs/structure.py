@@ -260,8 +260,8 @@ class Structure(Shown):
 
         Examples
         --------
-        >>> analyse([("a", "b", -1), ("b", "a", -1), ("b", "c", 1)]).to_pandas().loc["b"].tolist()
-        ['leader', 1, -1, 1]
+        >>> print(*analyse([("a", "b", -1), ("b", "a", -1), ("b", "c", 1)]).to_pandas().loc["b"])
+        leader 1 -1 1
         """
         pandas, n = import_pandas(), self.graph.n_nodes
         group: list[int | None] = [None] * n
