@@ -19,7 +19,7 @@ The names at the top, by topic:
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``save_figure``,
   ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
-- Reports: ``write_report``, ``explore``
+- Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
 Everything else is in the rooms of the package, which are loaded when they are named: ``ptcc.errors.GraphError``,
@@ -29,10 +29,12 @@ Everything else is in the rooms of the package, which are loaded when they are n
    cooperative-antagonistic networks with disturbances, manuscript; ``ptcc cite`` prints the BibTeX entry.
 """
 
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from types import ModuleType
 from typing import Any
 
 _EXPORTS = {
@@ -89,10 +91,23 @@ _EXPORTS = {
     # Reports
     "write_report": "report.report_file",
     "explore": "report.explorer",
+    "cite": "theorems.table",
     # Errors
     "PTCCError": "errors",
 }
 __all__ = [*_EXPORTS, "__version__"]
+#: What others call a public name.
+_ALSO_CALLED = {"analyze": "analyse", "classify": "analyse", "load_certificate": "read_certificate"}
+
+
+class Room(ModuleType):
+    """A package whose modules are loaded when they are named; called like a function, it names what is meant."""
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        name = self.__name__.rpartition(".")[2]
+        near = [public for public in _EXPORTS if name in public.split("_")]
+        hint = f"; did you mean ptcc_certify.{' or '.join(near)}?" if near else ""
+        raise TypeError(f"{self.__name__} is a package of modules, not a function{hint}")
 
 
 def modules_of(package: str) -> Callable[[str], Any]:
@@ -107,8 +122,15 @@ def modules_of(package: str) -> Callable[[str], Any]:
     def load(name: str) -> Any:
         if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        hint = ""
+        if package == __name__:
+            from ptcc_certify.errors import did_you_mean
 
+            meant = _ALSO_CALLED.get(name)
+            hint = f"; did you mean {meant}?" if meant else did_you_mean(name, _EXPORTS)
+        raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
+
+    sys.modules[package].__class__ = Room
     return load
 
 

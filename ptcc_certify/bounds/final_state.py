@@ -31,7 +31,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
-from ptcc_certify.graphs.tables import series
+from ptcc_certify.graphs.tables import import_pandas, series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -73,7 +73,7 @@ class Enclosure:
     witness: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Influence:
     """Who decides whom: the nonzero rows of ``Q``, in factored form.
 
@@ -177,6 +177,40 @@ class Influence:
         for v, weights in zip(self.structure.followers.tolist(), self.containment_weights, strict=True):
             final[v] = sum((w * c for w, c in zip(weights, values, strict=True) if w), zero)
         return final, values
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the weights, rounded to floats: one row per node, one column per leader that counts.
+
+        A node's final state is the sum of its row times the leaders' initial states.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> influence([("a", "c", 1), ("b", "c", -3)]).to_pandas().loc["c"].to_dict()
+        {'a': 0.25, 'b': -0.75}
+        """
+        pandas, labels = import_pandas(), np.array(self.structure.graph.labels, dtype=object)
+        names = [pandas.Index(part, name=name) for part, name in ((labels, "node"), (labels[self._counted], "leader"))]
+        table = np.zeros((labels.size, len(names[1])))
+        place = {v: k for k, v in enumerate(self._counted)}
+        for node in range(labels.size):
+            for leader, weight in self.row(node).items():
+                table[node, place[leader]] = float(weight)
+        return pandas.DataFrame(table, index=names[0], columns=names[1])
+
+    @property
+    def _counted(self) -> list[int]:
+        """Indices of the leaders in balanced groups."""
+        return sorted(v for component in self.balanced for v in component.nodes)
+
+    def __repr__(self) -> str:
+        kind = "exact" if self.exact else "enclosed" if self.enclosure is not None else "in floats"
+        leaders, groups = len(self._counted), len(self.balanced)
+        return f"Influence({self.structure.graph.n_nodes} nodes, {leaders} leaders, {groups} balanced groups, {kind})"
 
     def _weights_of(self, follower: int) -> Sequence[Number]:
         """Return the weights of one follower, by one solve with the transposed block if they are not stored."""

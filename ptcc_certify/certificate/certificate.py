@@ -133,7 +133,10 @@ class Certificate(Content, Shown):
     @property
     def _file(self) -> Source:
         if self.source is None:
-            raise ParameterError("the certificate was not read from a file; save it, and read_certificate")
+            of = "report, path and sha256 are of a certificate that was read from a file"
+            raise ParameterError(
+                f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
+            )
         return self.source
 
     @cached_property

@@ -37,7 +37,7 @@ class VerifiedObligation(ProofObligation):
     detail: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CheckReport:
     """What came of a check.
 
@@ -76,6 +76,11 @@ class CheckReport:
     arithmetic: str
     sha256: str
     memory: float = 0.0
+
+    def __repr__(self) -> str:
+        if not self.accepted:
+            return f"CheckReport(rejected {self.rejected}: {self.reason})"
+        return f"CheckReport(accepted, {self.verdict}, {len(self.obligations)} obligations verified)"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as JSON-ready data."""

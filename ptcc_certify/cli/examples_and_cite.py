@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ptcc_certify.cli.completion import PAPER, THEOREMS, complete
-from ptcc_certify.errors import ParameterError, did_you_mean
+from ptcc_certify.errors import ParameterError
 
 
 @click.command()
@@ -52,22 +52,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
 @click.argument("theorem", required=False, shell_complete=complete((), THEOREMS))
 def cite(theorem: str | None) -> int:
     """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
-    from ptcc_certify.theorems.table import THEOREMS
+    from ptcc_certify.theorems.table import cite as bibtex
 
-    note = "Manuscript"
-    if theorem is not None:
-        statements = {t.number: t.statement for t in THEOREMS}
-        if theorem not in statements:
-            hint = did_you_mean(theorem, statements)
-            raise ParameterError(f'no theorem "{theorem}"{hint}; one of {", ".join(statements)}')
-        note += f"; Theorem {theorem}: {statements[theorem]}"
-    click.echo(
-        "@unpublished{zhu_prescribed_time_coordination,\n"
-        "  author = {Zhu, Zhen-Hua and Wu, Huaiyu and Guan, Zhi-Hong and Liu, Zhi-Wei and Chen, Yang and "
-        "Zheng, Xiujuan},\n"
-        "  title  = {Robust prescribed-time coordination control of cooperative-antagonistic networks with "
-        "disturbances},\n"
-        f"  note   = {{{note}}}\n"
-        "}"
-    )
+    click.echo(bibtex(theorem))
     return 0

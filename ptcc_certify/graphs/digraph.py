@@ -11,6 +11,7 @@ import json
 import math
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from fractions import Fraction
 from functools import cached_property
@@ -251,9 +252,9 @@ class SignedDigraph(Shown):
         Parameters
         ----------
         matrix : (N, N) array, SciPy sparse matrix or pandas DataFrame
-            Integers are exact, floats are the dyadic numbers they are; the diagonal must be zero. Entries of an
-            object array may be Fractions. A DataFrame has the same labels on rows and columns, in any order; those of
-            the rows become the nodes.
+            Integers are exact, floats are the dyadic numbers they are, texts obey the exact grammar: ``"-0.3"`` is
+            -3/10. Entries may be Fractions; the diagonal must be zero. A DataFrame has the same labels on rows and
+            columns, in any order; those of the rows become the nodes.
         labels : iterable of N labels, optional
             ``1 .. N`` by default; none beside those of a DataFrame.
         orientation : {"information", "listens"} or None
@@ -293,6 +294,8 @@ class SignedDigraph(Shown):
         shape = entries.shape
         if len(shape) != 2:
             raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
+        if dense and entries.dtype.kind in "UO":
+            entries = _without_texts(np.array(matrix, dtype=object))
         if entries.dtype.kind not in "biufO":
             raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
         if shape[0] != shape[1]:
@@ -607,6 +610,15 @@ def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
         raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
     # One type for all columns would round the integers of one beside the floats of another.
     return frame[rows].to_numpy(dtype=object if len(set(frame.dtypes)) > 1 else None)
+
+
+def _without_texts(entries: np.ndarray) -> np.ndarray:
+    """Return entries of a matrix with rationals in the place of texts that are numbers."""
+    for place, entry in np.ndenumerate(entries):
+        if isinstance(entry, str):
+            with suppress(NumberError):
+                entries[place] = as_fraction(entry)
+    return entries
 
 
 def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from ptcc_certify.errors import did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.tables import import_pandas
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STABILITY = "stability"
 BIPARTITE_CONSENSUS = "bipartite consensus"
@@ -243,6 +247,36 @@ class Structure(Shown):
             surplus[int(self.graph.source[edge])] -= weight
         return not any(surplus.values())
 
+    def to_pandas(self) -> pd.DataFrame:
+        """Return one row per node.
+
+        Its ``role`` is leader or follower; ``group`` is the number of a leader's closed component, ``camp`` +1 or -1
+        within it (0 if that is unbalanced), both missing for followers; ``component`` that of the weakly connected one.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> print(*analyse([("a", "b", -1), ("b", "a", -1), ("b", "c", 1)]).to_pandas().loc["b"])
+        leader 1 -1 1
+        """
+        pandas, n = import_pandas(), self.graph.n_nodes
+        group: list[int | None] = [None] * n
+        camp = group.copy()
+        for number, closed in enumerate(self.closed_components, start=1):
+            for node, side in zip(closed.nodes, closed.gauge or (0,) * len(closed.nodes), strict=True):
+                group[node], camp[node] = number, side
+        columns = {
+            "role": ["follower" if number is None else "leader" for number in group],
+            "group": pandas.array(group, dtype="Int64"),
+            "camp": pandas.array(camp, dtype="Int64"),
+            "component": self.weak_component + 1,
+        }
+        return pandas.DataFrame(columns, index=pandas.Index(self.graph.labels, name="node"))
+
     def __eq__(self, other: object) -> bool:
         """Two structures are equal when their graphs are, with their nodes in the same order."""
         same = isinstance(other, Structure) and self.graph.labels == other.graph.labels
@@ -252,13 +286,13 @@ class Structure(Shown):
         return hash(self.graph)
 
     def __repr__(self) -> str:
-        balanced = sum(c.balanced for c in self.closed_components)
+        closed, balanced = len(self.closed_components), sum(c.balanced for c in self.closed_components)
         claim = f"{len(self.components)} components"
         if self.claim:
             claim = f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
         return (
-            f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {len(self.closed_components)} closed "
-            f"component(s), {balanced} balanced, {self.leaders.size} leaders; {claim})"
+            f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {closed} closed "
+            f"component{'s' * (closed > 1)}, {balanced} balanced, {self.leaders.size} leaders; {claim})"
         )
 
 
@@ -284,7 +318,7 @@ def analyse(graph: Any, orientation: str | None = None) -> Structure:
     --------
     >>> g = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])
     >>> analyse(g)
-    Structure(3 nodes, quasi-strong, 1 closed component(s), 1 balanced, 2 leaders; Theorem 2.1: interval bipartite \
+    Structure(3 nodes, quasi-strong, 1 closed component, 1 balanced, 2 leaders; Theorem 2.1: interval bipartite \
 consensus)
     """
     if isinstance(graph, Structure) and orientation is None:

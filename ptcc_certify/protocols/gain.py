@@ -90,6 +90,10 @@ class Gain(Parameters):
 
     # ------------------------------------------------------------------ numbers
 
+    def __call__(self, t: ArrayLike) -> np.ndarray:
+        """Return the gain at ``t``, as :meth:`value` does."""
+        return self.value(t)
+
     def phi(self, t: ArrayLike) -> np.ndarray:
         """Return ``phi(t) = (T/(T - t))^kappa`` on [0, T), 1 from T on; floats of the shape of ``t``."""
         q = self._remaining(t)

@@ -202,29 +202,38 @@ class Trajectory(ByValue, Shown):
         """
         return plot(self, what, **keywords)
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self, what: str = "states") -> pd.DataFrame:
         """Return the states as a DataFrame: one row per instant, indexed by ``t``, one column per agent.
 
         Of S components or initial states the columns are pairs ``(label, 1 .. S)``.
 
+        Parameters
+        ----------
+        what : {"states", "input", "error", "sigma", "disturbance"}
+            The last two under the sliding-mode protocol only.
+
         Raises
         ------
         ParameterError
-            pandas is not installed.
+            The run has nothing that is called so, or pandas is not installed.
 
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([("a", "b", 1)])
-        >>> simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0]).to_pandas().loc[0.0].to_dict()
-        {'a': 1.0, 'b': 0.0}
+        >>> run = simulate(pair, NominalProtocol(1, 1, 1, 1), [1, 0], times=[0])
+        >>> run.to_pandas().loc[0.0].to_dict(), run.to_pandas("input").loc[0.0, "b"]
+        ({'a': 1.0, 'b': 0.0}, np.float64(2.0))
         """
+        there = ["states", "input", "error"] + ["sigma", "disturbance"] * (self.sliding is not None)
+        if what not in there:
+            raise ParameterError(f"what = {shorten(repr(what))} is unknown; one of {', '.join(there)}")
         pandas, columns = import_pandas(), list(self.labels)
         names: Any = pandas.Index(columns, name="node")
         if self.states.ndim == 3:
             numbers = range(1, self.states.shape[1] + 1)
             names = pandas.MultiIndex.from_product([columns, numbers], names=["node", "component"])
         return pandas.DataFrame(
-            self.states.reshape(-1, self.t.size).T, index=pandas.Index(self.t, name="t"), columns=names
+            getattr(self, what).reshape(-1, self.t.size).T + 0.0, index=pandas.Index(self.t, name="t"), columns=names
         )
 
     def to_csv(self) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from copy import copy
 from typing import Any
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import Protocol
@@ -74,3 +74,42 @@ def theorem_for(graph: Any, protocol: str | Protocol = "nominal") -> Theorem:
         raise ParameterError(f"protocol {shorten(repr(kind))} is unknown; one of nominal, sliding-mode")
     rows = _SLIDING if kind == "sliding-mode" else _NOMINAL
     return next(theorem for theorem in rows if theorem.applies(structure))
+
+
+def cite(theorem: str | None = None) -> str:
+    """Return BibTeX of the source.
+
+    Parameters
+    ----------
+    theorem : str, optional
+        Such as ``"2.1"``; its statement stands in the note.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ParameterError
+        No theorem is called so.
+
+    Examples
+    --------
+    >>> print(cite("1.1").splitlines()[-2])
+      note   = {Manuscript; Theorem 1.1: Strongly connected, structurally balanced: bipartite consensus at T.}
+    """
+    note, statements = "Manuscript", {row.number: row.statement for row in THEOREMS}
+    if theorem is not None:
+        if theorem not in statements:
+            hint = did_you_mean(str(theorem), statements)
+            raise ParameterError(f'no theorem "{shorten(str(theorem))}"{hint}; one of {", ".join(statements)}')
+        note += f"; Theorem {theorem}: {statements[theorem]}"
+    return (
+        "@unpublished{zhu_prescribed_time_coordination,\n"
+        "  author = {Zhu, Zhen-Hua and Wu, Huaiyu and Guan, Zhi-Hong and Liu, Zhi-Wei and Chen, Yang and "
+        "Zheng, Xiujuan},\n"
+        "  title  = {Robust prescribed-time coordination control of cooperative-antagonistic networks with "
+        "disturbances},\n"
+        f"  note   = {{{note}}}\n"
+        "}"
+    )

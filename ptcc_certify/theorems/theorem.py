@@ -75,6 +75,9 @@ class Theorem(ABC):
     #: The hypotheses, each with its name.
     conditions: tuple[tuple[str, Callable[[Structure], bool]], ...]
 
+    def __repr__(self) -> str:
+        return f"Theorem({self.number}: {self.statement})"
+
     def hypotheses(self, structure: Structure) -> dict[str, bool]:
         """Return the named hypotheses, each with its truth value."""
         return {name: holds(structure) for name, holds in self.conditions}

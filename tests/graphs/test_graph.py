@@ -378,7 +378,7 @@ NETWORKX = SignedDigraph.from_networkx
         (MATRIX, [[1, 0], [0, 0]], "self-loop at node 1"),
         (MATRIX, [[0, np.nan], [0, 0]], "row 1, column 2 of the matrix is nan; write 0"),
         (MATRIX, [[0, 1j], [0, 0]], "real numbers"),
-        (MATRIX, [["a", "b"], ["c", "d"]], "real numbers"),
+        (MATRIX, [["a", "b"], ["c", "d"]], 'row 1, column 1 of the matrix: "a" is not a number'),
         (MATRIX, np.array([[0, "x"], [0, 0]], dtype=object), "not a number"),
         (MATRIX, sparse.csr_array(np.array([[0, 1j], [0, 0]])), "real numbers"),
         (NETWORKX, nx.Graph([("a", "b")]), "undirected"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import pickle
 import re
 from html.parser import HTMLParser
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import ptcc_certify as ptcc
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design import design
@@ -99,3 +101,16 @@ def test_labels_are_shown_as_they_are(label: str) -> None:
         page = shown(value)
         assert label in page.text
         assert len(page.images) == 1
+
+
+def test_a_notebook_shows_a_figure_or_its_axes_without_pyplot():
+    formatters = pytest.importorskip("IPython.core.formatters")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    before = pyplot.get_fignums()
+    axes = ptcc.plot_graph("fig1a")
+    for drawn in (axes, axes.figure, pickle.loads(pickle.dumps(axes))):  # noqa: S301 - our own
+        shown, how = formatters.DisplayFormatter().format(drawn)
+        assert shown["image/png"].startswith(b"\x89PNG") and how["image/png"]["width"] == 336
+    assert not hasattr(ptcc.plot_graph("fig1a", ax=pyplot.figure().add_subplot()), "_repr_png_")
+    pyplot.close()
+    assert pyplot.get_fignums() == before

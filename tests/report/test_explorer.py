@@ -95,6 +95,18 @@ def test_it_opens_with_a_certified_view(panel: Panel):
     assert set(panel.controls) == {"graph", "protocol", "bounds", "initial state", "T", "rho1", "rho2", "kappa"}
 
 
+def test_it_begins_with_the_defaults_of_the_protocols():
+    assert Settings().protocol() == ptcc.NominalProtocol()
+    assert {name: getattr(SLIDING.protocol(), name) for name in ("rho1", "rho2", "kappa")} == {
+        name: getattr(ptcc.SlidingModeProtocol(), name) for name in ("rho1", "rho2", "kappa")
+    }
+
+
+def test_its_advice_is_for_the_controls(explorer: Explorer):
+    verdict = explorer.view(Settings(rho1=0.2, rho2=0.1, kappa=1)).verdict
+    assert verdict.endswith("would bring the bound to 1 %") and "--" not in verdict
+
+
 def rows(view: View) -> dict[str, str]:
     return view.facts | {"verdict": view.verdict}
 
@@ -108,7 +120,7 @@ def test_a_control_that_is_moved_changes_image_and_text(panel: Panel):
     assert "at T = 0.4 " in panel.line("claim")
 
 
-@pytest.mark.parametrize(("name", "value"), [("T", 0.4), ("rho1", 0.8), ("rho2", 0.9), ("kappa", 2.0)])
+@pytest.mark.parametrize(("name", "value"), [("T", 0.4), ("rho1", 0.8), ("rho2", 0.9), ("kappa", 1.5)])
 def test_gains_move_the_bound_and_leave_the_rate(explorer: Explorer, name: str, value: float):
     """Rates are per unit of the clock and belong to the graph; only the clock depends on the gains."""
     before, after = (rows(explorer.preview(Settings(**more))) for more in ({}, {name: value}))  # type: ignore[arg-type]
@@ -207,9 +219,9 @@ MOVES = (
     ("mu2", 2.0, "sliding"),
     ("mu3", 2.0, "sliding"),
     ("delta", 0.5, "sliding"),
-    ("rho1", 1.0, "at T_r"),
-    ("rho2", 1.0, "at T_r"),
-    ("kappa", 2.0, "at T_r"),
+    ("rho1", 0.5, "at T_r"),
+    ("rho2", 0.5, "at T_r"),
+    ("kappa", 1.0, "at T_r"),
     ("disturbance", "none", "x(T)"),
     ("disturbance", "sin", "x(T)"),
     ("disturbance", "telegraph", "x(T)"),

@@ -390,7 +390,7 @@ def test_the_page_works_by_keyboard_and_every_control_has_a_name(chromium: Any, 
     before = page.shown()
     page.page.focus('[data-of="rho2"]')
     page.page.keyboard.press("ArrowRight")
-    assert page.page.input_value("#rho2") == "0.55"
+    assert page.page.input_value("#rho2") == "1.05"
     page.page.wait_for_timeout(50)
     page.settle()
     assert page.shown() != before

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.checker.input_formulas import InitialSet, Limits, Rows
 from ptcc_certify.theorems.theorem import Obligation
 
@@ -32,7 +33,7 @@ class EnergyIntegral:
     least: tuple[Fraction, Fraction]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Peak:
     """``sup |u_k|`` of every agent, and of the norm ``||u||_2``."""
 
@@ -45,6 +46,9 @@ class Peak:
     def largest(self) -> Fraction:
         """``sup max_k |u_k|``."""
         return max(self.agents)
+
+    def __repr__(self) -> str:
+        return f"Peak(|u_k| <= {up(self.largest)}, ||u|| <= {up(self.norm)}, {len(self.agents)} agents)"
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ class Disturbed:
     drift: tuple[Fraction, ...] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Effort:
     """What is proved about the input.
 
@@ -153,6 +157,13 @@ class Effort:
     longest_period: Fraction | None = None
     disturbed: Disturbed | None = None
     first: Fraction | None = None
+
+    def __repr__(self) -> str:
+        word = {True: "bounded", False: "not bounded", None: "undecided"}[self.bounded]
+        peak = "" if self.peak is None else f", |u_k| <= {up(self.peak.largest)}"
+        energy = "" if self.energy is None else f", energy <= {up(self.energy.value)}"
+        length = "" if self.path_length is None else f", path length <= {up(self.path_length.value)}"
+        return f"Effort({word}{peak}{energy}{length})"
 
     @property
     def obligations(self) -> list[Obligation]:

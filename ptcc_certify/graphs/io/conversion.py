@@ -35,7 +35,7 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
           where no such file exists;
         - a ``networkx.DiGraph`` with the edge attribute ``weight``;
         - an adjacency matrix, whose orientation must be said: a NumPy array, a SciPy sparse matrix or array, a list of
-          rows, or a DataFrame with the same labels on rows and columns;
+          rows, or a DataFrame with the same labels on rows and columns; ``"-0.3"`` is exact, ``-0.3`` a nearby float;
         - a DataFrame of edges with columns ``source``, ``target``, ``weight`` in any order (or the other names of
           :func:`~ptcc_certify.graphs.io.read_graph`); more columns are ignored, which ``read["notes"]`` says;
         - a list of ``(source, target, weight)``.
@@ -124,11 +124,11 @@ def _rows_of_matrix(rows: list[Any]) -> bool:
     """Tell a list of rows of a matrix from a list of edges: edges are tuples, or hold texts, or are not square."""
     if not rows or not all(isinstance(row, list | np.ndarray) and len(row) == len(rows) for row in rows):
         return False
-    if len(rows) == 3 and any(isinstance(entry, str) for row in rows for entry in row[:2]):
+    if len(rows) != 3 or all(row[k] in (0, "0") for k, row in enumerate(rows)):  # 0 is no weight of an edge
+        return True
+    if any(isinstance(entry, str) for row in rows for entry in row[:2]):
         return False
-    if len(rows) == 3 and not all(row[k] == 0 for k, row in enumerate(rows)):
-        raise GraphError(
-            "three lists of three numbers may be edges or a matrix; write edges as tuples (source, target, weight), "
-            "and a matrix with zeros on its diagonal"
-        )
-    return True
+    raise GraphError(
+        "three lists of three numbers may be edges or a matrix; write edges as tuples (source, target, weight), "
+        "and a matrix with zeros on its diagonal"
+    )

@@ -18,8 +18,8 @@ from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
-_SOURCE = ("source", "from", "fromnodeid", "src")
-_TARGET = ("target", "to", "tonodeid", "dst")
+_SOURCE = ("source", "from", "fromnodeid", "src", "rater")
+_TARGET = ("target", "to", "tonodeid", "dst", "rated")
 _WEIGHT = ("weight", "sign", "rating", "value", "w")
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
@@ -44,6 +46,18 @@ def run_of(certificate: Certificate) -> str:
     if not comparison.judged:
         return "bound not tested, all is below the integrator's floor"
     return f"bound {'VIOLATED' if comparison.violated else 'kept'}, worst ratio {comparison.worst_ratio:.4g}"
+
+
+def without_flags(verdict: str) -> str:
+    """Return a verdict whose advice is for the controls, not for the command line.
+
+    Examples
+    --------
+    >>> without_flags("it says little by T; --rho2 1.38 (rho2 kappa 2.76) leaves 1 %")
+    'it says little by T; rho2 = 1.38 would bring the bound to 1 %'
+    """
+    verdict = re.sub(r"--rho2 (\S+) \([^)]*\) leaves 1 %", r"rho2 = \1 would bring the bound to 1 %", verdict)
+    return verdict.replace("--method ", "bounds = ")
 
 
 def _claim(certificate: Certificate) -> str:

@@ -28,7 +28,7 @@ from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of
+from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of, without_flags
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png
 from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
@@ -73,7 +73,7 @@ class View:
         """The verdict line of ``certify``; before the check it says so."""
         if self.certificate is None:
             return self.refusal
-        return self.certificate.assessment.text if self.checked else UNCHECKED
+        return without_flags(self.certificate.assessment.text) if self.checked else UNCHECKED
 
     @property
     def grade(self) -> str:

@@ -23,12 +23,13 @@ PANELS = {
     "input": "Size of the input over time",
     "sliding": "Sliding variables over time",
 }
-#: Share of the initial error down to which the decay is drawn: below it the integrator resolves little.
-_LEAST = 1e-8
+#: Share of the initial error down to which the decay is drawn, below which the integrator resolves little; and of time.
+_LEAST, _LAST = 1e-8, 1e-4
 #: Decades that are named on the axes of the decay.
 _TICKS = {4: "10⁴", 2: "100", 0: "1", -2: "0.01", -4: "10⁻⁴", -6: "10⁻⁶", -8: "10⁻⁸"}
-#: A panel in inches, and its margins: left, bottom, right; that at the top has room for each row of a legend.
-_SIZE, _MARGINS, _GRAPH_MARGINS, _ROW = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56), (0.1, 0.1, 0.1), 0.17
+#: A panel in inches, and its margins: left, bottom, right, and top with room for the longest legend, of 1 to 4 lines.
+_SIZE, _MARGINS = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56)
+_TOP = {"decay": 0.26, "states": 0.58, "input": 0.58, "graph": 0.74, "sliding": 0.74}
 
 
 def panel_svg(certificate: Certificate, name: str) -> str:
@@ -47,13 +48,11 @@ def draw_panels(certificate: Certificate, names: tuple[str, ...]) -> Figure:
         for place, name in enumerate(names, start=1):
             ax = new_axes(figure, (rows, columns, place))
             row, column = divmod(place - 1, columns)
-            left, bottom, right = _GRAPH_MARGINS if name == "graph" else _MARGINS
+            left, bottom, right = (0.1, 0.1, 0.1) if name == "graph" else _MARGINS
             corner = (column * _SIZE[0] + left, (rows - 1 - row) * _SIZE[1] + bottom) / size
-            extent = np.array([_SIZE[0] - left - right, _SIZE[1] - bottom])
-            ax.set_position((*corner, *(extent - [0, 3 * _ROW]) / size))
+            extent = (_SIZE[0] - left - right, _SIZE[1] - bottom - _TOP[name]) / size
+            ax.set_position((*corner, *extent))
             _draw(certificate, name, ax)
-            entries = len(ax.get_legend_handles_labels()[0])  # in two columns
-            ax.set_position((*corner, *(extent - [0, (0.5 + math.ceil(entries / 2)) * _ROW]) / size))
     return figure
 
 
@@ -100,7 +99,7 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
     ax.minorticks_off()
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_ticks([10.0**k for k in _TICKS], list(_TICKS.values()))
-    ax.set_xlim(1, _LEAST)
+    ax.set_xlim(1, _LAST)
     ax.set_ylim(_LEAST, 1e4)
     name = "E" if envelope.coordinates == "E" else r"\varepsilon"
     finished(ax, "remaining time, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")

@@ -43,9 +43,9 @@ SLIDERS = {
     "T": Slider(1, "deadline", "nominal"),
     "T_r": Slider(0.5, "time to reach the manifold", "sliding-mode"),
     "T_s": Slider(0.5, "time on the manifold", "sliding-mode"),
-    "rho1": Slider(0.2, "constant part of the gain"),
-    "rho2": Slider(0.5, "growing part of the gain"),
-    "kappa": Slider(1, "exponent of the time scaling", largest=5.0),
+    "rho1": Slider(1, "constant part of the gain"),
+    "rho2": Slider(1, "growing part of the gain"),
+    "kappa": Slider(2, "exponent of the time scaling", largest=5.0),
     "mu1": Slider(2, "switching gain, above delta", "sliding-mode", largest=5.0),
     "mu2": Slider(1, "constant part of the reaching gain", "sliding-mode"),
     "mu3": Slider(1, "growing part of the reaching gain", "sliding-mode"),
@@ -83,7 +83,7 @@ class Settings:
     Examples
     --------
     >>> Settings(T=0.6, rho2=0.3).protocol()
-    NominalProtocol(T=3/5, rho1=1/5, rho2=3/10, kappa=1)
+    NominalProtocol(T=3/5, rho1=1, rho2=3/10, kappa=2)
     """
 
     def __init__(

@@ -8,7 +8,8 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.rationals import as_fraction
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.report.explorer.model import Explorer, View
@@ -33,7 +34,7 @@ _WITHOUT_WIDGETS = (
 _REST = 0.3
 
 
-def explore(graph: SignedDigraph | None = None, settings: Settings | None = None) -> VBox | View:
+def explore(graph: Any = None, settings: Settings | None = None, *, orientation: str | None = None) -> VBox | View:
     """Show controls for graph, protocol, disturbance, initial state and class of bounds; bound and run follow them.
 
     While a control is moved the bound is that of Lyapunov functions found before, and nothing is called certified; at
@@ -42,10 +43,12 @@ def explore(graph: SignedDigraph | None = None, settings: Settings | None = None
 
     Parameters
     ----------
-    graph : SignedDigraph, optional
-        A graph of up to 120 nodes besides the packaged ones.
+    graph : graph-like, optional
+        A graph of up to 120 nodes besides the packaged ones: whatever :func:`ptcc_certify.as_graph` takes.
     settings : Settings, optional
         What the controls begin with.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
 
     Returns
     -------
@@ -63,9 +66,10 @@ def explore(graph: SignedDigraph | None = None, settings: Settings | None = None
     >>> print(view.text.splitlines()[-1])
     verdict    certified; ||E|| <= 2.1e-07 ||E(0)|| at 0.99 T
     """
-    explorer = Explorer(graph)
+    packaged = isinstance(graph, str) and graph in GRAPHS
+    explorer = Explorer(None if graph is None or packaged else as_graph(graph, orientation))
     if settings is None:
-        settings = Settings() if graph is None else Settings(graph=GIVEN)
+        settings = Settings() if graph is None else Settings(graph=graph if packaged else GIVEN)
     if _in_notebook():
         try:
             return controls(explorer, settings)

@@ -34,16 +34,37 @@ STEPS = [1, 2, 2.5, 5, 10]
 
 
 def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
-    """Draw in the style of :data:`STYLE`, unless ``ax`` is given: axes have a style of their own."""
+    """Draw in the style of :data:`STYLE` what notebooks show; if ``ax`` is given, they have a style of their own."""
 
     @functools.wraps(plot)
     def drawn(subject: Any, *, ax: Axes | None = None, **keywords: Any) -> Any:
         if ax is not None:
             return plot(subject, ax=ax, **keywords)
         with style.context(STYLE):
-            return plot(subject, **keywords)
+            return shown(plot(subject, **keywords))
 
     return drawn
+
+
+def shown(drawn: Any) -> Any:
+    """Let notebooks show a figure, or axes, which is the last line of a cell or given to ``display``.
+
+    No backend is asked and pyplot, which would keep every figure, does not know of it.
+
+    Examples
+    --------
+    >>> data, size = plot_graph("fig1a")._repr_png_()
+    >>> data[1:4], size["width"]
+    (b'PNG', 336)
+    """
+    for one in (drawn, drawn.figure):
+        one._repr_png_ = functools.partial(_notebook_png, drawn.figure)
+    return drawn
+
+
+def _notebook_png(figure: Figure) -> tuple[bytes, dict[str, int]]:
+    """Return a figure and how wide it is shown, in pixels of 1/96 inch."""
+    return figure_bytes(figure, ".png"), {"width": round(96 * float(figure.get_figwidth()))}
 
 
 def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
