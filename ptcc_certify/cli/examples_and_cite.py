@@ -59,7 +59,7 @@ def cite(theorem: str | None) -> int:
         statements = {t.number: t.statement for t in THEOREMS}
         if theorem not in statements:
             hint = did_you_mean(theorem, statements)
-            raise ParameterError(f'no theorem "{theorem}"{hint}; one of {", ".join(statements)}')
+            raise ParameterError(f'no theorem "{theorem}"; one of {", ".join(statements)}{hint}')
         note += f"; Theorem {theorem}: {statements[theorem]}"
     click.echo(
         "@unpublished{zhu_prescribed_time_coordination,\n"
