@@ -43,6 +43,7 @@ from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_s
 from ptcc_certify.checker.theorem_function import check_paper
 
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
+GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use ptcc check CERTIFICATE GRAPH"
 
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
@@ -182,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         del words[place : place + 2]
     paths = [word for word in words if word != "--stdlib"]
     if paths in (["-h"], ["--help"]):
-        print(USAGE)
+        print(USAGE, GRAPH, sep="\n")
         return 0
     if len(paths) != 1 or (paths[0].startswith("-") and paths[0] != "-") or not paths[0] or not 0 < memory < math.inf:
         print(USAGE, file=sys.stderr)
@@ -192,5 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UnreadableError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2
+    if report.sha256:
+        print(f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean")
     print("\n".join(report.lines()))
     return 1 if not report.accepted else 0 if report.verdict == "certified" else 4

@@ -98,7 +98,7 @@ def behaviour_name(text: str) -> str:
         if text.replace("-", " ") == name.replace("-", " "):
             return name
     names = [name.replace(" ", "-") for name in BEHAVIOURS]
-    raise ValueError(f'unknown behaviour "{text}"{did_you_mean(text, names)}; one of {", ".join(names)}')
+    raise ValueError(f'unknown behaviour "{text}"; one of {", ".join(names)}{did_you_mean(text, names)}')
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from itertools import groupby, islice
 from typing import Any
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
@@ -142,7 +142,9 @@ def _view(saved: Certificate) -> dict[str, Any]:
     sizes = Counter(part.partition(", ")[2] for part in agent_parts(saved))
     named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "unbalanced": "unbalanced"}
     peaks = effort.peak.agents if effort and effort.peak else ()
+    verdict_text, larger_rho2 = _in_words(saved)
     return texts.facts(saved) | {
+        **{"verdict_text": verdict_text, "larger_rho2": larger_rho2},
         **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
         "remarks": remarks_on(saved.structure),
@@ -163,6 +165,14 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "commands": commands,
         "notes": [note for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else [],
     }
+
+
+def _in_words(saved: Certificate) -> tuple[Markup, str]:
+    """Return the verdict without options of the command line, and the ``rho2`` that it advises, empty if none."""
+    text, advice = Markup(escape(saved.assessment.text)), saved.assessment.advice
+    rho2 = advice.split()[1] if advice else ""
+    plain = Markup("\u03c1<sub>2</sub> = {} would leave 1 %").format(rho2)
+    return text.replace(escape(advice), plain) if advice else text, rho2
 
 
 def _title(saved: Certificate, invariant: str) -> Markup:

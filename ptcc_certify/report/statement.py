@@ -14,12 +14,41 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
 
+#: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
+_MATRIX, _EDGES = 10, 60
 _CAPTIONS = {
     "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",
-    "decay": "Proved bounds over a simulated run (numerical), against the time left.",
+    "decay": (
+        "What is left of the error against the time left, both logarithmic. Thick line: the proved bound, the least of"
+        " those of the Lyapunov functions, which are the thin lines; dashed: that of the theorem's own. With circles: a"
+        " simulated run (numerical), down to the dotted line, below which the integrator resolves nothing."
+    ),
+}
+#: What a behaviour is, in symbols.
+_MEANINGS = {
+    "stability": r"$x_{k}(t) \to 0$ for every $k$",
+    "consensus": r"all $x_{k}(t)$ have the same limit",
+    "signed-average consensus": (
+        r"$x_{k}(t) \to a$ in one camp and $x_{k}(t) \to -a$ in the other, $a$ being the mean of the initial states,"
+        " those of the other camp taken with the opposite sign"
+    ),
+    "bipartite consensus": r"for some $a$, $x_{k}(t) \to a$ in one camp and $x_{k}(t) \to -a$ in the other",
+    "interval bipartite consensus": (
+        r"for some $a$, the leaders tend to $a$ in one camp and to $-a$ in the other, and each follower to a limit in"
+        " $[-|a|, |a|]$"
+    ),
+    "containment": (
+        "each closed component tends to a value of its own, and each follower to a limit between the lowest and the"
+        " highest of these"
+    ),
+    "bipartite containment": (
+        "for some $a_{j}$, the agents of closed component $j$ tend to $a_{j}$ in one camp and to $-a_{j}$ in the other"
+        r" ($a_{j} = 0$ if it is not balanced), and each follower to a limit in $[-\max_{j} |a_{j}|, \max_{j} |a_{j}|]$"
+    ),
 }
 
 
@@ -52,6 +81,9 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         # nothing but ASCII is safe in a comment
         "comment": Markup("".join(c if " " <= c <= "~" else "?" for c in saved.path.name)),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
+        **{"structure": saved.structure, "named": _named(saved.graph)},
+        **{"matrix": _matrix(saved.graph), "edges": _edges(saved.graph)},
+        **{"connectivity": texts.structure_text(saved.structure).partition(";")[0], "bounds": _bounds(saved)},
         "shares": _shares(saved),
         "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
@@ -59,6 +91,41 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         "sha256": Markup(r"\allowbreak{}".join(saved.sha256[i : i + 8] for i in range(0, 64, 8))),
     }
     return _environment().get_template("statement.tex").render(view)
+
+
+def _named(graph: SignedDigraph) -> list[str]:
+    """Return the labels in the order of the agents' numbers, unless they are these numbers or too many."""
+    numbers = [str(k) for k in range(1, graph.n_nodes + 1)]
+    cut = [texts.printable(label, texts.CHARACTERS // 2) for label in graph.labels[: texts.LISTED]]
+    return cut if graph.n_nodes <= texts.LISTED and cut != numbers else []
+
+
+def _matrix(graph: SignedDigraph) -> list[list[Fraction]]:
+    """Return ``W`` of a small graph."""
+    weights = {(t, s): w for s, t, w in graph.edges} if graph.n_nodes <= _MATRIX else {}
+    return (
+        [[weights.get((target, source), Fraction(0)) for source in graph.labels] for target in graph.labels]
+        if weights
+        else []
+    )
+
+
+def _edges(graph: SignedDigraph) -> list[tuple[int, int, Fraction]]:
+    """Return listener, source and weight of the edges of a graph that has few, agents counted from 1."""
+    number = {label: k for k, label in enumerate(graph.labels, start=1)}
+    return [(number[t], number[s], w) for s, t, w in graph.edges] if graph.n_edges <= _EDGES else []
+
+
+def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
+    """Return overshoot constant and rate of the functions whose least bound holds; none that another one beats."""
+    own = [m for m in saved.envelope.functions if m.coordinates == saved.envelope.coordinates]
+    bounds: list[tuple[Fraction, Fraction]] = []
+    for c, rate in sorted((m.overshoot, m.proved_rate) for m in own):
+        if bounds and bounds[-1][0] == c:
+            bounds.pop()  # its rate is smaller, or the same
+        if not bounds or rate > bounds[-1][1]:
+            bounds.append((c, rate))
+    return bounds
 
 
 def _shares(saved: Certificate) -> list[tuple[float, float]]:
@@ -98,7 +165,7 @@ def _environment() -> jinja2.Environment:
         "below": lambda x, digits: _number(texts.below(x, digits)),
         "equals": lambda x: ("= " + _rational(x)).replace(r"= \approx", r"\approx"),
     }
-    environment.globals["captions"] = _CAPTIONS
+    environment.globals |= {"captions": _CAPTIONS, "meanings": _MEANINGS}
     return environment
 
 
@@ -140,7 +207,13 @@ def _rational(x: Fraction) -> Markup:
 
 def _number(text: str) -> Markup:
     """Turn a number as the page shows it into LaTeX."""
-    signs = {"\N{MINUS SIGN}": "-", "\N{ALMOST EQUAL TO}": r"\approx", "\u00d7": r"\cdot", "\u00b1": r"\pm"}
+    signs = {
+        "\N{MINUS SIGN}": "-",
+        "\N{ALMOST EQUAL TO}": r"\approx",
+        "\u00d7": r"\cdot",
+        "\u00b1": r"\pm",
+        "\u00a0": " ",
+    }
     for sign, latex in (signs | {"<sup>": "^{", "</sup>": "}"}).items():
         text = str(text).replace(sign, latex)
     return Markup(text)

@@ -376,7 +376,7 @@ def test_an_undecided_certificate_is_not_called_certified(tmp_path: Path):
     assert "not certified: Interval bipartite consensus" in page.text
     assert "".join(data for tag, data in page.pieces if tag == "h1").startswith("Undecided: ")
     text = report_latex(read_certificate(tmp_path / "c.json"))
-    assert "Proposition" not in text and "certificate undecided" in text and "occurs at" not in text
+    assert "[certified]" not in text and "[verified; the certificate is undecided]" in text and "occurs at" not in text
 
 
 def test_without_a_proved_rate_little_is_said(tmp_path: Path):
@@ -557,18 +557,52 @@ def test_the_file_does_not_say_who_checked_it(tmp_path: Path):
     assert page.text.count("Everything is proved") == 1 and "as the file says" in page.text
 
 
+def shares_of(text: str) -> dict[float, float]:
+    """Return the instants, as fractions of the deadline, and the shares of the error that a statement gives."""
+    line = next(line for line in text.splitlines() if "the following share is left" in line)
+    pairs = re.findall(r"\$([0-9.]+)(?: \\cdot 10\^\{(-?\d+)\})?\$ at \$t = ([0-9.]+)", line)
+    return {float(f): float(share) * 10 ** int(power or 0) for share, power, f in pairs}
+
+
 def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     made = example("limits")
     made.save(tmp_path / "c.json")
     text = report_latex(read_certificate(tmp_path / "c.json"), {"graph": "g.pdf", "decay": "d.pdf"})
-    assert "Proposition (certified)" in text and "Interval bipartite consensus occurs at $T$, by Theorem~2.1" in text
+    assert r"[certified]\label{prop:c}" in text and r"at $T$, by Theorem~2.1: as $t \to T$, for some $a$" in text
     assert NOMINAL.latex() in text and made.graph.sha256 in text and "$\\kappa = 1$" in text
-    found = re.search(r"\\le ([0-9.]+)\\, \\mathrm\{e\}\^\{-([0-9.]+)\\, s\(t\)\}", text)
-    assert found is not None and made.rate is not None and made.overshoot is not None
-    assert Fraction(found[1]) >= made.overshoot and Fraction(found[2]) <= made.rate
-    assert r"\includegraphics[width=0.75\linewidth]{g.pdf}" in text and "{d.pdf}" in text
+    rows = [re.search(rf"^{name}_{{i}} & ([^\\]*)", text, re.M) for name in "cr"]
+    constants, rates = ([Fraction(x) for x in row[1].split(" & ")] for row in rows if row is not None)
+    own = {(m.overshoot, m.proved_rate) for m in made.envelope.functions if m.coordinates == made.envelope.coordinates}
+    assert all(any(c >= x and r <= y for x, y in own) for c, r in zip(constants, rates, strict=True))
+    shares = shares_of(text)
+    assert len(shares) == 3
+    for instant, share in shares.items():  # what the statement says follows from its own inequality
+        s = float(made.envelope.gain.clock_at_remaining(1 - instant))
+        least = min(math.sqrt(c) * math.exp(-r * s / 2) for c, r in zip(constants, rates, strict=True))
+        assert least * 0.999 <= share <= least * 1.12
+    assert r"\includegraphics[width=\linewidth]{g.pdf}" in text and "{d.pdf}" in text
     assert text.count("\\begin{") == text.count("\\end{")
     assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text
+
+
+def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+    certify(graph, protocol, [1, 2, 3], delta=1, simulation=False).save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    text, page = report_latex(saved), sound(report_html(saved)).text
+    assert "0 & -1 & 0 \\\\\n2 & 0 & 0 \\\\\n0 & 1 & 0\n\\end{bmatrix}" in text and "(labelled ann, bob, eve)" in text
+    assert "All this is without disturbances." in text and r"u_{k} + d_{k}" in text
+    assert "without disturbances" in page and "All of this is for agents without disturbances" in page
+
+
+def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
+    graph = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
+    protocol = NominalProtocol(T="1/5", rho1="1/10", rho2="1/10", kappa=1)
+    certify(graph, protocol, simulation=False).save(tmp_path / "c.json")
+    page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
+    assert "Why that says little" in page and "in place of 0.1, at most 1 % would be left then" in page
+    assert "--rho2" not in page
 
 
 def test_long_tables_are_cut(tmp_path: Path):

@@ -27,7 +27,7 @@ def graph_path(name: str) -> Path:
     'fig1a.csv'
     """
     if name not in GRAPHS:
-        raise ParameterError(f'no packaged graph "{name}"{did_you_mean(name, GRAPHS)}; there are {", ".join(GRAPHS)}')
+        raise ParameterError(f'no packaged graph "{name}"; there are {", ".join(GRAPHS)}{did_you_mean(name, GRAPHS)}')
     return Path(str(resources.files("ptcc_certify") / "examples" / f"{name}.csv"))
 
 
