@@ -64,7 +64,9 @@ def disturbed_lines(certificate: Certificate) -> Lines:
     effort = certificate.effort
     if effort is not None and (d := effort.disturbed) is not None:
         held = any(entry.sample_period is not None for entry in certificate.limits)
-        text = f"|d_k| <= {near(d.delta)} adds at most {up(max(d.inputs), 4)} to |u_k|" + ", without the hold" * held
+        text = (
+            f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|" + ", without the hold" * held
+        )
         if d.drift is not None and not certificate.limits:
             most = max(d.drift)
             text += f" and moves x_k(T) by at most {up(most, 4)}" if most else " and moves no x_k(T)"

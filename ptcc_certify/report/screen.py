@@ -98,7 +98,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     """
     claims = _component_claims(certificate)
     drawn = _is_set_asked(certificate, origins)
-    for room, bounds in ((SHORT, _bounds), (SHORT, _short_bounds), (LONGEST, _bounds), (LONGEST, _short_bounds)):
+    for room, bounds in ((SHORT, _bounds), (SHORT, _short_bounds), (LONGEST, _short_bounds)):
         entries = [
             *graph_entries(certificate.structure, name),
             ("protocol", _protocol_text(certificate, origins)),
@@ -197,7 +197,7 @@ def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
 def _component_claims(certificate: Certificate) -> list[str]:
     """Tell what is claimed, of each of the largest components if there are several."""
     p = certificate.protocol
-    whatever = "" if p.reaching is None else f", any |d_k| <= {near(p.reaching.delta)}"
+    whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     return _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
 
 
@@ -223,7 +223,8 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    kind = f"({_accuracy(result, ', rounded')}{'; degenerate x(0)' * bool(result.degenerate)})"
+    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
+    kind = f"({_accuracy(result, ', rounded')}{degenerate}{limits})"
     if len(result.states) > 1 and len(set(result.states)) == 1:
         yield "x(T)", f"every agent at {short_number(result.states[0])} {kind}"
         return
@@ -267,7 +268,7 @@ def _error_texts(certificate: Certificate) -> tuple[str, str]:
     """
     if certificate.effort is not None and certificate.effort.residual:
         entry, *others = certificate.effort.residual
-        noise = "" if entry.noise is None else f", |n_k| <= {near(entry.noise)}"
+        noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
         norm = f"{limits_text(entry)}{noise}: at T ||E|| <= {up(entry.noisy_norm or entry.norm, 2)}"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
         return norm, agents + f"; ... {len(others) + 1} limits in all" * bool(others)
@@ -284,7 +285,7 @@ def _error_texts(certificate: Certificate) -> tuple[str, str]:
     agents = ""
     if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
         agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
-    return f"at {when}: {norm}", agents
+    return f"at {when}{', numerical' * (not certificate.direct)}: {norm}", agents
 
 
 def _instant(certificate: Certificate) -> tuple[float, str]:
@@ -305,6 +306,8 @@ def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
     else:
         states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "bounded or not is undecided"}
         text, size = states[effort.bounded], ""
+        if effort.bounded and effort.peak is None and effort.sliding is not None and not effort.sliding.bounded:
+            text = "the nominal part is bounded, of the sliding part nothing is proved"
         if effort.bounded is False and certificate.rate is not None:
             text += f"; rho2 kappa >= {up(2 / certificate.rate, 4)} bounds it"
         if effort.peak is not None:
@@ -392,11 +395,8 @@ def _leader_lines(structure: Structure, most: int, width: int = 40) -> Lines:
     many = len(closed) > most
     if many:
         single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
-        size = counted(len(numbered[0][1].nodes), "member")
-        yield (
-            "leaders",
-            f"{len(closed):,} groups, {balanced:,} balanced; {single:,} of one member, the largest of {size}",
-        )
+        size = len(numbered[0][1].nodes)
+        yield "leaders", f"{len(closed):,} groups, {balanced:,} balanced; {single:,} of one node, largest {size:,}"
     for number, component in sorted(numbered):
         if not many or len(component.nodes) > 1:
             text = _leaders_text(component, labels, width)

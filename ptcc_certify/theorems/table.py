@@ -102,7 +102,7 @@ def cite(theorem: str | None = None) -> str:
     if theorem is not None:
         if theorem not in statements:
             hint = did_you_mean(str(theorem), statements)
-            raise ParameterError(f'no theorem "{shorten(str(theorem))}"{hint}; one of {", ".join(statements)}')
+            raise ParameterError(f'no theorem "{shorten(str(theorem))}"; one of {", ".join(statements)}{hint}')
         note += f"; Theorem {theorem}: {statements[theorem]}"
     return (
         "@unpublished{zhu_prescribed_time_coordination,\n"
