@@ -120,3 +120,19 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
         begin("one step")
         threading.Event().wait(0.05)
     assert capsys.readouterr().err == ""
+
+
+def test_check_tells_deadline_bounds_and_input_as_certify_does():
+    ptcc("certify", "fig1a", *FAST, "-o", "c.json", "-q")
+    told, checked = ptcc("certify", "fig1a", *FAST).out.splitlines(), ptcc("check", "c.json").out.splitlines()
+    assert checked[1:-1] == told[3:-1] and checked[0].startswith("protocol ") and checked[-1].startswith("accepted ")
+    assert [line.split()[0] for line in ptcc("check", "c.json", "--stdlib").out.splitlines()] == ["claim", "accepted"]
+
+
+def test_gains_whose_proof_is_the_certificate_alone_are_printed(monkeypatch):
+    from ptcc_certify.gain_design import Design
+
+    monkeypatch.setattr(Design, "certify_options", None)
+    out = ptcc(*DESIGN, "--deadline", "2", "--residual", "0.01").out
+    assert "gains      T=2, rho1=" in out and "(deviation" in out
+    assert "deadline   every one from 1.265" in out and "\nnote       add -o design.json to keep the proof" in out
