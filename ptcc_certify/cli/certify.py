@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
 
-    Prints at most 8 lines, 12 of a disconnected graph; -v tells rates, the Lyapunov functions searched and used, proof
-    obligations and the simulated run. Exit code 0: certified, and everything asked holds.
+    Prints 8 lines, 10 or so where the answers take more; -v tells rates, the Lyapunov functions searched and used,
+    proof obligations and the simulated run. Exit code 0: certified, and everything asked holds.
     """
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run

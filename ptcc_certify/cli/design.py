@@ -83,7 +83,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
             screen.note("\n".join([f"to prove it again{again}:", *wrap_command(command)]))
         elif answer.protocol is not None:
             where = f"the proof is in {output}" if output else "add -o design.json to keep the proof"
-            screen.note(f"note       {where}; certify alone proves less of these gains")
+            screen.note(f"note       {where}; certify alone proves less")
     return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 

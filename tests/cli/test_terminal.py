@@ -154,3 +154,19 @@ def test_a_closed_stream_is_no_defect(monkeypatch: pytest.MonkeyPatch, stream: s
     assert terminal.Screen().show(lambda: ["a line"], list) is None
     with terminal.progress(["a step"]) as begin:
         begin("a step")
+
+
+def test_check_tells_deadline_bounds_and_input_as_certify_does():
+    ptcc("certify", "fig1a", *FAST, "-o", "c.json", "-q")
+    told, checked = ptcc("certify", "fig1a", *FAST).out.splitlines(), ptcc("check", "c.json").out.splitlines()
+    assert checked[1:-1] == told[3:-1] and checked[0].startswith("protocol ") and checked[-1].startswith("accepted ")
+    assert [line.split()[0] for line in ptcc("check", "c.json", "--stdlib").out.splitlines()] == ["claim", "accepted"]
+
+
+def test_gains_whose_proof_is_the_certificate_alone_are_printed(monkeypatch):
+    from ptcc_certify.gain_design import Design
+
+    monkeypatch.setattr(Design, "certify_options", None)
+    out = ptcc(*DESIGN, "--deadline", "2", "--residual", "0.01").out
+    assert "gains      T=2, rho1=" in out and "(deviation" in out
+    assert "deadline   every one from 1.265" in out and "\nnote       add -o design.json to keep the proof" in out

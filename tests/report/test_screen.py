@@ -113,6 +113,59 @@ def test_without_particulars_there_is_one_line_for_each_thing():
     assert [line.split()[0] for line in assert_screen(ptcc.certify(PAIR, NOMINAL))] == [h for h in HEADS if h != "x(T)"]
 
 
+def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
+    for limits in ([], [GainLimits(gain_cap=30)]):
+        lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, delta=1, limits=limits))
+        (line,) = [line for line in lines if line.startswith("disturbed  |d_k| <= 1 adds at most ")]
+        assert ("x_k(T)" in line) == (not limits), "where they move the agents is proved without limits alone"
+        assert lines[-1].startswith("verdict    certified without disturbances")
+
+
+def test_noise_that_is_left_open_has_its_reason():
+    sampled = [GainLimits(gain_cap=30, sample_period="0.001")]
+    for limits, why in (([], "--gain-cap or --stop-before"), (sampled, "ask for each alone")):
+        certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, noise="0.01", limits=limits)
+        text = " ".join(line.strip() for line in assert_screen(certificate))
+        assert f"{why}); the rest is certified" in text
+
+
+def test_a_drawn_state_is_not_told_where_a_set_is_asked_about():
+    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, initial_set=1)
+    assert any(line.startswith("x(T)") for line in assert_screen(certificate))
+    for show in (summary_lines, certificate_lines):
+        text = "\n".join(show(certificate, "g", {"x(0)": "random, seed 0"}))
+        assert "x(T)" not in text and "every agent" not in text and "all |x_k(0)| <= 1" in text
+
+
+def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends():
+    def line(x0: list[Any], graph: SignedDigraph = PAIR) -> str:
+        lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, simulation=False, method="paper"))
+        return " ".join(lines).partition("x(T)")[2].partition("error")[0]
+
+    assert "a=1/6, b=-1/6 (exact)" in line(["1/3", 0])
+    assert "a=0.11728, b=-0.11728 (exact, rounded)" in line(["0.234567", "0.0"])
+    labels = [f"n{k}" for k in range(40)]
+    loose = SignedDigraph.from_edges([("n0", "n1", 1)], labels)
+    assert "least n0=0, largest n39=39," in line([*range(40)], loose).replace("every agent", "")
+
+
+def test_of_many_groups_of_leaders_the_large_ones_are_told():
+    edges = [(f"s{k}", "hub", 1) for k in range(9)] + [("a", "b", -1), ("b", "a", -1), ("a", "hub", 1)]
+    lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
+    assert "leaders    10 groups, 10 balanced; 9 of one member, the largest of 2 members" in lines
+    assert "           group 10: balanced, camps {a} against {b}" in lines
+
+
+def test_a_header_that_swaps_the_columns_is_told(tmp_path):
+    (tmp_path / "g.csv").write_text("target,source,weight\nb,a,1\n")
+    for orientation, says in (
+        ("information", "information flows source -> target"),
+        ("listens", "source listens to target"),
+    ):
+        structure = analyse(ptcc.read_graph(tmp_path / "g.csv", orientation=orientation))
+        assert structure_summary(structure, "g")[1] == f"read       columns by header: {says}"
+
+
 def test_of_many_components_the_largest_four_are_told():
     edges = [(f"{k}a{i}", f"{k}a{i + 1}", 1) for k in range(6) for i in range(k)]
     lines = assert_screen(ptcc.certify(SignedDigraph.from_edges(edges, ["0a0"]), NOMINAL, [1] * 21, simulation=False))
