@@ -64,7 +64,7 @@ def explore(graph: Any = None, settings: Settings | None = None, *, orientation:
     >>> view = explore()  # doctest: +ELLIPSIS
     controls need a notebook with ipywidgets: pip install 'ptcc-certify[notebook]'; ...
     >>> print(view.text.splitlines()[-1])
-    verdict    certified; ||E|| <= 2.1e-07 ||E(0)|| at 0.99 T
+    verdict    certified; ||E|| <= 1.8e-30 ||E(0)|| at 0.99 T
     """
     packaged = isinstance(graph, str) and graph in GRAPHS
     explorer = Explorer(None if graph is None or packaged else as_graph(graph, orientation))
