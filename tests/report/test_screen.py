@@ -152,7 +152,7 @@ def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends
 def test_of_many_groups_of_leaders_the_large_ones_are_told():
     edges = [(f"s{k}", "hub", 1) for k in range(9)] + [("a", "b", -1), ("b", "a", -1), ("a", "hub", 1)]
     lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
-    assert "leaders    10 groups, 10 balanced; 9 of one member, the largest of 2 members" in lines
+    assert "leaders    10 groups, 10 balanced; 9 of one node, largest 2" in lines
     assert "           group 10: balanced, camps {a} against {b}" in lines
 
 
