@@ -292,7 +292,9 @@ OPTIONS = [
     BadInput("output into a missing folder", ("certify", "fig1b", "-o", "nowhere/out.json"), "folder"),
     BadInput("output a directory", ("certify", "fig1b", "-o", "there"), "directory", (("there", _folder),)),
     BadInput("output below a file", ("certify", "fig1b", "-o", "g.csv/out.json"), "folder", _PAIR),
-    BadInput("output over the graph", ("certify", "g", "-o", "./g"), "graph itself", (("g", "a\tb\t1\n"),)),
+    BadInput(
+        "output over the graph", ("certify", "g", "-o", "./g"), "is read by the command itself", (("g", "a\tb\t1\n"),)
+    ),
     BadInput("certificate named as an archive", ("certify", "fig1b", "-o", "c.zip"), "end in .json"),
     BadInput("output named -", ("certify", "fig1b", "-o", "-"), "-o names a file"),
     BadInput("CSV into a missing folder", ("simulate", "fig1b", "-o", "nowhere/out.csv"), "folder"),

@@ -75,6 +75,10 @@ class Observations:
     notes: tuple[str, ...] = ()
 
 
+#: What may be put to a certificate that was read: what is asked, and what was seen.
+_OF_NO_FILE = {"observed", "expectations", *(part.name for part in fields(Observations))} - {"search"}
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """The file that a certificate was read from, accepted by the independent check.
@@ -129,6 +133,11 @@ class Content:
         **values : Any
             Fields of the certificate, of its ``request`` or of its ``observed``; ``search`` is what a search found.
 
+        Raises
+        ------
+        ParameterError
+            The certificate was read from a file, which says other than that.
+
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -136,14 +145,14 @@ class Content:
         >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
         Fraction(1, 1)
         """
+        if self.source is not None and values.keys() - _OF_NO_FILE:
+            raise ParameterError("a certificate that was read is what its file says; certify the graph again")
         if (search := values.pop("search", None)) is not None:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
-            values[name] = replace(group, **own) if own else group
-        if self.source is not None and any(values[k] is not getattr(self, k) for k in values if k != "observed"):
-            raise ParameterError("a certificate that was read is what its file says; certify the graph again")
+            values[name] = replace(group, **own)
         return replace(self, **values)
 
     # ------------------------------------------------------------------ parts by their short names

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -99,7 +100,7 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
             return certificate
         if begins:
             x0 = shared.read_initial_state(options["x0"], options["seed"], certificate.graph)
-            certificate = certificate.changed(initial_state=tuple(x0))
+            certificate = replace(certificate, initial_state=tuple(x0))  # to be drawn: what is proved holds for all
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")

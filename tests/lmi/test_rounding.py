@@ -200,8 +200,10 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     below(row("Optimality ratio"), saved.rate / saved.upper_bound)
     above(row("Overshoot constant"), saved.overshoot)
     above(re.findall(rf"Lyapunov function exceeds \${NUMBER}\$", text), saved.upper_bound)
-    below(re.findall(rf"e\}}\^\{{-{NUMBER}\\,", text), saved.rate)
-    above(re.findall(rf"\^2 \\le {NUMBER}\\,", text), saved.overshoot)
+    rates = re.findall(rf"e\}}\^\{{-{NUMBER}\\,", text) or re.findall(rf"^r_\{{i\}} .*& {NUMBER}$", text, re.MULTILINE)
+    constants = re.findall(rf"^c_\{{i\}} .*& {NUMBER} ", text, re.MULTILINE)
+    below(rates, saved.rate)
+    above(re.findall(rf"\^2 \\le {NUMBER}\\,", text) or constants, saved.overshoot)
     if saved.effort.energy is not None:
         above(re.findall(rf"dt \u2264 {NUMBER}", page)[:1], saved.effort.energy.value)
     if saved.effort.peak is not None:
