@@ -88,6 +88,7 @@ NO_SOURCE = {
         *("LMIError", "MatrixError", "NoCertificate", "NotAnHMatrix", "NotAnMMatrix", "OutOfTime"),
     },
     "a time limit is what its definition says": {"time_limit"},
+    "BibTeX is the source": {"cite"},
     "files and numbers are converted": {
         *("as_graph", "as_state", "read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits")
     },

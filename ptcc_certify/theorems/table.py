@@ -93,10 +93,6 @@ def cite(theorem: str | None = None) -> str:
     ParameterError
         No theorem is called so.
 
-    References
-    ----------
-    [Zhu]_, which is what is cited.
-
     Examples
     --------
     >>> print(cite("1.1").splitlines()[-2])
