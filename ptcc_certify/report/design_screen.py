@@ -5,7 +5,7 @@ from __future__ import annotations
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.screen import graph_entries
+from ptcc_certify.report.structure_text import graph_entries
 from ptcc_certify.report.text_layout import format_lines, wrap_lines
 
 

@@ -23,7 +23,7 @@ from ptcc_certify.certificate.format import producer
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.report.screen import structure_text
+from ptcc_certify.report.structure_text import structure_text
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48

@@ -28,7 +28,7 @@ from ptcc_certify.report import notation as texts
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
-from ptcc_certify.report.screen import camps, remarks_on
+from ptcc_certify.report.structure_text import camps, remarks_on
 from ptcc_certify.theorems.table import THEOREMS
 
 #: Agents up to which each has a row, and how many there are of either extreme above; leader groups that have a row.
