@@ -133,7 +133,8 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
         with suppress(PTCCError):
             certificate = Certificate(**read_document(Path(path), document, "", report)) if path else None
-            told = [] if certificate is None else summary_lines(certificate, path)
+            origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
+            told = [] if certificate is None else summary_lines(certificate, path, origins)
             told = list(dropwhile(lambda line: not line.startswith("protocol"), told))
             lines = list(takewhile(lambda line: not line.startswith("verdict"), told)) or lines
     return wrap_lines([*lines, report.lines()[-1]])

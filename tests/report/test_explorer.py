@@ -439,7 +439,7 @@ def test_without_widgets_there_is_a_static_view(
         monkeypatch.setitem(sys.modules, "ipywidgets", None)
     view = explore()
     assert isinstance(view, View)
-    assert "pip install 'ptcc-certify[notebook]'" in capsys.readouterr().out
+    assert 'pip install ".[notebook]"' in capsys.readouterr().out
     assert view._repr_png_().startswith(PNG)
     assert len(view.figure.axes) == 4
     assert "\nverdict    certified" in repr(view)

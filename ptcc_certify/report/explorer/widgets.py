@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from ipywidgets import VBox
 
 _WITHOUT_WIDGETS = (
-    "controls need a notebook with ipywidgets: pip install 'ptcc-certify[notebook]'; "
-    "in a browser, without: ptcc explore"
+    'controls need a notebook with ipywidgets (pip install ".[notebook]"); in a browser, without: ptcc explore'
 )
 #: Seconds of rest after which what is shown is certified.
 _REST = 0.3
@@ -61,8 +60,8 @@ def explore(graph: Any = None, settings: Settings | None = None, *, orientation:
 
     Examples
     --------
-    >>> view = explore()  # doctest: +ELLIPSIS
-    controls need a notebook with ipywidgets: pip install 'ptcc-certify[notebook]'; ...
+    >>> view = explore()
+    controls need a notebook with ipywidgets (pip install ".[notebook]"); in a browser, without: ptcc explore
     >>> print(view.text.splitlines()[-1])
     verdict    certified; ||E|| <= 1.8e-30 ||E(0)|| at 0.99 T
     """
