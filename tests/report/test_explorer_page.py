@@ -338,12 +338,13 @@ def test_a_moved_slider_changes_image_and_text_within_a_second(
                 seconds = []
                 for value in ("0.8", "1.2", "1.6"):
                     image, text = page.shown()
+                    error = page.page.text_content('dd[data-head="error"]')
                     began = time.perf_counter()
                     page.move("rho2", value)
                     page.page.wait_for_function(
                         """([image, text]) => document.querySelector("#panel-states img").src !== image &&
                            document.querySelector('dd[data-head="error"]').textContent !== text""",
-                        arg=[image, page.page.text_content('dd[data-head="error"]')],
+                        arg=[image, error],
                         polling=10,
                     )
                     seconds.append(time.perf_counter() - began)
