@@ -339,7 +339,7 @@ def _structure_of(graph: SignedDigraph) -> Structure:
     leader = is_closed[strong]
 
     closed = _closed_components(graph, strong, is_closed, inside & leader[target])
-    gauge, violated, negative_cycle = _camps(n, source, target, sign)
+    gauge, violated, negative_cycle = find_camps(n, source, target, sign)
     opposed, one_way = _mutual_edges(graph)
     # Which weak components are balanced, all positive, undirected.
     flags = [_none_of(weak, source[edges]) for edges in (violated, sign < 0, one_way)]
@@ -361,7 +361,7 @@ def _structure_of(graph: SignedDigraph) -> Structure:
     )
 
 
-def _camps(
+def find_camps(
     n: int, source: np.ndarray, target: np.ndarray, sign: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, Callable[[int], tuple[Edge, ...]]]:
     """Assign camps along a breadth-first forest of the underlying undirected multigraph (Lemma 1).
@@ -419,11 +419,26 @@ def _camps(
     return gauge, violated, negative_cycle
 
 
+def weak_components(n: int, source: np.ndarray, target: np.ndarray) -> list[np.ndarray]:
+    """Return the nodes of each weakly connected component, ascending, in the order of their first nodes.
+
+    Examples
+    --------
+    >>> [nodes.tolist() for nodes in weak_components(3, np.array([2]), np.array([0]))]
+    [[0, 2], [1]]
+    """
+    from scipy import sparse
+    from scipy.sparse.csgraph import connected_components
+
+    pattern = sparse.csr_array((np.ones(source.size, dtype=np.int8), (source, target)), shape=(n, n))
+    return _groups(_by_first_node(connected_components(pattern, directed=False)[1]))
+
+
 def _closed_components(
     graph: SignedDigraph, strong: np.ndarray, is_closed: np.ndarray, edges: np.ndarray
 ) -> tuple[ClosedComponent, ...]:
     source, target, sign = graph.source[edges], graph.target[edges], graph.sign[edges]
-    gauge, violated, negative_cycle = _camps(graph.n_nodes, source, target, sign)
+    gauge, violated, negative_cycle = find_camps(graph.n_nodes, source, target, sign)
     violating = {int(strong[source[i]]): i for i in violated[::-1].tolist()}  # the first of each
     groups = _groups(strong)
     result = []

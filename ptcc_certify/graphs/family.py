@@ -1,0 +1,486 @@
+"""Families of signed digraphs: switching topologies, uncertain weights, edges that may fail.
+
+A family is a list of *modes* on one node set. In a mode every edge has one sign, and its size ``|w_kl|`` lies in an
+interval ``[w-, w+]``: *known* if ``w- = w+``, *optional* (it may fail) if ``w- = 0``, *mandatory* if ``w- > 0``. A
+*signal* chooses, at every instant, a mode and weights in its intervals. A graph is a family of one mode with known
+weights.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels
+from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
+
+Interval = tuple[Hashable, Hashable, Exact, Exact]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mode:
+    """The graphs of one mode: edges with fixed signs, whose sizes lie in intervals.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        The N nodes.
+    source, target : (m,) int arrays
+        Information flows from ``source`` to ``target``; sorted by (target, source, sign).
+    sign : (m,) int8 array
+        Two optional edges of opposite signs may join one pair of nodes: a weight of unknown sign.
+    lower, upper : Weights
+        The sizes ``w-`` and ``w+``, over one scale.
+    name : str
+        What the user calls it: a file, "day".
+    tied : bool
+        Whether both directions of an edge are one parameter, so that they change together (undirected edges).
+
+    References
+    ----------
+    docs/theory/families.md, "What may change".
+
+    Examples
+    --------
+    >>> mode = Family.from_intervals([("a", "b", -3, -2), ("b", "a", 0, 1)]).modes[0]
+    >>> mode
+    Mode(2 nodes, 2 edges, 2 uncertain, 1 of them optional)
+    >>> mode.mandatory.edges
+    (('a', 'b', Fraction(-2, 1)),)
+    """
+
+    labels: tuple[str, ...]
+    source: np.ndarray
+    target: np.ndarray
+    sign: np.ndarray
+    lower: Weights
+    upper: Weights
+    name: str = ""
+    tied: bool = False
+
+    def __post_init__(self) -> None:
+        for array in (self.source, self.target, self.sign, self.lower.table, self.upper.table):
+            array.flags.writeable = False
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges, those that may fail included."""
+        return int(self.source.size)
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """(m,) bool array: edges of which ``w- = w+``."""
+        return np.asarray(self.lower.table == self.upper.table, dtype=bool)
+
+    @cached_property
+    def optional(self) -> np.ndarray:
+        """(m,) bool array: edges that may fail, ``w- = 0``."""
+        return np.asarray(self.lower.table == 0, dtype=bool)
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """(q,) int array: one edge for each uncertain parameter; of undirected edges the one from the smaller node."""
+        uncertain = ~self.known
+        return np.flatnonzero(uncertain & (self.source < self.target) if self.tied else uncertain)
+
+    @cached_property
+    def mandatory(self) -> SignedDigraph:
+        """The graph of the mandatory edges at ``w-``: a member of the mode, with all optional edges off."""
+        return self.member(np.zeros(self.n_edges, dtype=bool))
+
+    def member(self, largest: np.ndarray) -> SignedDigraph:
+        """Return the graph with ``w+`` on the edges that ``largest`` (m,) selects, ``w-`` on the others.
+
+        Raises
+        ------
+        GraphError
+            Two edges of opposite signs between one pair of nodes are both on.
+        """
+        on = np.flatnonzero(largest | ~self.optional)
+        table = np.where(largest, self.upper.table, self.lower.table) * self.sign
+        weights = self.upper.take(on)
+        weights.table = table[on]
+        return SignedDigraph(self.labels, self.source[on], self.target[on], weights)
+
+    def edge_interval(self, edge: int) -> tuple[Fraction, Fraction]:
+        """Return the least and the largest weight of an edge, with its sign."""
+        ends = [int(self.sign[edge]) * bound.fraction(edge) for bound in (self.lower, self.upper)]
+        return min(ends), max(ends)
+
+    def restricted(self, nodes: np.ndarray) -> Mode:
+        """Return the mode on the nodes ``nodes`` (indices, ascending) and the edges among them."""
+        place = np.full(len(self.labels), -1, dtype=np.int64)
+        place[nodes] = np.arange(nodes.size)
+        keep = np.flatnonzero((place[self.source] >= 0) & (place[self.target] >= 0))
+        return Mode(
+            tuple(self.labels[v] for v in nodes.tolist()),
+            place[self.source[keep]],
+            place[self.target[keep]],
+            self.sign[keep],
+            self.lower.take(keep),
+            self.upper.take(keep),
+            self.name,
+            self.tied,
+        )
+
+    def lines(self) -> Iterator[str]:
+        """Yield one JSON array per edge: ``[source, target, weight]``, or ``[source, target, least, largest]``."""
+        for edge in range(self.n_edges):
+            bounds = sorted(set(self.edge_interval(edge)))
+            names = self.labels[self.source[edge]], self.labels[self.target[edge]]
+            yield json.dumps([*names, *map(format_exact, bounds)], ensure_ascii=False)
+
+    def __repr__(self) -> str:
+        uncertain, optional = int((~self.known).sum()), int(self.optional.sum())
+        more = f", {uncertain} uncertain" if uncertain else ""
+        more += f", {optional} of them optional" if optional else ""
+        return f"Mode({len(self.labels)} nodes, {self.n_edges} edges{more})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Family(Shown):
+    """Signed digraphs on one node set, of which any may act at any instant.
+
+    Made by :meth:`from_graph`, :meth:`from_intervals` or :meth:`switching`.
+
+    Attributes
+    ----------
+    modes : tuple of Mode
+        At least one; all have the same nodes in the same order.
+    notes : tuple of str
+        What was read in a larger sense than it was written.
+
+    References
+    ----------
+    docs/theory/families.md.
+
+    Examples
+    --------
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    >>> night = SignedDigraph.from_edges([("c", "a", 2)], nodes="abc")
+    >>> Family.switching({"day": day, "night": night})
+    Family(3 nodes, 2 modes)
+    >>> Family.from_graph(day, uncertainty="20%", optional=[("b", "c")]).modes[0].edge_interval(1)
+    (Fraction(-6, 5), Fraction(0, 1))
+    """
+
+    modes: tuple[Mode, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The N nodes."""
+        return self.modes[0].labels
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.labels)
+
+    @cached_property
+    def graph(self) -> SignedDigraph | None:
+        """The one graph of the family; None if there are several."""
+        if len(self.modes) > 1 or not self.modes[0].known.all():
+            return None
+        return self.modes[0].mandatory
+
+    @cached_property
+    def union(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Source, target and sign of all edges of all modes, each once, sorted."""
+        columns = [np.concatenate([getattr(m, end) for m in self.modes]) for end in ("target", "source", "sign")]
+        target, source, sign = np.unique(np.array(columns, dtype=np.int64), axis=1)
+        return source, target, sign.astype(np.int8)
+
+    def restricted(self, nodes: np.ndarray) -> Family:
+        """Return the family on the nodes ``nodes`` (indices, ascending) and the edges among them."""
+        return Family(tuple(mode.restricted(nodes) for mode in self.modes), self.notes)
+
+    @cached_property
+    def sha256(self) -> str:
+        r"""SHA-256 of nodes and modes.
+
+        Lines of UTF-8, ``\n`` after each: ``[label]`` of every node, sorted; then the modes in their order, a line
+        ``{}`` between two, each with its edges sorted, ``[source, target, weight]`` or ``[source, target, least,
+        largest]``, numbers as ``p`` or ``p/q`` in lowest terms. That of one graph is the graph's own.
+        """
+        nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
+        modes = "{}\n".join("".join(f"{line}\n" for line in sorted(mode.lines())) for mode in self.modes)
+        return hashlib.sha256((nodes + modes).encode("utf-8", "surrogatepass")).hexdigest()
+
+    # ------------------------------------------------------------------ constructors
+
+    @classmethod
+    def from_graph(
+        cls, graph: SignedDigraph, *, uncertainty: Any = 0, optional: Iterable[tuple[Hashable, Hashable]] = ()
+    ) -> Family:
+        """Return the family of one graph whose weights are known up to a share of each.
+
+        Parameters
+        ----------
+        graph : SignedDigraph
+        uncertainty : number or str
+            ``u`` from 0 to 1, or a text as "10%": ``|w|`` lies in ``[(1 - u) |w|, (1 + u) |w|]``.
+        optional : iterable of (source, target)
+            Edges that may fail; ``w+`` stays. Of an undirected graph one direction names both.
+
+        Raises
+        ------
+        GraphError
+            An optional edge is not in the graph, or the uncertainty is not from 0 to 1.
+
+        Examples
+        --------
+        >>> Family.from_graph(SignedDigraph.from_edges([("a", "b", 3)])).graph.edges
+        (('a', 'b', Fraction(3, 1)),)
+        """
+        share = read_share(uncertainty)
+        tied = bool(graph.read.get("undirected"))
+        off = np.zeros(graph.n_edges, dtype=bool)
+        key = graph.target * graph.n_nodes + graph.source  # ascends
+        for one in optional:
+            off[_edge_number(graph, key, one)] = True
+            if tied:
+                off[_edge_number(graph, key, one[::-1])] = True
+        bounds = _uncertain(graph, share, off)
+        mode = Mode(graph.labels, graph.source, graph.target, graph.sign, *bounds, tied=tied)
+        return cls((mode,))
+
+    @classmethod
+    def from_intervals(
+        cls,
+        edges: Iterable[Interval],
+        nodes: Iterable[Hashable] = (),
+        *,
+        orientation: str = "information",
+        undirected: bool = False,
+    ) -> Family:
+        """Return the family of one mode with edges ``(source, target, least, largest)``.
+
+        Parameters
+        ----------
+        edges : iterable of (label, label, number, number)
+            The weight, with its sign, lies between the two. 0 at one end is an edge that may fail. An interval with 0
+            inside, a weight of unknown sign, becomes two edges that may fail, one of each sign: a larger family.
+        nodes : iterable of labels, optional
+            Further nodes, and the wish for an order.
+        orientation : {"information", "listens"}
+            As in :meth:`SignedDigraph.from_edges`.
+        undirected : bool
+            Let each edge go both ways, as one parameter.
+
+        Raises
+        ------
+        GraphError
+            ``least > largest``, both are 0, an edge occurs twice or is a loop.
+
+        Examples
+        --------
+        >>> unsure = Family.from_intervals([("a", "b", -1, 2)])
+        >>> unsure, unsure.notes
+        (Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional), ('1 weight of unknown sign was read as two \
+edges that may fail, one of each sign',))
+        """
+        rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []
+        unsure = 0
+        for edge in edges:
+            parts = _parts(edge)
+            unsure += len(parts) == 2
+            for source, target, *interval in parts:
+                rows.append((source, target, *interval))
+                if undirected:
+                    rows.append((target, source, *interval))
+        return cls((_mode(rows, nodes, orientation, undirected),), _note(unsure))
+
+    @classmethod
+    def switching(cls, modes: Any) -> Family:
+        """Return the family of several modes, of which any may act at any instant.
+
+        Parameters
+        ----------
+        modes : mapping of str to graphs or families, or iterable of these
+            Each a SignedDigraph, or a family, whose modes are added.
+
+        Raises
+        ------
+        GraphError
+            There is none, or two have different nodes: a missing node is not an isolated one.
+        """
+        named = list(modes.items()) if hasattr(modes, "items") else [(str(k), one) for k, one in enumerate(modes, 1)]
+        if not named:
+            raise GraphError("a family has at least one mode; give one graph or several")
+        families = [(name, one if isinstance(one, Family) else cls.from_graph(one)) for name, one in named]
+        labels = families[0][1].labels
+        joint: list[Mode] = []
+        for name, family in families:
+            for number, mode in enumerate(family.modes, 1):
+                joint.append(_in_order(mode, labels, f"{name}.{number}" if len(family.modes) > 1 else name, named[0][0]))
+        return cls(tuple(joint), tuple(note for _, family in families for note in family.notes))
+
+    def __len__(self) -> int:
+        return self.n_nodes
+
+    def __eq__(self, other: object) -> bool:
+        """Two families are equal when their nodes and their modes are, in the same order."""
+        return isinstance(other, Family) and self.sha256 == other.sha256
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    def __repr__(self) -> str:
+        edges = sum(mode.n_edges for mode in self.modes)
+        uncertain = sum(int((~mode.known).sum()) for mode in self.modes)
+        optional = sum(int(mode.optional.sum()) for mode in self.modes)
+        parts = [f"{self.n_nodes} nodes"] + [f"{len(self.modes)} modes"] * (len(self.modes) > 1)
+        parts += [f"{uncertain} of {edges} weights uncertain"] * bool(uncertain)
+        parts += [f"{optional} edges optional"] * bool(optional)
+        return f"Family({', '.join(parts)})"
+
+
+def read_share(value: Any) -> Fraction:
+    """Return a share of a weight, from 0 to 1: ``0.1``, ``"1/10"`` or ``"10%"``.
+
+    Raises
+    ------
+    GraphError
+        It is no number from 0 to 1.
+
+    Examples
+    --------
+    >>> read_share("10%")
+    Fraction(1, 10)
+    """
+    percent = isinstance(value, str) and value.strip().endswith("%")
+    try:
+        share = as_fraction(value.strip()[:-1] if percent else value, "the uncertainty") / (100 if percent else 1)
+    except NumberError as error:
+        raise GraphError(str(error)) from None
+    if not 0 <= share <= 1:
+        hint = f"; write {format_exact(share)}% if it is one" if not percent and 1 < share <= 100 else ""
+        raise GraphError(f"uncertainty {shorten(str(value))} is not from 0 to 1{hint}")
+    return share
+
+
+def _uncertain(graph: SignedDigraph, share: Fraction, optional: np.ndarray) -> tuple[Weights, Weights]:
+    """Return the bounds of the sizes of all edges, over one scale; equal weights are one number."""
+    table, _ = graph.weight_table()
+    m = graph.n_edges
+    if table is None:
+        sizes, which = [abs(graph.exact_weight(e)) for e in range(m)], np.arange(m)
+    else:
+        _, first, which = np.unique(np.abs(table), return_index=True, return_inverse=True)
+        sizes = [abs(graph.exact_weight(e)) for e in first.tolist()]
+    d = len(sizes)
+    values = [(1 - share) * w for w in sizes] + [(1 + share) * w for w in sizes] + [Fraction(0)]
+    both = Weights(values, np.concatenate([np.where(optional, 2 * d, which), which + d]).astype(np.int64))
+    return both.take(np.arange(m)), both.take(np.arange(m, 2 * m))
+
+
+def _edge_number(graph: SignedDigraph, keys: np.ndarray, edge: tuple[Hashable, Hashable]) -> int:
+    try:
+        source, target = (graph.index[str(end)] for end in edge)
+    except (KeyError, ValueError, TypeError):
+        raise GraphError(f"optional edge {shorten(repr(edge))} is no pair of nodes of the graph") from None
+    key = target * graph.n_nodes + source
+    place = int(np.searchsorted(keys, key))
+    if place == keys.size or keys[place] != key:
+        raise GraphError(f"optional edge {shorten(str(edge[0]))} -> {shorten(str(edge[1]))} is not in the graph")
+    return place
+
+
+def _parts(edge: Interval) -> list[tuple[Hashable, Hashable, Fraction, Fraction]]:
+    """Return an interval as sizes times signs that do not change: one edge, or two if 0 lies inside."""
+    try:
+        source, target, first, last = edge
+    except (TypeError, ValueError):
+        raise GraphError(f"edge {shorten(repr(edge))} is not (source, target, least, largest)") from None
+    name = f"edge {shorten(str(source))} -> {shorten(str(target))}"
+    try:
+        least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
+    except NumberError as error:
+        raise GraphError(f"{name}: {error}") from None
+    if least > largest:
+        mend = f"exchange them; a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
+        raise GraphError(f"{name}: the least weight {format_exact(least)} is above the largest; {mend}")
+    if least == largest == 0:
+        raise GraphError(f"{name}: its weight is always 0; leave the edge out")
+    zero = Fraction(0)
+    if least < 0 < largest:
+        return [(source, target, least, zero), (source, target, zero, largest)]
+    return [(source, target, least, largest)]
+
+
+def _mode(
+    rows: Sequence[tuple[Hashable, Hashable, Fraction, Fraction]],
+    nodes: Iterable[Hashable],
+    orientation: str,
+    tied: bool,
+) -> Mode:
+    signs = [1 if largest > 0 else -1 for *_, largest in rows]
+    sizes = [sorted((abs(least), abs(largest))) for *_, least, largest in rows]
+    # The graph of all edges, one sign at a time, holds the rules of labels, loops and edges that occur twice.
+    known: dict[str, int] = {}
+    for node in nodes:
+        known.setdefault(str(node), len(known))
+    for first, second, *_ in rows:
+        known.setdefault(str(first), len(known))
+        known.setdefault(str(second), len(known))
+    labels, rank = ordered_labels(list(known))
+    ends = [rank[np.array([known[str(row[k])] for row in rows], dtype=np.int64)] for k in (0, 1)]
+    source, target = ends if orientation == "information" else ends[::-1]
+    sign, m = np.array(signs, dtype=np.int8), len(rows)
+    both = Weights([low for low, _ in sizes] + [high for _, high in sizes])
+    for one in (1, -1):
+        some = np.flatnonzero(sign == one)
+        SignedDigraph(labels, source[some], target[some], both.take(some + m))
+    order = np.lexsort((sign, source, target))
+    mode = Mode(
+        tuple(labels), source[order], target[order], sign[order], both.take(order), both.take(order + m), tied=tied
+    )
+    _refuse_two_signs(mode)
+    return mode
+
+
+def _refuse_two_signs(mode: Mode) -> None:
+    """Refuse two edges of opposite signs between one pair of nodes, but where both may fail."""
+    same = (mode.source[1:] == mode.source[:-1]) & (mode.target[1:] == mode.target[:-1])
+    bad = np.flatnonzero(same & ~(mode.optional[1:] & mode.optional[:-1]))
+    if bad.size:
+        source, target = (shorten(mode.labels[int(end[bad[0]])]) for end in (mode.source, mode.target))
+        raise GraphError(
+            f"edge {source} -> {target} has both signs in one mode; give two modes, one with each sign (exact), or one "
+            "interval with 0 inside (a larger family)"
+        )
+
+
+def _note(unsure: int) -> tuple[str, ...]:
+    if not unsure:
+        return ()
+    which = "1 weight of unknown sign was" if unsure == 1 else f"{unsure} weights of unknown sign were"
+    return (f"{which} read as two edges that may fail, one of each sign",)
+
+
+def _in_order(mode: Mode, labels: tuple[str, ...], name: str, first: str) -> Mode:
+    """Return a mode with its nodes in the order of ``labels``."""
+    if mode.labels == labels:
+        return Mode(
+            labels, mode.source, mode.target, mode.sign, mode.lower, mode.upper, mode.name or name, mode.tied
+        )
+    index = {label: v for v, label in enumerate(labels)}
+    if odd := sorted(set(labels) ^ set(mode.labels)):
+        lacks = name if odd[0] in index else first
+        mend = "declare it in a row of its own if it is isolated there"
+        raise GraphError(f"mode {shorten(lacks)} has no node {shorten(odd[0])}, which another mode has; {mend}")
+    place = np.array([index[label] for label in mode.labels], dtype=np.int64)
+    source, target = place[mode.source], place[mode.target]
+    order = np.lexsort((mode.sign, source, target))
+    lower, upper = mode.lower.take(order), mode.upper.take(order)
+    return Mode(labels, source[order], target[order], mode.sign[order], lower, upper, mode.name or name, mode.tied)
