@@ -73,6 +73,14 @@ class Weights:
         value = self.table.item(i)
         return Fraction(value, self.scale) if isinstance(value, int) else Fraction(value)
 
+    def texts(self) -> list[str]:
+        """Return the weights as exact texts."""
+        if self.table.dtype == object:
+            return [format_exact(self.fraction(i)) for i in range(self.table.size)]
+        _, first, which = np.unique(self.table, return_index=True, return_inverse=True)
+        texts = [format_exact(self.fraction(int(i))) for i in first]
+        return [texts[k] for k in which.tolist()]
+
     def signs(self) -> np.ndarray:
         """Return +1 or -1 for each weight."""
         return np.where(self.table > 0, 1, -1).astype(np.int8)
@@ -414,12 +422,7 @@ class SignedDigraph(Shown):
     @cached_property
     def weight_texts(self) -> list[str]:
         """The weights as exact texts, in the order of the edges."""
-        table = self._weights.table
-        if table.dtype == object:
-            return [format_exact(self._weights.fraction(i)) for i in range(self.n_edges)]
-        _, first, which = np.unique(table, return_index=True, return_inverse=True)
-        texts = [format_exact(self._weights.fraction(int(i))) for i in first]
-        return [texts[k] for k in which.tolist()]
+        return self._weights.texts()
 
     def equal_weights(self, other: np.ndarray) -> np.ndarray:
         """Tell for each edge ``i`` whether its weight equals that of edge ``other[i]``, exactly."""

@@ -132,12 +132,21 @@ class Mode:
             self.tied,
         )
 
+    @cached_property
+    def texts(self) -> tuple[list[str], list[str]]:
+        """The least and the largest weight of every edge, with their signs, as exact texts."""
+        negative = self.sign < 0
+        ends = []
+        for below, above in ((self.upper, self.lower), (self.lower, self.upper)):  # of negative and positive edges
+            ends.append(np.where(negative, [f"-{w}" if w != "0" else w for w in below.texts()], above.texts()).tolist())
+        return ends[0], ends[1]
+
     def lines(self) -> Iterator[str]:
         """Yield one JSON array per edge: ``[source, target, weight]``, or ``[source, target, least, largest]``."""
-        for edge in range(self.n_edges):
-            bounds = sorted(set(self.edge_interval(edge)))
-            names = self.labels[self.source[edge]], self.labels[self.target[edge]]
-            yield json.dumps([*names, *map(format_exact, bounds)], ensure_ascii=False)
+        names = [json.dumps(label, ensure_ascii=False) for label in self.labels]
+        for s, t, *ends in zip(self.source.tolist(), self.target.tolist(), *self.texts, strict=True):
+            weights = ends if ends[0] != ends[1] else ends[:1]
+            yield f"[{names[s]}, {names[t]}, {', '.join(json.dumps(w) for w in weights)}]"
 
     def __repr__(self) -> str:
         uncertain, optional = int((~self.known).sum()), int(self.optional.sum())

@@ -294,7 +294,7 @@ class Kernel:
             return None
 
     def disagreeing(self, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> Iterator[tuple[int, int]]:
-        """Yield the edges with ``B_target != sign B_source``, each with the first column that tells; lazily.
+        """Yield edges with ``B_target != sign B_source``, each with a column that tells, lazily; each at least once.
 
         Raises
         ------
@@ -304,6 +304,10 @@ class Kernel:
         ends, heard = self.codes[target], self.codes[source]
         unknown = (ends == _UNKNOWN) | (heard == _UNKNOWN)
         differ = ~unknown & (ends != sign * np.where(unknown, 0, heard))
+        # An unknown row is a proper mean of others, and never a unit vector.
+        unit = np.where(ends == _UNKNOWN, heard, ends)
+        for edge in np.flatnonzero(unknown & (unit != _UNKNOWN) & (unit != 0)).tolist():
+            yield edge, abs(int(unit[edge])) - 1
         for edge in [*np.flatnonzero(differ).tolist(), *np.flatnonzero(unknown).tolist()]:
             pairs = zip(self.row(int(target[edge])), self.row(int(source[edge])), strict=True)
             column = next((j for j, (b, c) in enumerate(pairs) if b != int(sign[edge]) * c), None)
