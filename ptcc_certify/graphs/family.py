@@ -303,10 +303,10 @@ edges that may fail, one of each sign',))
         for edge in edges:
             parts = _parts(edge)
             unsure += len(parts) == 2
-            for source, target, *interval in parts:
-                rows.append((source, target, *interval))
+            for source, target, least, largest in parts:
+                rows.append((source, target, least, largest))
                 if undirected:
-                    rows.append((target, source, *interval))
+                    rows.append((target, source, least, largest))
         return cls((_mode(rows, nodes, orientation, undirected),), _note(unsure))
 
     @classmethod
@@ -331,7 +331,9 @@ edges that may fail, one of each sign',))
         joint: list[Mode] = []
         for name, family in families:
             for number, mode in enumerate(family.modes, 1):
-                joint.append(_in_order(mode, labels, f"{name}.{number}" if len(family.modes) > 1 else name, named[0][0]))
+                joint.append(
+                    _in_order(mode, labels, f"{name}.{number}" if len(family.modes) > 1 else name, named[0][0])
+                )
         return cls(tuple(joint), tuple(note for _, family in families for note in family.notes))
 
     def __len__(self) -> int:
@@ -413,7 +415,10 @@ def _parts(edge: Interval) -> list[tuple[Hashable, Hashable, Fraction, Fraction]
         raise GraphError(f"edge {shorten(repr(edge))} is not (source, target, least, largest)") from None
     name = f"edge {shorten(str(source))} -> {shorten(str(target))}"
     try:
-        least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
+        least, largest = (
+            as_fraction(end, f"the {which} weight")  # type: ignore[arg-type]
+            for end, which in ((first, "least"), (last, "largest"))
+        )
     except NumberError as error:
         raise GraphError(f"{name}: {error}") from None
     if least > largest:
@@ -480,9 +485,7 @@ def _note(unsure: int) -> tuple[str, ...]:
 def _in_order(mode: Mode, labels: tuple[str, ...], name: str, first: str) -> Mode:
     """Return a mode with its nodes in the order of ``labels``."""
     if mode.labels == labels:
-        return Mode(
-            labels, mode.source, mode.target, mode.sign, mode.lower, mode.upper, mode.name or name, mode.tied
-        )
+        return Mode(labels, mode.source, mode.target, mode.sign, mode.lower, mode.upper, mode.name or name, mode.tied)
     index = {label: v for v, label in enumerate(labels)}
     if odd := sorted(set(labels) ^ set(mode.labels)):
         lacks = name if odd[0] in index else first

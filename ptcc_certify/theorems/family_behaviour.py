@@ -222,7 +222,7 @@ def _decide_connected(nodes: np.ndarray, family: Family) -> FamilyComponent:
 # ---------------------------------------------------------------------- kernels
 
 
-class TooLarge(Exception):  # noqa: N818  (no error: the behaviour is then undecided)
+class TooLarge(Exception):
     """The rows of a kernel are rational numbers, and there are too many to solve for."""
 
 
@@ -411,9 +411,7 @@ def _moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
         ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
         try:
             for edge, j in kernel.disagreeing(*ends):
-                return Counterexample(
-                    "moving rest state", 0, number, edge=int(uncertain[edge]), state=kernel.column(j)
-                )
+                return Counterexample("moving rest state", 0, number, edge=int(uncertain[edge]), state=kernel.column(j))
         except TooLarge:
             unknown = True
     if unknown:
