@@ -142,11 +142,17 @@ class Mode:
         return ends[0], ends[1]
 
     def lines(self) -> Iterator[str]:
-        """Yield one JSON array per edge: ``[source, target, weight]``, or ``[source, target, least, largest]``."""
+        """Yield one JSON array per edge: ``[source, target, weight]``, or ``[source, target, least, largest]``.
+
+        Sorted by source label, target label and sign, so that the order of nodes does not count.
+        """
         names = [json.dumps(label, ensure_ascii=False) for label in self.labels]
-        for s, t, *ends in zip(self.source.tolist(), self.target.tolist(), *self.texts, strict=True):
-            weights = ends if ends[0] != ends[1] else ends[:1]
-            yield f"[{names[s]}, {names[t]}, {', '.join(json.dumps(w) for w in weights)}]"
+        rank = np.argsort(sorted(range(len(names)), key=self.labels.__getitem__))
+        least, largest = self.texts
+        for edge in np.lexsort((self.sign, rank[self.target], rank[self.source])).tolist():
+            weights = dict.fromkeys((least[edge], largest[edge]))
+            ends = names[self.source[edge]], names[self.target[edge]]
+            yield f"[{', '.join([*ends, *map(json.dumps, weights)])}]"
 
     def __repr__(self) -> str:
         uncertain, optional = int((~self.known).sum()), int(self.optional.sum())
@@ -218,11 +224,11 @@ class Family(Shown):
         r"""SHA-256 of nodes and modes.
 
         Lines of UTF-8, ``\n`` after each: ``[label]`` of every node, sorted; then the modes in their order, a line
-        ``{}`` between two, each with its edges sorted, ``[source, target, weight]`` or ``[source, target, least,
-        largest]``, numbers as ``p`` or ``p/q`` in lowest terms. That of one graph is the graph's own.
+        ``{}`` between two, each with the lines of its edges (:meth:`Mode.lines`), numbers as ``p`` or ``p/q`` in lowest
+        terms. That of one graph is the graph's own.
         """
         nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
-        modes = "{}\n".join("".join(f"{line}\n" for line in sorted(mode.lines())) for mode in self.modes)
+        modes = "{}\n".join("".join(f"{line}\n" for line in mode.lines()) for mode in self.modes)
         return hashlib.sha256((nodes + modes).encode("utf-8", "surrogatepass")).hexdigest()
 
     # ------------------------------------------------------------------ constructors
