@@ -148,7 +148,7 @@ def _verdict(doc: Document) -> str:
     entries(data["proof"], "proof")
     protocol = check_protocol(doc)
     graph = check_graph(doc)
-    structure = check_structure(doc, graph)
+    structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
     begin = check_begin(doc, graph, protocol)
     final = check_final_state(doc, structure, claim, begin)

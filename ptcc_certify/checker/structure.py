@@ -81,13 +81,13 @@ class Claim:
     components: list[tuple[list[int], Any]]
 
 
-def check_structure(doc: Document, graph: Digraph) -> Structure:
+def check_structure(doc: Document, graph: Digraph, section: Any, of: str = "graph") -> Structure:
     """Verify closed components, camps, leaders and followers, and every witness."""
-    doc.open("structure", "graph")
+    doc.open("structure", of)
     keys = ("connectivity", "closed_components", "leaders", "followers", "balanced", "sign_symmetric")
     closed: list[list[int]] = []
     gauges: list[list[int] | None] = []
-    section = fields(doc.data["structure"], keys, "structure")
+    fields(section, keys, "structure")
     for entry in entries(section["closed_components"], "closed_components"):
         balanced = isinstance(entry, dict) and entry.get("balanced") is True
         fields(entry, ("nodes", "balanced", "gauge" if balanced else "negative_cycle"), "a closed component")
