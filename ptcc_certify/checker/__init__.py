@@ -22,6 +22,7 @@ from typing import Any
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
+from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
@@ -50,6 +51,9 @@ KEYS = (
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
     *("verdict", "digest", "unverified"),
 )
+
+#: Parts that are null in a certificate of a family.
+NOT_OF_FAMILIES = ("paper", "overshoot", "sliding_variable", "influence", "reaching_time")
 
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
@@ -147,6 +151,8 @@ def _verdict(doc: Document) -> str:
     need(isinstance(data["unverified"], dict), "unverified is not an object")
     entries(data["proof"], "proof")
     protocol = check_protocol(doc)
+    if isinstance(data["graph"], dict) and "modes" in data["graph"]:
+        return _family_verdict(doc)
     graph = check_graph(doc)
     structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
@@ -158,13 +164,25 @@ def _verdict(doc: Document) -> str:
     bound = check_rate_bound(doc, structure)
     check_sliding(doc, graph, protocol, begin)
     check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
-    doc.at = "proof"
+    return _close(doc, data["influence"] is not None and (rate is not None or not graph.listening))
+
+
+def _close(doc: Document, proved: bool) -> str:
+    """Verify that nothing is left of the proof, the verdict, and the digest."""
+    data, doc.at = doc.data, "proof"
     need(len(doc.obligations) == len(data["proof"]), "an obligation that nothing asks for")
-    proved = data["influence"] is not None and (rate is not None or not graph.listening)
     verdict = "certified" if proved else "undecided"
     need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")
     need(doc.section("digest") == digest(data), "the certificate was changed after it was made")
     return verdict
+
+
+def _family_verdict(doc: Document) -> str:
+    """Verify a certificate of a family, part after part; return its verdict."""
+    check_family(doc)
+    for key in NOT_OF_FAMILIES:
+        need(doc.section(key) is None, "a part that certificates of families do not have")
+    return _close(doc, True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

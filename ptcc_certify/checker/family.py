@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 from lmi.exact.work import spend
@@ -95,10 +96,15 @@ def check_family(doc: Document) -> Family:
     sections = entries(fields(doc.section("structure"), ("modes",), "structure")["modes"], "modes", len(drafts))
     modes = []
     for number, ((edges, tied), section) in enumerate(zip(drafts, sections, strict=True)):
-        mandatory = [edge for edge in edges if edge[3]]
-        graph = Digraph(labels, *([e[k] for e in mandatory] for k in (0, 1)), [e[2] * e[3] for e in mandatory], 1)
+        edges_on = [edge for edge in edges if edge[3]]
+        source, target, weights = ([x(e) for e in edges_on] for x in (itemgetter(0), itemgetter(1), _least))
+        graph = Digraph(labels, source, target, weights, 1)
         modes.append(Mode(edges, check_structure(doc, graph, section, f"graph.modes[{number}]"), tied))
     return Family(labels, modes, _check_claims(doc, labels, modes))
+
+
+def _least(edge: Edge) -> Fraction:
+    return edge[2] * edge[3]
 
 
 # ---------------------------------------------------------------------- modes
@@ -260,9 +266,9 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witnes
     need(not any(_row_product(mode.structure.graph.row(v), state) for v in inside), "the state is not at rest")
     moved = {v for v in inside if _row_product(other.structure.graph.row(v), state)}
     if (edge := witness["edge"]) is not None:
-        need(type(edge) is int and 0 <= edge < len(other.edges), "an unknown edge")
-        s, t, sign, low, high = other.edges[edge]
-        need(low < high and t not in moved, "the edge is known, or its listener moves already")
+        s, t = positions(doc, other.structure.graph, entries(edge, "an edge", 3)[:2], "an edge")
+        need(edge[2] in (1, -1) and (s, t, sign := int(edge[2])) in {e[:3] for e in other.uncertain}, "a known edge")
+        need(t not in moved, "the listener of the edge moves already")
         if state[t].get(0, 0) != sign * state[s].get(0, 0):
             moved.add(t)
     need(bool(moved), "the state is at rest in both")

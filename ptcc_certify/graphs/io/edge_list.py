@@ -81,6 +81,12 @@ def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
     return None
 
 
+def edge_columns(row: Sequence[str], place: str) -> tuple[int, int, int | None] | None:
+    """Return the columns of source, target and, if it is named, weight; None if a row names no source and target."""
+    source, target = column(row, _SOURCE, place), column(row, _TARGET, place)
+    return None if source is None or target is None else (source, target, column(row, _WEIGHT, place))
+
+
 def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
     """Return the columns of source, target and weight if a row is a header, else None.
 
@@ -89,10 +95,10 @@ def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
     >>> header(["weight", "from", "to"], "a.csv, line 1"), header(["a", "b", "1"], "a.csv, line 1")
     ((1, 2, 0), None)
     """
-    source, target = column(row, _SOURCE, place), column(row, _TARGET, place)
-    if source is None or target is None:
+    if (columns := edge_columns(row, place)) is None:
         return None
-    if (weight := column(row, _WEIGHT, place)) is not None:
+    source, target, weight = columns
+    if weight is not None:
         return source, target, weight
     try:
         parse_exact("".join(row[2:3]))

@@ -95,6 +95,17 @@ def read_graph(
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
 
 
+def is_edge_list(ending: str) -> bool:
+    """Tell whether a file with this ending is read as an edge list.
+
+    Examples
+    --------
+    >>> is_edge_list("csv"), is_edge_list("npz")
+    (True, False)
+    """
+    return _READERS.get(ending, read_edge_list) is read_edge_list
+
+
 def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> SignedDigraph:
     """Read a file as another graph was read; see :func:`read_graph`.
 
@@ -192,7 +203,7 @@ def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
         raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; give ptcc_certify.as_graph of it")
     refuse_no_path(path)
     name, ending = name_and_ending(path)
-    if _READERS.get(ending, read_edge_list) is not read_edge_list:
+    if not is_edge_list(ending):
         raise FormatError(f"{name}: graphs are written as edge lists; let the name end in .csv")
     data = edge_list(graph, name)
     packed = os.fspath(path).lower().endswith((".gz", ".gzip"))

@@ -1,0 +1,193 @@
+"""Families of graphs from files: weights in intervals, shares of uncertainty, edges that may fail, files as modes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family, read_share
+from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
+from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.io.graph_files import is_edge_list, read_graph
+from ptcc_certify.graphs.rationals import parse_exact, shorten
+
+_LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
+_LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
+_OPTIONAL = ("optional", "may_fail")
+_YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
+
+Pair = tuple[Hashable, Hashable]
+Row = tuple[str, str, Fraction, Fraction]
+
+
+def read_family(
+    paths: Source | Sequence[Source],
+    *,
+    uncertainty: Any = 0,
+    optional: Iterable[Pair] = (),
+    orientation: str | None = None,
+    undirected: bool = False,
+    **options: Any,
+) -> Family:
+    r"""Read a family of signed digraphs: one mode from each file.
+
+    An edge list whose header names ``weight_min`` and ``weight_max`` gives the interval of each weight, with its sign:
+    ``-3,-2`` is an opponent; 0 at one end is an edge that may fail; 0 inside, a weight of unknown sign, becomes two
+    such edges, one of each sign. A column ``optional`` (yes or no) marks edges that may fail. Any other file is read
+    as :func:`read_graph` reads it.
+
+    Parameters
+    ----------
+    paths : path, file object, or sequence of these
+        Several files are modes, of which any may act at any instant; each is named by its file.
+    uncertainty : number or str
+        Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
+    optional : iterable of (source, target)
+        Edges that may fail, in every mode that has them.
+    orientation, undirected
+        As in :func:`read_graph`; an undirected edge is one parameter, both directions change together.
+    **options : keywords of :func:`read_graph`
+        Not for files with intervals.
+
+    Returns
+    -------
+    Family
+
+    Raises
+    ------
+    FormatError
+        A file is no graph; an interval is empty, has both ends 0, or occurs twice: the line is named.
+    GraphError
+        An optional edge is in no file, or two files have different nodes.
+
+    Examples
+    --------
+    >>> family = read_family(StringIO("source,target,weight_min,weight_max\na,b,1,2\nb,a,-1,0\n"))
+    >>> family, family.modes[0].edge_interval(0)
+    (Family(2 nodes, 2 of 2 weights uncertain, 1 edges optional), (Fraction(-1, 1), Fraction(0, 1)))
+    >>> read_family([StringIO("a,b,1"), StringIO("b,a,1")], uncertainty="10%")
+    Family(2 nodes, 2 modes, 2 of 2 weights uncertain)
+    """
+    one = isinstance(paths, str | Path) or hasattr(paths, "read")
+    sources: list[Any] = [paths] if one else list(paths)  # type: ignore[arg-type]
+    share, wanted = read_share(uncertainty), [(str(s), str(t)) for s, t in optional]
+    named: dict[str, Family] = {}
+    missing = set(wanted)
+    for number, path in enumerate(sources, 1):
+        rows = _interval_rows(path, orientation or "information", share)
+        name = Path(str(path)).name.partition(".")[0] if isinstance(path, str | Path) else str(number)
+        name = name if name not in named else f"{name} ({number})"
+        if rows is not None:
+            if options.get("duplicates", "refuse") != "refuse" or options.get("drop_self_loops"):
+                raise ParameterError("rows with intervals are neither merged nor dropped; mend them in the file")
+            nodes, edges = rows
+            off = set(wanted) & {pair for edge in edges for pair in _both(edge[:2], undirected)}
+            edges = [_may_fail(edge) if off & set(_both(edge[:2], undirected)) else edge for edge in edges]
+            named[name] = Family.from_intervals(edges, nodes, undirected=undirected)
+        else:
+            graph = read_graph(path, orientation=orientation, undirected=undirected, **options)
+            off = {pair for pair in wanted if _has(graph, pair)}
+            named[name] = Family.from_graph(graph, uncertainty=share, optional=off)
+        missing -= off
+    if missing:
+        source, target = min(missing)
+        raise GraphError(f"optional edge {shorten(source)} -> {shorten(target)} is in no file; check the labels")
+    return Family.switching(named)
+
+
+def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
+    return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
+
+
+def _has(graph: SignedDigraph, pair: tuple[str, str]) -> bool:
+    source, target = (graph.index.get(label) for label in pair)
+    return bool(((graph.source == source) & (graph.target == target)).any())
+
+
+def _may_fail(row: Row) -> Row:
+    return row[0], row[1], min(row[2], Fraction(0)), max(row[3], Fraction(0))
+
+
+def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[list[str], list[Row]] | None:
+    """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files."""
+    name, ending = name_and_ending(path)
+    if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
+        return None
+    data = read_bytes(path, name)
+    if hasattr(path, "seek"):
+        path.seek(0)
+    lines = [(number, [field.strip() for field in row]) for number, row in records(data, name) if any(row)]
+    first = next((row for _, row in lines if len(row) > 1), [])
+    columns = [column(first, names, name) for names in (_LEAST, _LARGEST, _OPTIONAL)]
+    if columns == [None, None, None] or (ends := edge_columns(first, name)) is None:
+        return None
+    low, high, may_fail = columns
+    if (low is None) != (high is None):
+        raise FormatError(f"{name}: the header names one end of the intervals; name weight_min and weight_max")
+    if low is None and ends[2] is None:
+        raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
+    if orientation != "information":
+        ends = ends[1], ends[0], ends[2]
+    nodes: dict[str, None] = {}
+    rows: dict[tuple[str, str], tuple[int, Row]] = {}
+    for number, row in lines[1 + next(k for k, (_, fields) in enumerate(lines) if fields == first) :]:
+        where = f"{name}, line {number}"
+        if len([*filter(None, row)]) == 1:
+            nodes[row[0] or row[-1]] = None
+            continue
+        edge = _row(row, ends, (low, high, may_fail), where, share)
+        nodes |= dict.fromkeys(edge[:2])
+        if edge[:2] in rows:
+            mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
+            raise FormatError(
+                f"{where}: second row for edge {_text(edge)} (the first is line {rows[edge[:2]][0]}); {mend}"
+            )
+        rows[edge[:2]] = number, edge
+    return list(nodes), [row for _, row in rows.values()]
+
+
+def _text(edge: Sequence[Any]) -> str:
+    return f"{shorten(edge[0])} -> {shorten(edge[1])}"
+
+
+def _row(
+    row: list[str],
+    ends: tuple[int, int, int | None],
+    columns: Sequence[int | None],
+    where: str,
+    share: Fraction,
+) -> Row:
+    """Return source, target, least and largest weight of a row, or refuse it."""
+    field = lambda k: row[k] if k is not None and k < len(row) else ""  # noqa: E731
+    source, target = field(ends[0]), field(ends[1])
+    edge = _text((source, target))
+    if not source or not target:
+        raise FormatError(
+            f"{where}: the {'source' if not source else 'target'} is empty; name a node or remove the row"
+        )
+    low, high, may_fail = columns
+    try:
+        if low is None:
+            weight = parse_exact(field(ends[2]))
+            least, largest = sorted((weight * (1 - share), weight * (1 + share)))
+        else:
+            least, largest = parse_exact(field(low)), parse_exact(field(high))
+    except NumberError as error:
+        raise FormatError(f"{where}: edge {edge}: {error}; give a number") from None
+    answer = field(may_fail).lower()
+    if answer not in (*_YES, *_NO):
+        raise FormatError(f"{where}: optional is {shorten(answer)}; write yes or no")
+    if least > largest:
+        raise FormatError(
+            f"{where}: edge {edge}: its least weight {least} is above its largest {largest}; exchange them"
+        )
+    if least == largest == 0:
+        raise FormatError(f"{where}: edge {edge}: its weight is always 0; remove the row")
+    if source == target:
+        raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it")
+    found = source, target, least, largest
+    return _may_fail(found) if answer in _YES else found
