@@ -230,7 +230,7 @@ def _component(
         behaviour = DEPENDS
     else:
         kernel = _check_kernel(doc, modes, inside, witness)
-        behaviour = DEPENDS if not kernel else INTERVAL if balanced[0] == 1 else CONTAINMENT
+        behaviour = DEPENDS if not kernel else INTERVAL if closed == [1] * len(modes) else CONTAINMENT
         return Component(nodes, camps, closed, balanced, behaviour)
     need(witness is None, "a witness that nothing asks for")
     return Component(nodes, camps, closed, balanced, behaviour)

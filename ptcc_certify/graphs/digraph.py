@@ -214,7 +214,7 @@ class SignedDigraph(Shown):
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
-        _refuse_unknown_orientation(orientation)
+        refuse_unknown_orientation(orientation)
         known: dict[str, tuple[int, Hashable]] = {}
 
         def number(node: Hashable) -> int:
@@ -289,7 +289,7 @@ class SignedDigraph(Shown):
                 'a matrix does not tell its direction: say orientation="listens" if row k holds whom k listens to (the '
                 'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
             )
-        _refuse_unknown_orientation(orientation)
+        refuse_unknown_orientation(orientation)
         if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
@@ -582,7 +582,18 @@ _READ_DEFAULT: dict[str, Any] = {
 }
 
 
-def _refuse_unknown_orientation(orientation: str) -> None:
+def refuse_unknown_orientation(orientation: str) -> None:
+    """Refuse an orientation that is neither "information" nor "listens".
+
+    Raises
+    ------
+    GraphError
+        It is another.
+
+    Examples
+    --------
+    >>> refuse_unknown_orientation("listens")
+    """
     if orientation not in ("information", "listens"):
         raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
 
