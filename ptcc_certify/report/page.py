@@ -140,7 +140,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
     commands = [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]
     notes = saved.document["unverified"].get("notes")
     sizes = Counter(part.partition(", ")[2] for part in agent_parts(saved))
-    named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "unbalanced": "unbalanced"}
+    named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "alone": "alone", "unbalanced": "unbalanced"}
     peaks = effort.peak.agents if effort and effort.peak else ()
     verdict_text, larger_rho2 = _in_words(saved)
     return texts.facts(saved) | {

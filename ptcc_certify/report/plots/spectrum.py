@@ -117,6 +117,9 @@ def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
         if own:
             points = [m.overshoot_above for m in own], [m.rate_below for m in own]
             ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
+    constants = [m.overshoot_above for m in functions]
+    low, high = ax.get_xlim()
+    ax.set_xlim(min(low, min(constants) / 1.5), max(high, max(constants) * 1.5))  # room for ticks that differ
     rates = [m.rate_below for m in functions]
     if certificate.upper_bound is not None:
         limit = float_up(certificate.upper_bound)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
@@ -41,7 +42,7 @@ def trajectory_of(subject: Any) -> Trajectory:
     Raises
     ------
     ParameterError
-        The subject is neither, the certificate has no initial state, or the run has several.
+        The subject is neither, the certificate has no initial state, or the run has several or one that is not finite.
 
     Examples
     --------
@@ -61,6 +62,8 @@ def trajectory_of(subject: Any) -> Trajectory:
         )
     if run.states.ndim != 2:
         raise ParameterError(f"the trajectory holds {run.states.shape[1]} initial states; draw a run of one")
+    if not np.isfinite(run.states).all():
+        raise ParameterError("the trajectory holds states that are not finite; draw a run that ends well")
     return run
 
 
@@ -76,6 +79,19 @@ def structure_of(subject: Any) -> Structure:
     if isinstance(subject, Structure):
         return subject
     return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
+
+
+def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
+    """Name what limits the gain of a run, or say that a certificate's limits do not."""
+    limits = run.actuator
+    if limits is None:
+        return "without the limits of the gain" if certificate is not None and certificate.limits else ""
+    names = {
+        "gain at most ": limits.gain_cap,
+        "off from $T$ - ": limits.stop_before,
+        "held over ": limits.sample_period,
+    }
+    return ", ".join(f"{name}{near(number)}" for name, number in names.items() if number is not None)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:
