@@ -202,7 +202,7 @@ def agent_parts(saved: Certificate) -> list[str]:
         name = f"leader of group {k}" if len(groups) > 1 else "leader"
         for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
             camp = {1: "camp 1", -1: "camp 2", 0: "unbalanced"}[sign]
-            parts[v] = f"{name}, {camp if len(component.nodes) > 1 else 'alone'}"
+            parts[v] = f"{name}, {'alone' if len(component.nodes) == 1 else camp}"
     return parts
 
 

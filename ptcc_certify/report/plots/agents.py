@@ -115,7 +115,8 @@ def name_agents(
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
     rooms = [10 + max(text_width(name) for _, _, name, _ in column) for column in texts]
     width = ax.get_window_extent().width / ax.figure.dpi * 72
-    left = (last - first) * rooms[0] / max(width - sum(rooms), width / 4)
+    width = min([0.8 * width, *(width - room for room in rooms[1:])])  # without names at the end, in any panel
+    left = (last - first) * rooms[0] / max(width - rooms[0], width / 3)
     ticks = MaxNLocator(tick_count(ax.xaxis, 5), steps=STEPS).tick_values(first, last)
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)

@@ -29,6 +29,8 @@ INSIDE, BESIDE = 3, 15
 WEIGHED_ARROWS = 24
 #: Where a weight may stand, as shares of its arrow; the first is best.
 WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
+#: Boxes along an arrow of three points each; its own weight keeps off so many at either end.
+BOX, NEAR_ENDS = 3, 5
 #: Height of the drawing in inches.
 _HEIGHT = 3.4
 
@@ -83,9 +85,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     _draw_nodes(ax, structure, place, radius)
     _draw_arrows(ax, arrows, place, bends, radius)
     lines = _boxes_along(arrows, place, bends)
-    heads = _boxes_of_heads(arrows, place, bends, radius + 4)
     written = _draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
-    _draw_weights(ax, arrows, place, bends, written + heads, lines)
+    _draw_weights(ax, arrows, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
     ax.set_ylim(-height / 2, height / 2)
@@ -177,8 +178,8 @@ def _draw_weights(
         along = place[arrow.target] - place[arrow.source]
         beside = along[::-1] * [1, -1] / np.linalg.norm(along) * (np.linalg.norm(half) + 1)
         spots += [spots[0] + beside, spots[0] - beside]
-        foreign = [box for line in lines[:k] + lines[k + 1 :] for box in line]
-        box = _least_covered(spots, half, taken + foreign)
+        others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
+        box = _least_covered(spots, half, [*taken, *(box for line in others for box in line)])
         taken.append(box)
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
@@ -188,19 +189,8 @@ def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) 
     """Return small boxes along each arrow, which leave no gaps."""
     boxes = []
     for (a, b, *_), bend in zip(arrows, bends, strict=True):
-        along = np.linspace(0.06, 0.94, 2 + int(np.linalg.norm(place[b] - place[a]) / 3))
-        boxes.append([np.array([*(p - 1.5), *(p + 1.5)]) for p in arc(place[a], place[b], bend, along)])
-    return boxes
-
-
-def _boxes_of_heads(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, far: float) -> list[np.ndarray]:
-    """Return boxes about the heads of arrows, so far from the middles of their nodes."""
-    boxes = []
-    for arrow, bend in zip(arrows, bends, strict=True):
-        curve = arc(place[arrow.source], place[arrow.target], bend)
-        for node in [arrow.target] + [arrow.source] * arrow.mutual:
-            p = curve[np.abs(np.linalg.norm(curve - place[node], axis=1) - far).argmin()]
-            boxes.append(np.array([*(p - 3.5), *(p + 3.5)]))
+        along = np.linspace(0.06, 0.94, 2 + int(np.linalg.norm(place[b] - place[a]) / BOX))
+        boxes.append([np.array([*(p - BOX / 2), *(p + BOX / 2)]) for p in arc(place[a], place[b], bend, along)])
     return boxes
 
 

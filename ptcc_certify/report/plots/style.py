@@ -188,13 +188,10 @@ def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
 def share_legend(figure: Figure, columns: int) -> Figure:
     """Put one legend above all panels of a figure in the place of theirs."""
     shared: dict[str, Any] = {}
-    titles: dict[str, None] = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             shared.setdefault(label, handle)
         if (own := ax.get_legend()) is not None:
-            titles |= {text: None for text in [own.get_title().get_text()] if text}
             own.remove()
-    title = "\n".join(titles)
-    figure.legend(shared.values(), shared.keys(), loc="outside upper center", ncols=columns, frameon=False, title=title)
+    figure.legend(shared.values(), shared.keys(), loc="outside upper center", ncols=columns, frameon=False)
     return figure

@@ -14,28 +14,6 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
 
 
-def certificate_of(subject: Any) -> Certificate:
-    """Return a certificate as it is, and refuse anything else.
-
-    Raises
-    ------
-    ParameterError
-        The subject is no certificate.
-
-    Examples
-    --------
-    >>> from ptcc_certify.report.plots.subject import certificate_of
-    >>> certificate_of("fig1b")
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; certify the graph first
-    """
-    if isinstance(subject, Certificate):
-        return subject
-    raise ParameterError(
-        f"this figure is drawn from a certificate, not from {type(subject).__name__}; certify the graph first"
-    )
-
-
 def trajectory_of(subject: Any) -> Trajectory:
     """Return a run of one initial state: the subject itself, or that of a certificate, which is simulated if need be.
 
@@ -86,12 +64,9 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     limits = run.actuator
     if limits is None:
         return "without the limits of the gain" if certificate is not None and certificate.limits else ""
-    names = {
-        "gain at most ": limits.gain_cap,
-        "off from $T$ - ": limits.stop_before,
-        "held over ": limits.sample_period,
-    }
-    return ", ".join(f"{name}{near(number)}" for name, number in names.items() if number is not None)
+    numbers = (limits.gain_cap, limits.stop_before, limits.sample_period)
+    named = zip(("gain at most", "off from $T$ -", "held over"), numbers, strict=True)
+    return ", ".join(f"{name} {near(number)}" for name, number in named if number is not None)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:
