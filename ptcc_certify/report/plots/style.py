@@ -14,7 +14,7 @@ from matplotlib import rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure, FigureBase
-from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
@@ -158,16 +158,30 @@ def place_ticks(axis: Axis) -> None:
     axis.set_major_formatter("{x:g}")
 
 
-def finished(ax: Axes, x: str, y: str) -> Axes:
+def factor_out(axis: Axis, label: str) -> str:
+    """Return the label of an axis with the power of ten that its ticks leave out, which would lie on the legend."""
+    formatter = axis.get_major_formatter()
+    if not isinstance(formatter, ScalarFormatter):
+        return label
+    formatter.set_useOffset(False)
+    formatter.set_useMathText(False)
+    formatter.set_locs(axis.get_majorticklocs())  # type: ignore[arg-type]
+    axis.get_offset_text().set_visible(False)
+    power = formatter.get_offset().removeprefix("1e")
+    return f"{label} / $10^{{{power}}}$" if power else label
+
+
+def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
     """Name the axes, and put the legend above them, where it covers no data, in as many columns as its width takes."""
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    for axis in (ax.xaxis, ax.yaxis):
+    for axis, label in ((ax.xaxis, x), (ax.yaxis, y)):
         place_ticks(axis)
+        axis.set_label_text(factor_out(axis, label) if label else "")
     if ax.get_legend_handles_labels()[0]:
         width = ax.get_window_extent().width / ax.figure.dpi
         columns = 1 if width < 2.2 else 2 if width < 4 else 3
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2)
+        ax.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, title=title
+        )
     return ax
 
 
