@@ -1,8 +1,8 @@
 """The command line ``ptcc``: parses, calls, prints.
 
 Exit codes: 0 proved and everything asked holds; 1 a bound is violated, or a certificate rejected; 2 bad input or
-usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything
-else to standard error.
+usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program; 130 Ctrl-C; 141 who reads the output has
+gone. Data go to standard output, everything else to standard error.
 
 Modules are named after their commands. :mod:`~ptcc_certify.cli.options` are those that several share, and what becomes
 of them; :mod:`~ptcc_certify.cli.terminal` prints.
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import os
-import re
 import sys
 from typing import Any
 
@@ -40,7 +39,7 @@ __all__ = ["cli", "main"]
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
-#: What the help says of each command, and in which order: these words, or those of the command itself.
+#: What the help says of each command, and in which order.
 GROUPS = {
     "Ask about a graph": {
         "classify": "Tell its structure and the theorem that applies.",
@@ -68,16 +67,12 @@ class _Commands(click.Group):
     """Commands in groups, each with one plain line; near names of one that is not there."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        named = [name for group in GROUPS.values() for name in group if name in self.commands]
-        return [*named, *(name for name in self.commands if name not in named)]
+        return [name for group in GROUPS.values() for name in group]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        lines = {name: command.get_short_help_str(60) for name, command in self.commands.items()}
-        for title, group in {**GROUPS, "More": {}}.items():
-            rows = [(name, text) for name, text in group.items() if lines.pop(name, None) is not None]
-            if rows := rows if group else list(lines.items()):
-                with formatter.section(title):
-                    formatter.write_dl(rows)
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(group.items()))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -91,12 +86,15 @@ class _Commands(click.Group):
         try:
             return super().invoke(ctx)
         except (PTCCError, click.BadParameter) as error:
-            raise placed(ctx, _with_near_choices(error)) from None
+            raise placed(ctx, error) from None
         except click.NoSuchOption as error:
-            files = [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]  # noqa: PTH110
-            if not files:
+            if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
+                raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
+            others = {n: [o for p in c.params for o in p.opts] for n, c in self.commands.items()}
+            having = [f"ptcc {name}" for name, flags in others.items() if error.option_name in flags]
+            if not having:
                 raise
-            raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
+            raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}") from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
@@ -130,15 +128,6 @@ for command in (
     cli.add_command(command)
 
 
-def _with_near_choices(error: PTCCError | click.BadParameter) -> PTCCError | click.BadParameter:
-    """Return the refusal of a value that is none of an option's, with those that are near it."""
-    if not isinstance(error, click.BadParameter) or not error.param or not isinstance(error.param.type, click.Choice):
-        return error
-    given = re.match("'(.*)' is not one of", error.message)
-    hint = did_you_mean(given[1], map(str, error.param.type.choices)) if given else ""
-    return click.BadParameter(error.message.rstrip(".") + hint, error.ctx, error.param) if hint else error
-
-
 def main() -> None:
     """Run ``ptcc`` and exit with its code; every refusal is one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
@@ -160,11 +149,11 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         click.echo("ptcc: interrupted", err=True)
         code = ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        code = ExitCode.OK
-        sys.stderr.close()
+    except SystemExit:  # by click, where who reads the output has gone; the code is that of other programs then
+        code = 141
     except OSError as error:
         code = _refuse(f"the result cannot be written ({error.strerror or error})")
+        sys.stdout = sys.stderr  # Python would try again at its end
     except ModuleNotFoundError:
         raise  # what is told of a package that is missing is in ptcc_certify.__main__
     except Exception as error:

@@ -91,9 +91,7 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
         limits = [] if actuator is None else [actuator]
-        return more | {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
-    if options["noise"] is not None:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
+        more |= {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
     return more
 
 

@@ -138,13 +138,15 @@ def refuse_as_certificate(path: str) -> None:
 
 
 def near_files(path: str, names: tuple[str, ...] = ()) -> str:
-    """Return near names of files in the folder of a path that does not exist, and of ``names``."""
+    """Return near names of files in the folder of a path that does not exist, and ``names``; endings do not count."""
     try:
         with os.scandir(Path(path).parent) as entries:
             files = [entry.name for entry in islice(entries, 5000)]
     except (OSError, ValueError):
         files = []
-    return did_you_mean(Path(path).name, [*names, *files])
+    wanted = Path(path).name
+    start = wanted.partition(".")[0]
+    return did_you_mean(wanted, [name for name in (*names, *files) if did_you_mean(start, [name.partition(".")[0]])])
 
 
 def shell_word(text: str) -> str:

@@ -16,7 +16,7 @@ import click
 
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario
+from ptcc_certify.cli.scenario import FOREIGN, graph_of, is_scenario, kind_of_protocol, read_scenario
 from ptcc_certify.errors import NumberError, ParameterError, PTCCError
 
 if TYPE_CHECKING:
@@ -112,6 +112,8 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 #: Options whose value is an exact number.
 number_option = partial(click.option, callback=_exact)
+#: Options that are true or false, also where a scenario has the other.
+_switch = partial(click.option, default=False, show_default=False)
 
 
 def expect_option(text: str) -> Callable[[Any], Any]:
@@ -133,8 +135,8 @@ reading_options = _options(
         default="refuse",
         help="What becomes of two rows for one ordered pair.",
     ),
-    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
-    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
+    _switch("--drop-self-loops/--no-drop-self-loops", help="Ignore edges of a node to itself."),
+    _switch("--undirected/--no-undirected", help="Every row counts in both directions."),
 )
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
@@ -251,15 +253,13 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     nominal = options["kind"] == "nominal"
-    others = (*_SLIDING, "disturbance", "sigma0") if nominal else LIMITS
-    for name in others:
-        if options.get(name) is not None and not (nominal and name in disturbed):
-            other = "sliding-mode" if nominal else "nominal"
-            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; leave it out or change the protocol")
+    other = "sliding-mode" if nominal else "nominal"
+    for name in (*FOREIGN[options["kind"]], *["delta"] * nominal):
+        if options.get(name) is not None and name not in disturbed:
+            mend = "the deadline is --T-r plus --T-s" if name == "T" else "leave it out or change the protocol"
+            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; {mend}")
     if nominal:
         return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
-    if options["T"] is not None:
-        raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
     defaults = {name: default for name, (default, _) in _SLIDING.items()} | {"delta": "1"}
     own = {name: default if options[name] is None else options[name] for name, default in defaults.items()}
     return SlidingModeProtocol(**own, **shared)
@@ -277,6 +277,13 @@ def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph)
         "sigma0": _sigma0(options["sigma0"], seed, graph),
         "disturbance": as_disturbance(source, graph.n_nodes, sliding.delta, horizon, seed),
     }
+
+
+def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
+    """Return what acts on a simulated run, as the library takes it."""
+    if protocol.reaching is not None:
+        return sliding_keywords(protocol, options, graph)
+    return {"actuator": actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
 
 
 def actuator_of(options: Options) -> GainLimits | None:

@@ -116,14 +116,12 @@ def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Tr
     if what in ("graph", "spectrum"):
         return signed, protocol
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    more = shared.sliding_keywords(protocol, options, signed)
     if what == "decay":
+        more = shared.sliding_keywords(protocol, options, signed)
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
-    if options["kind"] == "nominal":
-        more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
-    return simulate(signed, protocol, x0, **more)
+    return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
 def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:

@@ -49,7 +49,7 @@ class Screen:
 
         if not self.quiet:
             width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
-            print_lines(wrap_lines(long(), width) if self.verbose else short())
+            click.echo("\n".join(wrap_lines(long(), width) if self.verbose else short()))
 
     def note(self, text: str) -> None:
         """Print one more line on standard output."""
@@ -76,11 +76,6 @@ def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def _on_terminal(stream: Any) -> bool:
     """Tell whether a stream is a terminal; one that was closed before the start is None."""
     return stream is not None and stream.isatty()
-
-
-def print_lines(lines: Sequence[str]) -> None:
-    """Print lines."""
-    click.echo("\n".join(lines))
 
 
 def print_json(data: Any) -> None:

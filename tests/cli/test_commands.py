@@ -182,10 +182,6 @@ def test_a_run_tells_what_was_written_and_meets_noise():
     assert "gain_cap or stop_before" in ptcc("simulate", "team.csv", "--noise", "0.1").err
 
 
-def test_a_value_near_a_choice_is_told():
-    assert "did you mean listens?" in ptcc("classify", "team.csv", "--edges", "listen").err
-
-
 # ---------------------------------------------------------------------- plot
 
 

@@ -8,17 +8,20 @@ import re
 import secrets
 import shutil
 import sys
+import tomllib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from ptcc_certify.errors import FormatError, PTCCError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import MAX_BYTES, MAX_LINE
 
+#: A key or a header of 32 parts, for which tomllib takes the square of their number.
+_DEEP = re.compile(r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]
 
 
@@ -99,6 +102,24 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     return shorten(" ".join(str(error).split()), 160) or type(error).__name__
+
+
+def parse_toml(data: bytes, name: str, number: Callable[[str], Any]) -> dict[str, Any]:
+    """Read TOML whose decimals become ``number(text)``, exactly, as in every other input.
+
+    Examples
+    --------
+    >>> parse_toml(b"T = 1_000.5", "a.toml", str)
+    {'T': '1000.5'}
+    """
+    try:
+        text = data.decode("utf-8").removeprefix("\ufeff")
+        if _DEEP.search(text):
+            raise ValueError("a name of more than 32 parts")
+        return tomllib.loads(text, parse_float=lambda digits: number(digits.replace("_", "")))
+    except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
+        reason = shorten(" ".join(str(error).split()), 160)
+        raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
 
 
 @contextmanager
