@@ -39,26 +39,26 @@ __all__ = ["cli", "main"]
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
-#: What the help says of each command, and in which order.
+#: The commands, and what the help says of each, in this order.
 GROUPS = {
     "Ask about a graph": {
-        "classify": "Tell its structure and the theorem that applies.",
-        "certify": "Prove what the protocol does on it; write a certificate.",
-        "simulate": "Run the protocol: a table, or a figure of the states.",
-        "design": "Find gains and a deadline that keep the input within limits.",
-        "batch": "Certify many graphs: one table.",
+        classify.classify: "Tell its structure and the theorem that applies.",
+        certify.certify: "Prove what the protocol does on it; write a certificate.",
+        simulate.simulate: "Run the protocol: a table, or a figure of the states.",
+        design.design: "Find gains and a deadline that keep the input within limits.",
+        batch.batch: "Certify many graphs: one table.",
     },
     "Certificates": {
-        "check": "Check a certificate exactly, without a solver.",
-        "report": "Write a page, or LaTeX, to send to somebody.",
-        "plot": "Draw a figure of a certificate or a graph.",
+        check_and_report.check: "Check a certificate exactly, without a solver.",
+        check_and_report.report: "Write a page, or LaTeX, to send to somebody.",
+        plot.plot: "Draw a figure of a certificate or a graph.",
     },
     "Set up and learn": {
-        "new": "Write a commented scenario file to begin with.",
-        "examples": "Run the paper's examples, figures included.",
-        "explore": "Try graph, deadline and gains in a browser.",
-        "cite": "Print BibTeX of the theorem used.",
-        "completion": "Complete names with TAB in bash, zsh or fish.",
+        new.new: "Write a commented scenario file to begin with.",
+        examples_and_cite.examples: "Run the paper's examples, figures included.",
+        explore.explore: "Try graph, deadline and gains in a browser.",
+        examples_and_cite.cite: "Print BibTeX of the theorem used.",
+        completion.completion: "Complete names with TAB in bash, zsh or fish.",
     },
 }
 
@@ -67,12 +67,12 @@ class _Commands(click.Group):
     """Commands in groups, each with one plain line; near names of one that is not there."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [name for group in GROUPS.values() for name in group]
+        return [name for group in GROUPS.values() for command in group if (name := command.name)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         for title, group in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl(list(group.items()))
+                formatter.write_dl([(command.name or "", text) for command, text in group.items()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -110,22 +110,9 @@ def cli() -> None:
     """
 
 
-for command in (
-    new.new,
-    classify.classify,
-    certify.certify,
-    check_and_report.check,
-    check_and_report.report,
-    simulate.simulate,
-    design.design,
-    plot.plot,
-    explore.explore,
-    examples_and_cite.examples,
-    batch.batch,
-    examples_and_cite.cite,
-    completion.completion,
-):
-    cli.add_command(command)
+for group in GROUPS.values():
+    for command in group:
+        cli.add_command(command)
 
 
 def main() -> None:

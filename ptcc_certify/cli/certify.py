@@ -90,8 +90,7 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
-        limits = [] if actuator is None else [actuator]
-        more |= {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
+        more |= {"limits": [] if actuator is None else [actuator], "delta": options["delta"], "noise": options["noise"]}
     return more
 
 

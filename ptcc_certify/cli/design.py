@@ -47,6 +47,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
     The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
+    A saturation, a sample period and noise are not searched under: give them to that command.
 
     Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """

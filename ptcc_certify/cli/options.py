@@ -17,7 +17,7 @@ import click
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.cli.scenario import FOREIGN, graph_of, is_scenario, kind_of_protocol, read_scenario
-from ptcc_certify.errors import NumberError, ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -142,7 +142,6 @@ reading_options = _options(
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED)
 )
-graph_options = _options(graph_argument, reading_options)
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
 protocol_options = _options(
     click.option(
@@ -295,14 +294,9 @@ def actuator_of(options: Options) -> GainLimits | None:
 
 
 def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
-    from ptcc_certify.graphs.rationals import parse_exact
-
-    try:
-        if text is None or parse_exact(text) == 0:
-            return [Fraction(0)] * graph.n_nodes
-    except NumberError:
-        pass
-    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: sigma(0)")
+    if text is None or ("0" in text and not text.strip("0. ")):
+        return [Fraction(0)] * graph.n_nodes
+    return read_initial_state(text, [seed, 1], graph, "--sigma0: sigma(0)")
 
 
 def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:

@@ -221,7 +221,9 @@ def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
         if section not in SECTIONS:
             what = "section" if isinstance(keys, dict) else "key outside of a section"
             hint = did_you_mean(section, SECTIONS) if isinstance(keys, dict) else _where(section)
-            raise ParameterError(f"{name}: [{shorten(section)}]: no such {what}{hint or '; ' + _list(SECTIONS)}")
+            raise ParameterError(
+                f"{name}: [{shorten(section)}]: no such {what}{hint or '; there are ' + ', '.join(SECTIONS)}"
+            )
         if not isinstance(keys, dict):
             raise ParameterError(f"{name}: [{section}]: is a section; write its keys below [{section}]")
     return sections
@@ -234,10 +236,6 @@ def _texts(value: Any) -> Any:
     if isinstance(value, list):
         return [_texts(part) for part in value]
     return value if isinstance(value, bool) else str(value)
-
-
-def _list(names: Mapping[str, Any]) -> str:
-    return f"there are {', '.join(names)}"
 
 
 def _where(key: str) -> str:

@@ -16,7 +16,8 @@ _TABLES = ("", ".csv", ".txt")
 
 
 @click.command()
-@shared.graph_options
+@shared.graph_argument
+@shared.reading_options
 @shared.protocol_options
 @shared.limit_options
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")

@@ -85,12 +85,14 @@ def print_json(data: Any) -> None:
 
 def refuse_output(output: str | None) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
-    if not output:
+    if output is None:
         return
-    if output == "-":
+    if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out (certify: and say --json)")
     if not Path(output).parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if not os.access(Path(output).parent, os.W_OK) and not os.path.exists(output):  # noqa: PTH110 - Path.exists may raise
+        raise ParameterError(f"{output}: nothing may be written to this folder; name another one")
     _refuse_input(output, output)
 
 

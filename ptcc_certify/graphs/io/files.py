@@ -163,10 +163,10 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
     name = shorten(os.fspath(path), 200)
     try:
         content = data.encode("utf-8") if isinstance(data, str) else data
-        target = Path(os.path.realpath(path))
-        if target.exists() and not target.is_file():
-            target.write_bytes(content)
+        if os.path.exists(path) and not os.path.isfile(path):  # noqa: PTH110, PTH113 - of a pipe the real path is none
+            Path(path).write_bytes(content)
             return
+        target = Path(os.path.realpath(path))
         temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
         try:
             with temporary.open("xb") as file:
