@@ -107,6 +107,11 @@ def _reason(error: BaseException) -> str:
 def parse_toml(data: bytes, name: str, number: Callable[[str], Any]) -> dict[str, Any]:
     """Read TOML whose decimals become ``number(text)``, exactly, as in every other input.
 
+    Raises
+    ------
+    FormatError
+        It is none, nests too deep, or has a name of more than 32 parts.
+
     Examples
     --------
     >>> parse_toml(b"T = 1_000.5", "a.toml", str)
