@@ -90,9 +90,8 @@ class _Commands(click.Group):
         except click.NoSuchOption as error:
             if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
                 raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
-            others = {n: [o for p in c.params for o in p.opts] for n, c in self.commands.items()}
-            having = [f"ptcc {name}" for name, flags in others.items() if error.option_name in flags]
-            if not having:
+            flag, others = error.option_name, self.commands.items()
+            if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 raise
             raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}") from None
 

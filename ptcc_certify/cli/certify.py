@@ -89,8 +89,8 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     more |= {"initial_set": options["initial_bound"]}
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
-        actuator = shared.actuator_of(options)
-        more |= {"limits": [] if actuator is None else [actuator], "delta": options["delta"], "noise": options["noise"]}
+        own = {name: options[name] for name in ("delta", "noise")}
+        return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
     return more
 
 

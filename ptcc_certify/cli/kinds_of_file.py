@@ -145,12 +145,9 @@ def near_files(path: str, names: tuple[str, ...] = ()) -> str:
             files = [entry.name for entry in islice(entries, 5000)]
     except (OSError, ValueError):
         files = []
-    stem, stems = _stem(path), {name: _stem(name) for name in (*names, *files)}
-    return did_you_mean(Path(path).name, [name for name in stems if get_close_matches(stem, [stems[name]], cutoff=0.7)])
-
-
-def _stem(path: str) -> str:
-    return Path(path).name.partition(".")[0].lower()
+    stem = Path(path).name.partition(".")[0].lower()
+    near = [n for n in (*names, *files) if get_close_matches(stem, [n.partition(".")[0].lower()], cutoff=0.7)]
+    return did_you_mean(Path(path).name, near)
 
 
 def shell_word(text: str) -> str:

@@ -221,9 +221,8 @@ def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
         if section not in SECTIONS:
             what = "section" if isinstance(keys, dict) else "key outside of a section"
             hint = did_you_mean(section, SECTIONS) if isinstance(keys, dict) else _where(section)
-            raise ParameterError(
-                f"{name}: [{shorten(section)}]: no such {what}{hint or '; there are ' + ', '.join(SECTIONS)}"
-            )
+            hint = hint or f"; there are {', '.join(SECTIONS)}"
+            raise ParameterError(f"{name}: [{shorten(section)}]: no such {what}{hint}")
         if not isinstance(keys, dict):
             raise ParameterError(f"{name}: [{section}]: is a section; write its keys below [{section}]")
     return sections

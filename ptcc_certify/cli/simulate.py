@@ -51,8 +51,7 @@ def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **optio
     if vectors and options["kind"] != "nominal":
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = shared.read(graph, options)
-    more = shared.run_keywords(protocol, options, signed)
-    more |= {name: options[name] for name in ("samples", "boundary_layer")}
+    more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         more |= {"noise": "telegraph", "noise_bound": options["noise"]}
     if (steps := options["steps"]) is not None:
