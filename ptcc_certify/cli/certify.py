@@ -89,11 +89,8 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     more |= {"initial_set": options["initial_bound"]}
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
-        actuator = shared.actuator_of(options)
-        limits = [] if actuator is None else [actuator]
-        return more | {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
-    if options["noise"] is not None:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
+        own = {name: options[name] for name in ("delta", "noise")}
+        return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
     return more
 
 
