@@ -64,12 +64,11 @@ def disturbed_lines(certificate: Certificate) -> Lines:
     effort = certificate.effort
     if effort is not None and (d := effort.disturbed) is not None:
         held = any(entry.sample_period is not None for entry in certificate.limits)
-        text = (
-            f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|" + ", without the hold" * held
-        )
-        if d.drift is not None and not certificate.limits:
-            most = max(d.drift)
-            text += f" and moves x_k(T) by at most {up(most, 4)}" if most else " and moves no x_k(T)"
+        text = f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|"
+        if d.drift is None or certificate.limits:
+            text += " without a sample period" * held + "; how far it moves x(T) is not proved"
+        else:
+            text += f" and moves x_k(T) by at most {up(max(d.drift), 4)}" if any(d.drift) else " and moves no x_k(T)"
         yield "disturbed", text
 
 

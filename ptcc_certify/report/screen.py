@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -27,10 +28,12 @@ from ptcc_certify.report.structure_text import (
 )
 from ptcc_certify.report.text_layout import (
     TEXT,
+    columns,
     counted,
     format_lines,
     printable,
     short_number,
+    shorten_label,
     shorten_list,
     shorten_text,
     value_list,
@@ -109,7 +112,9 @@ def structure_summary(structure: Structure, name: str) -> list[str]:
 
     def lines() -> Lines:
         yield from graph_entries(structure, name)
-        yield from ((head, shorten_text(text, TEXT)) for head, text in leader_lines(structure, 3, 20))
+        for head, text in leader_lines(structure, 3, 20):
+            whole = columns(text) <= TEXT
+            yield head, text if whole else shorten_text(text.partition(", negative cycle")[0], TEXT)
         if structure.followers.size:
             yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()], TEXT)
         claims = [component.claim for component in structure.components]
@@ -183,17 +188,28 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
-    kind = f"({_accuracy(result, ', rounded')}{degenerate}{limits})"
+    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; no limits" * bool(certificate.limits)
+    kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
     if len(result.states) > 1 and len(set(result.states)) == 1:
         yield "x(T)", f"every agent at {short_number(result.states[0])} {kind}"
         return
     text = f"{value_list(labels, result.states, 2 * TEXT)} {kind}"
-    if ", ... (" in text or len(wrap_text(text)) > 2:
+    groups = f"{_equal_values(labels, result.states)} {kind}"
+    if len(wrap_text(text)) > 1 and columns(groups) <= TEXT:
+        text = groups
+    elif ", ... (" in text or len(wrap_text(text)) > 2:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
         text = f"least {least}, largest {most}, of {len(labels):,} agents {kind}"
     yield "x(T)", text
+
+
+def _equal_values(labels: Sequence[str], states: Sequence[Fraction | float]) -> str:
+    """List the agents that end at the same state, group by group."""
+    groups: dict[Fraction | float, list[str]] = {}
+    for label, state in zip(labels, states, strict=True):
+        groups.setdefault(state, []).append(printable(label))
+    return "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
 
 
 def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
@@ -261,20 +277,24 @@ def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
     """Return whether the input is bounded, and its proved size, empty if none is proved."""
     if effort.residual:
         entry = effort.residual[0]
-        largest = entry.noisy_largest if entry.noise is not None else entry.largest
-        text, size = "bounded under these limits", "" if largest is None else f"|u_k| <= {up(largest, 4)}"
+        largest = entry.largest if entry.noise is None else entry.noisy_largest
+        text = "bounded under these limits"
+        if largest is None:
+            return text, "under a sample period no number is proved"
     else:
-        states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "bounded or not is undecided"}
-        text, size = states[effort.bounded], ""
-        if effort.bounded and effort.peak is None and effort.sliding is not None and not effort.sliding.bounded:
-            text = "the nominal part is bounded, of the sliding part nothing is proved"
-        if effort.bounded is False and certificate.rate is not None:
-            text += f"; rho2 kappa >= {up(2 / certificate.rate, 4)} bounds it"
-        if effort.peak is not None:
-            agents = effort.peak.agents
-            label = certificate.graph.labels[max(range(len(agents)), key=agents.__getitem__)]
-            states_text = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
-            size = f"|u_k| <= {up(effort.peak.largest, 4)}{states_text}, the largest of agent {shorten_text(label, 20)}"
+        states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}
+        text = states[effort.bounded]
+        if effort.peak is None:
+            if effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
+                return "the nominal part is bounded, of the sliding part nothing is proved", ""
+            return text, "no number is proved" * bool(effort.bounded and certificate.initial_state is not None)
+        largest = effort.peak.largest
+    size = f"|u_k| <= {up(largest, 4)}"
+    if effort.initial_set is not None:
+        size += f" for {initial_states_text(effort.initial_set)}"
+    if effort.peak is not None and not effort.residual:
+        label = certificate.graph.labels[effort.peak.agents.index(largest)]
+        size += f", the largest of agent {shorten_label(label, 22)}"
     return text, size
 
 
@@ -285,15 +305,11 @@ def _short_verdict(certificate: Certificate) -> str:
     assessment = certificate.assessment
     if assessment.verdict != CERTIFIED:
         return assessment.line(f"{assessment.verdict}: {assessment.remark}")
-    certified = assessment.certified_part + " without disturbances" * (certificate.delta is not None)
-    option = assessment.advice.partition(" (")[0]
-    more = f"{option} leaves 1 %" if option else ""
-    if assessment.useful is False:
-        certified += ", but says little by T"
-    elif not assessment.answers and certificate.delta is None:
-        more = "checked without a solver"
+    certified, advice = assessment.certified_part, re.sub(r" \(.*?\)", "", assessment.advice)
+    certified += ", but says little by T" * (assessment.useful is False)
+    checked = "" if certified != CERTIFIED or assessment.answers or assessment.caveat else "checked without a solver"
     ended = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-    return assessment.line(certified, more, ended * bool(certificate.cut_off))
+    return assessment.line(certified, checked, assessment.caveat, advice, ended * bool(certificate.cut_off))
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -307,7 +323,7 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
         yield from leader_lines(structure, 4)
         if structure.followers.size:
             yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()])
-        yield from _claim_lines([component.claim for component in structure.components])
+        yield from _claim_lines(structure, [component.claim for component in structure.components])
 
     return format_lines(lines())
 
@@ -322,7 +338,7 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(certificate.claims, f" {when}")
+        yield from _claim_lines(structure, certificate.claims, f" {when}")
         names = [name for name in p.to_dict() if name != "kind"]
         yield "protocol", f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
         if certificate.initial_state is not None:
@@ -359,14 +375,13 @@ def _final_state_lines(certificate: Certificate) -> Lines:
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
-def _accuracy(result: FinalState, rounded: str = "; here to 5 digits") -> str:
-    """Tell how exactly a final state is known, and if it is written with fewer digits."""
+def _accuracy(result: FinalState, rounded: str = "exact; here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and of exact ones whether they are written with fewer digits."""
     if result.radius is None and not result.exact:
         return "floating point"
-    widest = max(result.radius or (0,))
-    known = f"to within {up(widest, 2)}, proved" if widest else "exact"
-    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
-    return known + rounded * cut
+    if widest := max(result.radius or (0,)):
+        return f"to within {up(widest, 2)}, proved"
+    return rounded if any(Fraction(short_number(x)) != x for x in result.states[:100]) else "exact"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:
@@ -485,10 +500,14 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         yield f"end state within {gap:.1e} of the final state{remark}"
 
 
-def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:
-    counts = sorted(Counter(claims).items(), key=lambda item: item[0].theorem)
-    for head, (claim, count) in zip(chain(["claim"], repeat("")), counts, strict=False):
-        yield head, f"{count} component(s): " * (len(claims) > 1) + _claim_text(claim, when)
+def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> Lines:
+    """Tell each claim in full, and of several components which one it is of, or how many."""
+    labels = structure.graph.labels
+    heads = chain(["claim"], repeat(""))
+    for claim, count in sorted(Counter(claims).items(), key=lambda item: item[0].theorem):
+        nodes = structure.components[claims.index(claim)].nodes
+        whose = f"{count} components" if count > 1 else shorten_list([labels[v] for v in nodes], 40)
+        yield next(heads), f"{whose}: " * (len(claims) > 1) + _claim_text(claim, when)
 
 
 def _sliding_lines(certificate: Certificate) -> Lines:
@@ -523,8 +542,8 @@ def _sliding_lines(certificate: Certificate) -> Lines:
 
 
 def _claim_text(claim: Claim, when: str) -> str:
-    numbers = ", ".join(claim.corollaries)
-    also = f"; {', '.join(claim.special)} (Corollary {numbers})" if claim.special else ""
-    if claim.corollaries and not claim.special:
-        also = f"; Corollary {numbers}"
-    return f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})"
+    numbers = f"Corollar{'y' if len(claim.corollaries) == 1 else 'ies'} {', '.join(claim.corollaries)}"
+    theorem = f"{claim.behaviour}{when} (Theorem {claim.theorem}"
+    if claim.special:
+        return f"{theorem}), in particular {', '.join(claim.special)} ({numbers})"
+    return f"{theorem}, {numbers})" if claim.corollaries else f"{theorem})"
