@@ -322,7 +322,7 @@ def judge_limits(certificate: Content) -> list[Answer]:
     if certificate.noise is not None and silent and not certificate.constant:
         why = "without a limit it meets an infinite gain: add --gain-cap or --stop-before"
         if any(entry.sample_period is not None for entry in certificate.limits):
-            why = "together with a sample period it has no proved bound: ask for each alone"
+            why = "with a sample period no bound is proved: ask for each alone"
         elif certificate.limits:
             why = no_bound
         answers.append(Answer(OPEN, "noise", why))

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import value_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort, Limited
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.input_formulas import InitialSet
-
-#: The head of a line, and its text; a line without a head belongs to the one before.
-Lines = Iterator[tuple[str, str]]
 
 
 def input_lines(certificate: Certificate) -> Lines:
@@ -66,7 +63,7 @@ def disturbed_lines(certificate: Certificate) -> Lines:
         held = any(entry.sample_period is not None for entry in certificate.limits)
         text = f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|"
         if d.drift is None or certificate.limits:
-            text += " without a sample period" * held + "; how far it moves x(T) is not proved"
+            text += " without a sample period" * held + "; of x(T) nothing is proved"
         else:
             text += f" and moves x_k(T) by at most {up(max(d.drift), 4)}" if any(d.drift) else " and moves no x_k(T)"
         yield "disturbed", text

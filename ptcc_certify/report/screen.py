@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker import CheckReport
+    from ptcc_certify.protocols.base import Protocol
 
 #: Lines of a short screen of a connected graph, and of one whose answers take more.
 SHORT, LONGEST = 8, 10
@@ -147,16 +148,18 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     """Tell the protocol with its parameters, and where the initial state comes from."""
-    p = certificate.protocol
-    names = [name for name in p.to_dict() if name != "kind"]
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
     if certificate.initial_set is not None and (not begin or _is_set_asked(certificate, origins)):
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
-    text = f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
-    lines = wrap_text("; ".join([text, ", ".join(begin) or "no x(0)"]))
+    lines = wrap_text("; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"]))
     return " ".join(lines[:2]) if len(lines) <= 2 else f"{lines[0]} {shorten_text(f'{lines[1]} ...', TEXT)}"
+
+
+def _gains_text(p: Protocol) -> str:
+    """Tell a protocol with its parameters."""
+    return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
 
 
 def _component_claims(certificate: Certificate) -> list[str]:
@@ -227,8 +230,8 @@ def _bounds(certificate: Certificate, drawn: bool) -> Lines:
     if norm:
         yield "error", norm + agents * (not drawn)
     if certificate.effort is not None:
-        bounded, size = _input_texts(certificate, certificate.effort)
-        yield "INPUT" if certificate.effort.bounded is False else "input", "; ".join(filter(None, (bounded, size)))
+        loud = certificate.effort.bounded is False and not certificate.effort.residual
+        yield "INPUT" if loud else "input", _input_text(certificate, certificate.effort)
 
 
 def _short_bounds(certificate: Certificate, drawn: bool) -> Lines:
@@ -273,29 +276,26 @@ def _instant(certificate: Certificate) -> tuple[float, str]:
     return 0.01 * _sliding_share(certificate), "T_r + 0.99 T_s"
 
 
-def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
-    """Return whether the input is bounded, and its proved size, empty if none is proved."""
-    if effort.residual:
-        entry = effort.residual[0]
-        largest = entry.largest if entry.noise is None else entry.noisy_largest
-        text = "bounded under these limits"
-        if largest is None:
-            return text, "under a sample period no number is proved"
+def _input_text(certificate: Certificate, effort: Effort) -> str:
+    """Tell whether the input is bounded, and its proved size."""
+    entry = effort.residual[0] if effort.residual else None
+    if entry is not None:
+        text, largest = "bounded under these limits", entry.largest if entry.noise is None else entry.noisy_largest
+        nothing = "; under a sample period no number is proved"
     else:
         states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}
-        text = states[effort.bounded]
-        if effort.peak is None:
-            if effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
-                return "the nominal part is bounded, of the sliding part nothing is proved", ""
-            return text, "no number is proved" * bool(effort.bounded and certificate.initial_state is not None)
-        largest = effort.peak.largest
-    size = f"|u_k| <= {up(largest, 4)}"
-    if effort.initial_set is not None:
-        size += f" for {initial_states_text(effort.initial_set)}"
-    if effort.peak is not None and not effort.residual:
+        text, largest = states[effort.bounded], None if effort.peak is None else effort.peak.largest
+        nothing = "; no number is proved" * bool(effort.bounded and certificate.initial_state is not None)
+        if largest is None and effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
+            text, nothing = "the nominal part is bounded", ", of the sliding part nothing is proved"
+    if largest is None:
+        return text + nothing
+    whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
+    agent = ""
+    if entry is None and effort.peak is not None:
         label = certificate.graph.labels[effort.peak.agents.index(largest)]
-        size += f", the largest of agent {shorten_label(label, 22)}"
-    return text, size
+        agent = f", the largest of agent {shorten_label(label, 22)}"
+    return f"{text}; |u_k| <= {up(largest, 4)}{whom}{agent}"
 
 
 def _short_verdict(certificate: Certificate) -> str:
@@ -339,8 +339,9 @@ def certificate_lines(
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
         yield from _claim_lines(structure, certificate.claims, f" {when}")
-        names = [name for name in p.to_dict() if name != "kind"]
-        yield "protocol", f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
+        yield "protocol", _gains_text(p)
+        if certificate.limits or certificate.noise is not None or certificate.delta is not None:
+            yield "", "a line that names no limits, noise or disturbances is without them"
         if certificate.initial_state is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
             alone = ", of the simulated run alone" * _is_set_asked(certificate, origins)
