@@ -232,10 +232,9 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
         useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
         caveat, advice = ("", "") if limited else _advise(certificate, rho2)
     violated = comparison is not None and comparison.violated
-    still_open = [answer.what for answer in answers if answer.status == OPEN]
-    ignored = ("limits" in still_open, "noise" in still_open, certificate.delta is not None)
-    names = [name for name, holds in zip(("limits", "noise", "disturbances"), ignored, strict=True) if holds]
-    without = f" without {' and '.join(filter(None, (', '.join(names[:-1]), names[-1])))}" if names else ""
+    ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
+    ignored += ["disturbances"] * (certificate.delta is not None)
+    without = f" without {' and '.join(ignored)}" if ignored else ""
     return Assessment(verdict, violated, useful, remark, advice, tuple(answers), caveat, without)
 
 

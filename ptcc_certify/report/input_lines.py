@@ -30,13 +30,12 @@ def input_lines(certificate: Certificate) -> Lines:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
         enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
-        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: raise rho2 * kappa{enough}"
+        yield "", f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 * kappa{enough}"
     else:
-        yield "input", f"bounded or not is undecided: {product}, it takes 1"
+        yield "input", f"not proved bounded: {product}, 1 is needed"
     sizes = []
     if effort.peak is not None:
-        most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
-        label = certificate.graph.labels[most]
+        label = certificate.graph.labels[effort.peak.agents.index(effort.peak.largest)]
         sizes = [f"|u_k| <= {up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {up(effort.peak.norm, 4)}"]
     sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
     sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []

@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
     from ptcc_certify.protocols.base import Protocol
 
-#: Lines of a short screen of a connected graph, and of one whose answers take more.
-SHORT, LONGEST = 8, 10
+#: Lines of a short screen of a connected graph, if its answers do not take more.
+SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
@@ -89,39 +89,36 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     input      bounded; |u_k| <= 24.01, the largest of agent a
     verdict    certified; checked without a solver
     """
-    claims = _component_claims(certificate)
+    p = certificate.protocol
+    whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
+    claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate, origins)
-    for room, bounds in ((SHORT, _bounds), (SHORT, _short_bounds), (LONGEST, _short_bounds)):
+    for agents in (True, False):
         entries = [
             *graph_entries(certificate.structure, name),
             ("protocol", _protocol_text(certificate, origins)),
-            *zip(chain(["claim"], repeat("")), claims, strict=False),
+            *_headed("claim", claims),
             *([] if drawn else _short_final_state(certificate)),
-            *bounds(certificate, drawn),
+            *_bounds(certificate, agents, drawn),
             *disturbed_lines(certificate),
             ("verdict", _short_verdict(certificate)),
         ]
         lines = wrap_lines(format_lines(entries))
-        if len(lines) < room + len(claims):
+        if len(lines) < SHORT + len(claims):
             break
     return lines
 
 
 def structure_summary(structure: Structure, name: str) -> list[str]:
     """Return the short screen of ``ptcc classify``: at most 8 lines of 80 columns, 12 of a disconnected graph."""
-    labels = structure.graph.labels
-
-    def lines() -> Lines:
-        yield from graph_entries(structure, name)
-        for head, text in leader_lines(structure, 3, 20):
-            whole = columns(text) <= TEXT
-            yield head, text if whole else shorten_text(text.partition(", negative cycle")[0], TEXT)
-        if structure.followers.size:
-            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()], TEXT)
-        claims = [component.claim for component in structure.components]
-        yield from zip(chain(["claim"], repeat("")), _claim_texts(structure, claims), strict=False)
-
-    return format_lines(lines())
+    followers = [structure.graph.labels[v] for v in structure.followers.tolist()]
+    claims = _claim_texts(structure, [component.claim for component in structure.components])
+    leaders = (
+        (head, text if columns(text) <= TEXT else shorten_text(text.partition(", negative cycle")[0], TEXT))
+        for head, text in leader_lines(structure, 3, 20)
+    )
+    told = [("followers", shorten_list(followers, TEXT))] if followers else []
+    return format_lines([*graph_entries(structure, name), *leaders, *told, *_headed("claim", claims)])
 
 
 def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
@@ -137,12 +134,12 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
+    if report.accepted and path:
         with suppress(PTCCError):
-            certificate = Certificate(**read_document(Path(path), document, "", report)) if path else None
-            origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
-            told = [] if certificate is None else summary_lines(certificate, path, origins)
-            told = list(dropwhile(lambda line: not line.startswith("protocol"), told))
-            lines = list(takewhile(lambda line: not line.startswith("verdict"), told)) or lines
+            certificate = Certificate(**read_document(Path(path), document, "", report))
+            told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
+            answers = dropwhile(lambda line: not line.startswith("protocol"), told)
+            lines = list(takewhile(lambda line: not line.startswith("verdict"), answers))
     return wrap_lines([*lines, report.lines()[-1]])
 
 
@@ -162,11 +159,9 @@ def _gains_text(p: Protocol) -> str:
     return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
 
 
-def _component_claims(certificate: Certificate) -> list[str]:
-    """Tell what is claimed, of each of the largest components if there are several."""
-    p = certificate.protocol
-    whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
-    return _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
+def _headed(head: str, texts: Iterable[str]) -> Lines:
+    """Put a head before the first of some texts."""
+    return zip(chain([head], repeat("")), texts, strict=False)
 
 
 def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> list[str]:
@@ -193,26 +188,19 @@ def _short_final_state(certificate: Certificate) -> Lines:
         return
     degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; no limits" * bool(certificate.limits)
     kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
-    if len(result.states) > 1 and len(set(result.states)) == 1:
-        yield "x(T)", f"every agent at {short_number(result.states[0])} {kind}"
-        return
-    text = f"{value_list(labels, result.states, 2 * TEXT)} {kind}"
-    groups = f"{_equal_values(labels, result.states)} {kind}"
-    if len(wrap_text(text)) > 1 and columns(groups) <= TEXT:
-        text = groups
-    elif ", ... (" in text or len(wrap_text(text)) > 2:
+    groups: dict[Fraction | float, list[str]] = {}
+    for label, state in zip(labels, result.states, strict=True):
+        groups.setdefault(state, []).append(printable(label))
+    listed = value_list(labels, result.states, 2 * TEXT)
+    grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
+    text = min(listed, grouped, key=columns)
+    if len(groups) == 1 < len(labels):
+        text = f"every agent at {short_number(result.states[0])}"
+    elif ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
-        text = f"least {least}, largest {most}, of {len(labels):,} agents {kind}"
-    yield "x(T)", text
-
-
-def _equal_values(labels: Sequence[str], states: Sequence[Fraction | float]) -> str:
-    """List the agents that end at the same state, group by group."""
-    groups: dict[Fraction | float, list[str]] = {}
-    for label, state in zip(labels, states, strict=True):
-        groups.setdefault(state, []).append(printable(label))
-    return "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
+        text = f"least {least}, largest {most}, of {len(labels):,} agents"
+    yield "x(T)", f"{text} {kind}"
 
 
 def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
@@ -220,24 +208,18 @@ def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
     return certificate.initial_set is not None and "x(0)" in origins
 
 
-def _bounds(certificate: Certificate, drawn: bool) -> Lines:
-    """Tell how near the agents are by when, and how large the input gets."""
+def _bounds(certificate: Certificate, single: bool, drawn: bool) -> Lines:
+    """Tell how near the agents are by when, and how large the input gets, with or without single agents."""
     if certificate.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
         yield "error", f"none: no agent listens to another, each keeps {invariant}"
         return
     norm, agents = _error_texts(certificate)
     if norm:
-        yield "error", norm + agents * (not drawn)
+        yield "error", norm + agents * (single and not drawn)
     if certificate.effort is not None:
         loud = certificate.effort.bounded is False and not certificate.effort.residual
-        yield "INPUT" if loud else "input", _input_text(certificate, certificate.effort)
-
-
-def _short_bounds(certificate: Certificate, drawn: bool) -> Lines:
-    """Tell the same of no single agent."""
-    for head, text in _bounds(certificate, drawn):
-        yield head, text.partition(", every agent" if head == "error" else ", the largest")[0]
+        yield "INPUT" if loud else "input", _input_text(certificate, certificate.effort, single)
 
 
 def _error_texts(certificate: Certificate) -> tuple[str, str]:
@@ -276,8 +258,8 @@ def _instant(certificate: Certificate) -> tuple[float, str]:
     return 0.01 * _sliding_share(certificate), "T_r + 0.99 T_s"
 
 
-def _input_text(certificate: Certificate, effort: Effort) -> str:
-    """Tell whether the input is bounded, and its proved size."""
+def _input_text(certificate: Certificate, effort: Effort, single: bool) -> str:
+    """Tell whether the input is bounded, its proved size, and whose it is."""
     entry = effort.residual[0] if effort.residual else None
     if entry is not None:
         text, largest = "bounded under these limits", entry.largest if entry.noise is None else entry.noisy_largest
@@ -292,7 +274,7 @@ def _input_text(certificate: Certificate, effort: Effort) -> str:
         return text + nothing
     whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
     agent = ""
-    if entry is None and effort.peak is not None:
+    if single and entry is None and effort.peak is not None:
         label = certificate.graph.labels[effort.peak.agents.index(largest)]
         agent = f", the largest of agent {shorten_label(label, 22)}"
     return f"{text}; |u_k| <= {up(largest, 4)}{whom}{agent}"
@@ -315,17 +297,11 @@ def _short_verdict(certificate: Certificate) -> str:
 def structure_lines(structure: Structure, name: str) -> list[str]:
     """Return the lines of ``ptcc classify``."""
     labels = structure.graph.labels
-
-    def lines() -> Lines:
-        yield from _graph_lines(structure, name)
-        yield "nodes", shorten_list(labels)
-        yield "structure", structure_text(structure)
-        yield from leader_lines(structure, 4)
-        if structure.followers.size:
-            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()])
-        yield from _claim_lines(structure, [component.claim for component in structure.components])
-
-    return format_lines(lines())
+    followers = [labels[v] for v in structure.followers.tolist()]
+    claims = _claim_lines(structure, [component.claim for component in structure.components])
+    told = [("followers", shorten_list(followers))] if followers else []
+    facts = [("nodes", shorten_list(labels)), ("structure", structure_text(structure))]
+    return format_lines([*_graph_lines(structure, name), *facts, *leader_lines(structure, 4), *told, *claims])
 
 
 def certificate_lines(
@@ -349,7 +325,7 @@ def certificate_lines(
         states = () if _is_set_asked(certificate, origins) else (_final_state_lines, _deviation_lines)
         for part in (_sliding_lines, *states, _rate_lines, input_lines):
             yield from part(certificate)
-        yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
+        yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
             named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
             yield "cut off", f"{named}; what was proved by then stands"
@@ -503,12 +479,12 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
 
 def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> Lines:
     """Tell each claim in full, and of several components which one it is of, or how many."""
-    labels = structure.graph.labels
-    heads = chain(["claim"], repeat(""))
+    labels, texts = structure.graph.labels, []
     for claim, count in sorted(Counter(claims).items(), key=lambda item: item[0].theorem):
         nodes = structure.components[claims.index(claim)].nodes
         whose = f"{count} components" if count > 1 else shorten_list([labels[v] for v in nodes], 40)
-        yield next(heads), f"{whose}: " * (len(claims) > 1) + _claim_text(claim, when)
+        texts.append(f"{whose}: " * (len(claims) > 1) + _claim_text(claim, when))
+    return _headed("claim", texts)
 
 
 def _sliding_lines(certificate: Certificate) -> Lines:

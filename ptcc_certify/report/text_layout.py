@@ -86,7 +86,7 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
         return ", ".join(words)
     if fitting:
         return ", ".join(words[:fitting]) + rest
-    return shorten_text(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
+    return shorten_label(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
 
 
 def value_list(labels: Sequence[str], values: Iterable[object], width: int = 4 * TEXT) -> str:

@@ -73,6 +73,16 @@ def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, 
     assert left is not None and float(left[1]) <= 0.01
 
 
+def test_a_sliding_part_that_is_not_bounded_is_told_with_the_gain_that_bounds_it():
+    def found(mu3: str) -> Any:
+        p = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 2, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": mu3, "delta": 1}
+        return certify(PAIR, SlidingModeProtocol(**p), [1, 3], sigma0=[5, -5], simulation=False).assessment
+
+    weak_gain = found("0.3")
+    assert weak_gain.text.endswith("; the input is not proved bounded; --mu3 0.334 bounds the input")
+    assert weak_gain.exit_code == 0 and not found("0.334").caveat
+
+
 def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alone():
     """The bound of the error at T(1 - 1e-9) is above the error at the start, and the verdict was `certified`."""
     slow = certify(load_graph("fig5b"), NominalProtocol(T=1, rho1="0.01", rho2="0.001", kappa=1), simulation=False)
