@@ -153,30 +153,20 @@ class _LogFile(logging.FileHandler):
 @contextmanager
 def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[str], None]]:
     """Show which of some steps is at work, and log each with its seconds; on a terminal the line goes at the end."""
-    clock = _StepClock()
+    began, last = time.monotonic(), ""
     with _bar("TimeElapsedColumn", quiet=quiet) as add:
         update = add("", total=len(steps))
 
         def begin(step: str) -> None:
-            clock.begin(step)
-            update(completed=steps.index(step), description=step)
+            nonlocal began, last
+            if last:
+                LOG.info("%s: %.3f s", last, time.monotonic() - began)
+            began, last = time.monotonic(), step
+            if step:
+                update(completed=steps.index(step), description=step)
 
         yield begin
-        clock.begin("")
-
-
-class _StepClock:
-    """Logs each step, when it is done, with the seconds that it took."""
-
-    def __init__(self) -> None:
-        self.step, self.began = "", time.monotonic()
-
-    def begin(self, step: str) -> None:
-        """End the step at work, and begin another, or none."""
-        now = time.monotonic()
-        if self.step:
-            LOG.info("%s: %.3f s", self.step, now - self.began)
-        self.step, self.began = step, now
+        begin("")
 
 
 @contextmanager

@@ -6,6 +6,7 @@ Its sentences are in ``templates/``, which Jinja2 fills: every text of the file 
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections import Counter
 from datetime import date
@@ -162,11 +163,10 @@ def _view(saved: Certificate) -> dict[str, Any]:
 
 
 def _in_words(saved: Certificate) -> tuple[Markup, str]:
-    """Return the verdict without options of the command line, and the ``rho2`` that it advises, empty if none."""
-    text, advice = Markup(escape(saved.assessment.text)), saved.assessment.advice
-    rho2 = advice.split()[1] if advice else ""
-    plain = Markup("\u03c1<sub>2</sub> = {} would leave 1 %").format(rho2)
-    return text.replace(escape(advice), plain) if advice else text, rho2
+    """Return the verdict without options of the command line, and the ``rho2`` that leaves 1 %, empty if none."""
+    text = re.sub(r"--rho2 (\S+) \([^)]*\)", "\u03c1<sub>2</sub> = \\1", str(escape(saved.assessment.text)))
+    useful = re.match(r"--rho2 (\S+) .*leaves 1 %", saved.assessment.advice)
+    return Markup(re.sub(r"--mu3 (\S+)", "\u03bc<sub>3</sub> = \\1", text)), useful[1] if useful else ""
 
 
 def _title(saved: Certificate, invariant: str) -> Markup:
