@@ -20,6 +20,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
@@ -433,6 +434,8 @@ class Envelope:
             The run is of another graph or protocol, disturbed or held over periods under the nominal protocol, or has
             no sample before the deadline.
         """
+        if not isinstance(trajectory, Trajectory):
+            raise ParameterError(f"{shorten(repr(trajectory))} is no run; give what simulate returned")
         if trajectory.forcing is not None or trajectory.held_input is not None:
             raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
         if trajectory.graph.labels != self.structure.graph.labels or trajectory.graph != self.structure.graph:

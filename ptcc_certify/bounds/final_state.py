@@ -429,6 +429,8 @@ def final_state(
     structure = analyse(graph, orientation)
     initial_state = as_state(x0, structure.graph)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
+    if not isinstance(matrix, Influence) or matrix.structure != structure:
+        raise ParameterError("matrix is not the influence of this graph; leave it out, or give influence(graph)")
     final, values = matrix.apply(initial_state if matrix.exact else [float(x) for x in initial_state])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     size = max((abs(float(x)) for x in initial_state), default=0.0)

@@ -19,7 +19,7 @@ from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import read_bytes, refuse_no_path
@@ -61,6 +61,7 @@ class RejectedCertificate(PTCCError, ValueError):
         super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
 
 
+@gated
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Content, Shown):
     """A claim about a signed digraph under a protocol, with its proof.

@@ -27,7 +27,7 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
@@ -369,6 +369,7 @@ class Content:
             return SlidingEnvelope(self.structure, gain, self.functions, sliding, sigma0, reaching)
         return Envelope(self.structure, gain, self.functions)
 
+    @gated
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the initial state.
 
@@ -391,6 +392,7 @@ class Content:
         """
         return self.envelope.norm_bound(remaining, self._require_initial_state())
 
+    @gated
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the initial state, for every agent.
 

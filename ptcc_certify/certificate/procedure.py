@@ -35,6 +35,7 @@ from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,
+    listener,
     read_initial_state,
     read_request,
     read_sliding_variable,
@@ -42,7 +43,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import HypothesisError, SimulationError
+from ptcc_certify.errors import HypothesisError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
@@ -79,6 +80,7 @@ FEW_SAMPLES = 51
 SETTLED = 1e-6
 
 
+@gated
 def certify(
     graph: Any,
     protocol: Protocol,
@@ -97,7 +99,7 @@ def certify(
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    progress: Callable[[str], None] | None = None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
 
@@ -177,7 +179,7 @@ ReachingTime(0, 1 before T_r)))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
-    limits = list(limits) if isinstance(limits, Iterable) else [limits]
+    limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])

@@ -13,7 +13,7 @@ import numpy as np
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -30,6 +30,7 @@ from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reachin
 LONGEST_BITS = 470_000
 
 
+@gated
 @dataclass(frozen=True)
 class Expectations:
     """What is asked of a certificate besides.
@@ -133,6 +134,10 @@ def refuse(
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
     seconds, n = arguments["time_limit"], structure.graph.n_nodes
+    if not isinstance(scenario := arguments["scenario"], Mapping | None):
+        raise ParameterError(
+            f"scenario = {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
+        )
     request = Request(
         method=arguments["method"],
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
@@ -140,12 +145,19 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
         time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
         expectations=_expectations(arguments["expectations"]),
-        scenario=arguments["scenario"],
+        scenario=scenario,
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:
         raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
     return request
+
+
+def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
+    """Return what is told how the work goes on; None: nobody is."""
+    if progress is not None and not callable(progress):
+        raise ParameterError(f"progress = {shorten(repr(progress))} is no function; give print, say, or leave it out")
+    return progress or (lambda *_: None)
 
 
 def _seconds(time_limit: Any) -> float:

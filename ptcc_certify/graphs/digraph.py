@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.tables import import_pandas
@@ -92,6 +92,7 @@ def _common_scale(values: Sequence[Fraction]) -> int | None:
 _HASHED = 65_536
 
 
+@gated
 class SignedDigraph(Shown):
     """A signed digraph with exact weights.
 
@@ -178,6 +179,7 @@ class SignedDigraph(Shown):
     # ------------------------------------------------------------------ constructors
 
     @classmethod
+    @gated
     def from_edges(
         cls,
         edges: Iterable[tuple[Hashable, Hashable, Exact]],
@@ -207,6 +209,8 @@ class SignedDigraph(Shown):
         ('b', 'a', Fraction(1, 1))
         """
         _refuse_unknown_orientation(orientation)
+        if not isinstance(edges, Iterable):
+            raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
         known: dict[str, tuple[int, Hashable]] = {}
 
         def number(node: Hashable) -> int:
@@ -238,6 +242,7 @@ class SignedDigraph(Shown):
         return cls(labels, source, target, Weights(values), {"orientation": orientation})
 
     @classmethod
+    @gated
     def from_matrix(
         cls, matrix: Any, labels: Iterable[Hashable] | None = None, *, orientation: str | None = None
     ) -> SignedDigraph:
@@ -327,6 +332,7 @@ class SignedDigraph(Shown):
         return cls(names, column, row, weights, {"orientation": "matrix"})
 
     @classmethod
+    @gated
     def from_networkx(
         cls, graph: nx.DiGraph, weight: str = "weight", *, orientation: str = "information"
     ) -> SignedDigraph:
@@ -480,7 +486,9 @@ class SignedDigraph(Shown):
 
     def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
         """Return the graph induced by the node indices ``nodes``, in that order."""
-        nodes = np.asarray(nodes, dtype=np.int64)
+        nodes = np.asarray(nodes, dtype=None if len(nodes) else np.int64)
+        if nodes.dtype.kind not in "iu" or (nodes.size and not 0 <= nodes.min() <= nodes.max() < self.n_nodes):
+            raise GraphError(f"a node of a subgraph is an index from 0 to {self.n_nodes - 1}; index[label] tells it")
         position = np.full(self.n_nodes, -1, dtype=np.int64)
         position[nodes] = np.arange(nodes.size)
         keep = np.flatnonzero((position[self.source] >= 0) & (position[self.target] >= 0))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import did_you_mean
+from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.io import as_graph
@@ -86,7 +86,7 @@ def behaviour_name(text: str) -> str:
 
     Raises
     ------
-    ValueError
+    ParameterError
         No such behaviour; the message lists them.
 
     Examples
@@ -94,11 +94,12 @@ def behaviour_name(text: str) -> str:
     >>> behaviour_name("interval-bipartite-consensus")
     'interval bipartite consensus'
     """
+    text = str(text)
     for name in BEHAVIOURS:
         if text.replace("-", " ") == name.replace("-", " "):
             return name
     names = [name.replace(" ", "-") for name in BEHAVIOURS]
-    raise ValueError(f'unknown behaviour "{text}"; one of {", ".join(names)}{did_you_mean(text, names)}')
+    raise ParameterError(f'unknown behaviour "{text}"; one of {", ".join(names)}{did_you_mean(text, names)}')
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,7 @@ class Structure(Shown):
 
         Raises
         ------
-        ValueError
+        ParameterError
             No behaviour is called so.
         """
         wanted = behaviour_name(behaviour)
