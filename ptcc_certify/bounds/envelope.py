@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.simulation.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Instants, as fractions of the deadline, at which ratios and residuals are reported.
 FRACTIONS = (0.5, 0.9, 0.99)
@@ -133,7 +130,7 @@ class Comparison:
     tolerance: float
     resolved_until: float
     judged: int
-    ratios: dict[float, float]
+    ratios: dict[float, float] = field(hash=False)
     stop: float
     deadline_resolved: bool
     sliding_ratio: float | None = None

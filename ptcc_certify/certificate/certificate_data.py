@@ -17,7 +17,7 @@ import numpy as np
 
 from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
-from ptcc_certify.bounds.final_state import FinalState, Influence, influence
+from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
@@ -149,6 +149,12 @@ class Content:
             raise ParameterError("a certificate that was read is what its file says; certify the graph again")
         if (search := values.pop("search", None)) is not None:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
+        if values.keys() & {"protocol", "initial_state", "sigma0"}:
+            values.setdefault("trajectory", None)
+        if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
+            x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
+            first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
+            values["final_state"] = first and final_state(self.structure, first, matrix=self.influence)
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}

@@ -36,6 +36,7 @@ from ptcc_certify.certificate.request import (
     Expectations,
     Request,
     listener,
+    origins_of,
     read_initial_state,
     read_request,
     read_sliding_variable,
@@ -99,6 +100,7 @@ def certify(
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
+    origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
@@ -145,6 +147,9 @@ def certify(
         ``assessment``.
     scenario : mapping, optional
         The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
+    origins : mapping of str to str, optional
+        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from, where the arguments do not tell:
+        kept under ``unverified.origins``, and told by ``summary``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -181,6 +186,7 @@ ReachingTime(0, 1 before T_r)))
     """
     limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)

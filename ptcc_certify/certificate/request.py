@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -101,6 +103,9 @@ class Request:
         What is asked besides; what became of it is part of ``assessment``.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
+    origins : mapping of str to str
+        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from: of a random state its seed. What
+        is missing was given as it is.
     """
 
     method: str = "best"
@@ -112,6 +117,22 @@ class Request:
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
+    origins: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+
+def origins_of(graph: Any, x0: Any, sigma0: Any) -> dict[str, str]:
+    """Return what the arguments of :func:`ptcc_certify.certify` tell of where they come from.
+
+    Examples
+    --------
+    >>> origins_of("graphs/team.csv", "random", None)
+    {'graph': 'team.csv', 'x(0)': 'random, seed 0'}
+    """
+    origins = {"graph": Path(graph).name} if isinstance(graph, str | os.PathLike) else {}
+    states = {"x(0)": x0, "sigma(0)": sigma0}
+    return origins | {
+        name: "random, seed 0" for name, state in states.items() if isinstance(state, str) and state.strip() == "random"
+    }
 
 
 def refuse(
@@ -146,6 +167,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
         expectations=_expectations(arguments["expectations"]),
         scenario=scenario,
+        origins=arguments["origins"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:

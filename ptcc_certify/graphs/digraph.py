@@ -13,6 +13,7 @@ import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
+from dataclasses import FrozenInstanceError
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.tables import import_pandas
 
@@ -37,7 +39,7 @@ _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 Exact = Fraction | int | float | str
 
 
-class Weights:
+class Weights(ReadOnly):
     """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
 
     def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
@@ -93,7 +95,7 @@ _HASHED = 65_536
 
 
 @gated
-class SignedDigraph(Shown):
+class SignedDigraph(ReadOnly, Shown):
     """A signed digraph with exact weights.
 
     Build one with :meth:`from_edges`, :meth:`from_matrix`, :meth:`from_networkx` or
@@ -157,9 +159,14 @@ class SignedDigraph(Shown):
         self._weights = weights.take(order)
         self.sign = self._weights.signs()
         self.read = dict(_READ_DEFAULT, **(read or {}))
-        for array in (self.source, self.target, self._weights.table, self.sign):
-            array.flags.writeable = False
+        self.lock()
+        self._weights.lock()
         self._refuse_bad_edges()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in vars(self) or hasattr(type(self), name):
+            raise FrozenInstanceError(f"{name} of a graph stays as it is; make another graph")
+        super().__setattr__(name, value)
 
     def _refuse_bad_edges(self) -> None:
         source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
@@ -215,6 +222,8 @@ class SignedDigraph(Shown):
 
         def number(node: Hashable) -> int:
             label = str(node)
+            if label not in known:
+                refuse_unnamed(node, "an edge")
             place, first = known.setdefault(label, (len(known), node))
             if first is not node and first != node:
                 raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
@@ -282,16 +291,15 @@ class SignedDigraph(Shown):
         if hasattr(matrix, "is_multigraph"):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
         if orientation is None:
-            raise GraphError(
-                'a matrix does not tell its direction: say orientation="listens" if row k holds whom k listens to (the '
-                'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
-            )
+            raise GraphError(f"a matrix {WAY}")
         _refuse_unknown_orientation(orientation)
         if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
-            labels, matrix = rows, _aligned_frame(matrix, rows)
+            labels, matrix = matrix.index, _aligned_frame(matrix, rows)
         dense = not hasattr(matrix, "tocoo")
+        if np.ma.is_masked(matrix):
+            raise GraphError("an entry of the adjacency matrix is masked; write 0 where there is no edge: filled(0)")
         try:
             entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
         except ValueError:
@@ -310,7 +318,10 @@ class SignedDigraph(Shown):
         except (TypeError, ValueError):  # pandas' NA is neither zero nor not
             raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
         values = entries[row, column] if dense else entries.data[entries.data != 0]
-        names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
+        own: list[Hashable] = list(range(1, shape[0] + 1)) if labels is None else list(labels)
+        for label in own:
+            refuse_unnamed(label, "the matrix")
+        names = [str(label) for label in own]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
         if values.dtype.kind == "f":
@@ -485,9 +496,17 @@ class SignedDigraph(Shown):
         return rows
 
     def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
-        """Return the graph induced by the node indices ``nodes``, in that order."""
-        nodes = np.asarray(nodes, dtype=None if len(nodes) else np.int64)
-        if nodes.dtype.kind not in "iu" or (nodes.size and not 0 <= nodes.min() <= nodes.max() < self.n_nodes):
+        """Return the graph induced by the node indices ``nodes``, in that order.
+
+        Raises
+        ------
+        GraphError
+            There is no such node, or none at all.
+        """
+        nodes = np.asarray(nodes)
+        if not nodes.size:
+            nodes = nodes.astype(np.int64)
+        elif nodes.ndim != 1 or nodes.dtype.kind not in "iu" or not 0 <= nodes.min() <= nodes.max() < self.n_nodes:
             raise GraphError(f"a node of a subgraph is an index from 0 to {self.n_nodes - 1}; index[label] tells it")
         position = np.full(self.n_nodes, -1, dtype=np.int64)
         position[nodes] = np.arange(nodes.size)
@@ -539,6 +558,8 @@ class SignedDigraph(Shown):
     def to_pandas(self) -> pd.DataFrame:
         """Return the edges as a DataFrame with columns ``source``, ``target``, ``weight`` (float64).
 
+        A node without edges is in no row; :meth:`to_networkx` keeps it.
+
         Raises
         ------
         ParameterError
@@ -578,6 +599,11 @@ class SignedDigraph(Shown):
         return f"SignedDigraph({self.n_nodes} nodes, {self.n_edges} edges, {negative} negative)"
 
 
+#: What a matrix without an orientation is refused with.
+WAY = (
+    'does not tell its direction: say orientation="listens" if row k holds whom k listens to (the paper\'s W), or '
+    '"information" if row k holds whom k informs (networkx.to_numpy_array)'
+)
 _READ_DEFAULT: dict[str, Any] = {
     "orientation": "information",
     "duplicates": "refused",
@@ -590,6 +616,19 @@ _READ_DEFAULT: dict[str, Any] = {
 def _refuse_unknown_orientation(orientation: str) -> None:
     if orientation not in ("information", "listens"):
         raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
+
+
+def refuse_unnamed(node: Any, where: str) -> None:
+    """Refuse what stands where a node has no name: None, NaN, and NA or NaT of pandas.
+
+    Examples
+    --------
+    >>> refuse_unnamed(None, "row 2")
+    Traceback (most recent call last):
+    ptcc_certify.errors.GraphError: row 2 names no node (None); leave it out or name the node
+    """
+    if node is None or (str(node) in ("nan", "<NA>", "NaT") and not isinstance(node, str)):
+        raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
 
 
 def labels_beside(values: Any) -> list[str] | None:

@@ -73,4 +73,6 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
 
 def summary(subject: Any) -> str:
     """Return what the command line prints of a certificate."""
-    return "\n".join(import_module("ptcc_certify.report.screen").summary_lines(subject, "graph"))
+    origins = subject.request.origins
+    lines = import_module("ptcc_certify.report.screen").summary_lines(subject, origins.get("graph", "graph"), origins)
+    return "\n".join(lines)

@@ -119,7 +119,7 @@ def number_within(value: Any, name: str, least: float, most: float) -> float:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: past = 1/2 is outside its domain; it must be a number from 0 to 1
     """
-    if isinstance(value, Real) and least <= value <= most:
+    if isinstance(value, int | float | Fraction) and least <= value <= most:
         return float(value)
     domain = f"a number from {least:g} to {most:g}"
     raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")

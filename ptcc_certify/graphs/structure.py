@@ -22,6 +22,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.tables import import_pandas
 
@@ -144,7 +145,7 @@ class WeakComponent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure(Shown):
+class Structure(ReadOnly, Shown):
     """The structure of a signed digraph; made by :func:`analyse`.
 
     Attributes
@@ -196,6 +197,9 @@ class Structure(Shown):
     sign_symmetric: bool
     undirected: bool
     all_positive: bool
+
+    def __post_init__(self) -> None:
+        self.lock()
 
     @property
     def balanced(self) -> bool:

@@ -331,7 +331,7 @@ class SampledDisturbance(ByValue, Disturbance):
         parts = {"times": instants, "samples": samples, "hold": bool(hold)}
         for name, part in (parts | {"text": text or f"{instants.size} samples, {between}"}).items():
             object.__setattr__(self, name, part)
-        instants.flags.writeable = samples.flags.writeable = False
+        self.lock()
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike = ()) -> np.ndarray:
         """Return ``d_k(t)``: floats (A, M); ``signs`` does not matter."""

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any, Self, overload
 
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 
@@ -72,6 +72,7 @@ class Parameters:
         every = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {name: value for name, value in every.items() if value is not None}
 
+    @gated
     def replace(self, **changes: Exact) -> Self:
         """Return the same with other values of some parameters.
 

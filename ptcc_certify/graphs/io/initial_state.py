@@ -97,6 +97,8 @@ def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]
     what, mend = f"the initial state {name}", f"give one number for each of {_some(graph.labels)}"
     if isinstance(values, set | frozenset | bytes | bytearray):
         raise ParameterError(f"{what} is {shorten(repr(values))}, which has no order; {mend}")
+    if np.ma.is_masked(values):
+        raise ParameterError(f"{what} has masked entries; {mend}")
     values = in_node_order(values.toarray() if hasattr(values, "tocoo") else values, graph, name)
     if not isinstance(values, Iterable) or not getattr(values, "ndim", True):
         raise ParameterError(f"{what} is {'missing' if values is None else shorten(repr(values))}; {mend}")

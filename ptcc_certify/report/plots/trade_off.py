@@ -27,6 +27,11 @@ def plot_trade_off(subject: Design, *, ax: Axes | None = None, time_unit: str = 
     -------
     Axes
 
+    Raises
+    ------
+    ParameterError
+        The subject is no design.
+
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
