@@ -167,21 +167,13 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 #: Where a keyword belongs that a function does not have.
-_PLACES = {
-    "NominalProtocol": ("T", "rho1", "rho2", "kappa"),
-    "SlidingModeProtocol": ("T_r", "T_s", "mu1", "mu2", "mu3"),
-    "GainLimits": ("gain_cap", "stop_before", "sample_period"),
-    "Expectations": ("behaviour", "min_rate", "max_input"),
-}
+_PLACES = dict.fromkeys(("T", "rho1", "rho2", "kappa"), "NominalProtocol")
+_PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtocol")
+_PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
+_PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
 #: What a parameter is called elsewhere, on the command line for one.
-_ALSO_CALLED = {
-    "edges": "orientation",
-    "direction": "orientation",
-    "expect": "expectations",
-    "initial_bound": "initial_set",
-    "initial_state": "x0",
-    "t": "times",
-}
+_ALSO_CALLED = {"edges": "orientation", "direction": "orientation", "initial_state": "x0", "t": "times"}
+_ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
 
 
 def gated(called: Called) -> Called:
@@ -206,8 +198,8 @@ def gated(called: Called) -> Called:
     def gate(*args: Any, **keywords: Any) -> Any:
         try:
             signature.bind(*args, **keywords)
-        except TypeError as error:
-            raise ParameterError(_misfit(called, signature, args, keywords) or one_line(str(error))) from None
+        except TypeError:
+            raise ParameterError(_misfit(called, signature, args, keywords)) from None
         return called(*args, **keywords)
 
     return gate  # type: ignore[return-value]
@@ -220,18 +212,17 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
     places = [key for key, one in parameters.items() if one.kind is one.POSITIONAL_OR_KEYWORD]
     given = places[: len(args) - (len(parameters) < len(signature.parameters))]
     if unknown := next((key for key in keywords if key not in parameters), None):
-        place = None if name in _PLACES else next((k for k, names in _PLACES.items() if unknown in names), None)
-        hint = f"; give it to {place}({unknown}=...)" if place else did_you_mean(unknown, parameters)
+        hint = did_you_mean(unknown, parameters) or f"; it has {', '.join(parameters)}"
         if (meant := _ALSO_CALLED.get(unknown)) in parameters:
             hint = f"; did you mean {meant}?"
-        return f"{name} has no parameter {unknown}{hint or '; it has ' + ', '.join(parameters)}"
-    if twice := [key for key in given if key in keywords]:
-        return f"{name} is given {twice[0]} twice; leave one out"
+        elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
+            hint = f"; give it to {place}({unknown}=...)"
+        return f"{name} has no parameter {unknown}{hint}"
     required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
     if missing := [key for key in required if key not in given and key not in keywords]:
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
         return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)})"
-    return f"{name} takes {', '.join(places) or 'nothing'} without a name; write any other as name=value"
+    return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; write any other as name=value"
 
 
 def explain(error: Exception) -> str:

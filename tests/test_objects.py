@@ -173,7 +173,7 @@ def test_without_pandas_a_line_names_it(cert, monkeypatch):
 
 def test_parameters_of_a_protocol_are_replaced_by_name():
     assert PROTOCOL.replace(T=3, kappa="1/2") == ptcc.NominalProtocol(T=3, rho1=1, rho2=1, kappa="1/2")
-    with pytest.raises(ParameterError, match="gamma is no parameter of NominalProtocol; it has T, rho1, rho2, kappa"):
+    with pytest.raises(ParameterError, match="NominalProtocol has no parameter gamma; it has T, rho1, rho2, kappa"):
         PROTOCOL.replace(gamma=3)
 
 

@@ -24,7 +24,7 @@ from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.tables import first_five, import_pandas
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -653,8 +653,7 @@ def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
             twice = labels[labels.duplicated()][0]
             raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
     if odd := frame.index.symmetric_difference(frame.columns).tolist():
-        named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
-        raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
+        raise GraphError(f"rows and columns of the matrix have different labels: {first_five(odd)}; give both the same")
     # One type for all columns would round the integers of one beside the floats of another.
     return frame[rows].to_numpy(dtype=object if len(set(frame.dtypes)) > 1 else None)
 

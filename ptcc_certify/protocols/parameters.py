@@ -91,9 +91,6 @@ class Parameters:
         >>> NominalProtocol(T=1, rho1=1, rho2=1, kappa=2).replace(T=3)
         NominalProtocol(T=3, rho1=1, rho2=1, kappa=2)
         """
-        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
-        if unknown := [name for name in changes if name not in names]:
-            raise ParameterError(f"{unknown[0]} is no parameter of {type(self).__name__}; it has {', '.join(names)}")
         return replace(self, **changes)  # type: ignore[type-var]
 
     def __repr__(self) -> str:

@@ -15,7 +15,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, plot
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.tables import import_pandas, position
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -173,10 +173,7 @@ class Trajectory(ByValue, Shown):
 
     def __getitem__(self, label: Hashable) -> np.ndarray:
         """(M,) or (S, M) array: the states of one agent."""
-        if str(label) not in self.graph:
-            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
-            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
-        return self.states[self.graph.index[str(label)]]
+        return self.states[position(label, self.labels)]
 
     def __len__(self) -> int:
         return self.t.size

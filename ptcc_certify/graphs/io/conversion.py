@@ -15,6 +15,7 @@ from ptcc_certify.graphs.io.files import name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, read_graph
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.tables import first_five
 
 TAKEN = (
     "a SignedDigraph, a path, the name of a packaged graph, a networkx.DiGraph, an adjacency matrix with orientation=, "
@@ -101,10 +102,9 @@ def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, 
     if set(labels_beside(table) or ()) == set(names):
         return None  # an adjacency matrix
     if (columns := header(names, "the DataFrame")) is None:
-        titles = ", ".join(map(shorten, names[:5])) + (", ..." if len(names) > 5 else "")
         raise GraphError(
-            f"a DataFrame with the columns {titles} is no graph; name them source, target, weight, or give an "
-            "adjacency matrix with the same labels on rows and columns"
+            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, or "
+            "give an adjacency matrix with the same labels on rows and columns"
         )
     parts = [list(table[table.columns[i]]) for i in columns]
     for what, column in zip(("source", "target"), parts, strict=False):
