@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.io.files import parse_toml, read_bytes
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
@@ -40,6 +40,7 @@ class _Block(NamedTuple):
     leads: bool
 
 
+@gated
 @dataclass(frozen=True)
 class Ensemble:
     """A family of random signed digraphs of stated classes, each a function of its number alone.

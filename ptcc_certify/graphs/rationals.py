@@ -105,6 +105,26 @@ def whole_number(value: Any, name: str, least: int, most: int) -> int:
     return number
 
 
+def number_within(value: Any, name: str, least: float, most: float) -> float:
+    """Return a float from ``least`` to ``most``; refuse anything else by name.
+
+    Raises
+    ------
+    ParameterError
+        The message tells the value and the domain.
+
+    Examples
+    --------
+    >>> number_within("1/2", "past", 0, 1)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: past = 1/2 is outside its domain; it must be a number from 0 to 1
+    """
+    if isinstance(value, int | float | Fraction) and least <= value <= most:
+        return float(value)
+    domain = f"a number from {least:g} to {most:g}"
+    raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
+
+
 def given(value: Any) -> str:
     """Return what was given for a parameter as a message quotes it, truth values as TOML writes them.
 

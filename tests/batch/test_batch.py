@@ -481,7 +481,7 @@ def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
 
 
 def test_an_unknown_setting_is_refused():
-    with pytest.raises(TypeError, match="speed"):
+    with pytest.raises(ParameterError, match="speed"):
         quickly(TRIANGLE, speed=3)
 
 

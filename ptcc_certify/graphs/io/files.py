@@ -48,6 +48,8 @@ def refuse_no_path(path: object) -> None:
 
 def read_bytes(path: Source, name: str) -> bytes:
     """Read a path, standard input (``-``) or a file object, and undo gzip; text becomes UTF-8."""
+    if not isinstance(path, str | os.PathLike) and not callable(getattr(path, "read", None)):
+        raise FormatError(f"{shorten(repr(path))} is no file; ptcc_certify.as_graph takes other data")
     file = getattr(sys.stdin, "buffer", sys.stdin) if isinstance(path, str) and path == "-" else path
     try:
         if isinstance(file, str | os.PathLike):

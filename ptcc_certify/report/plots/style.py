@@ -18,6 +18,7 @@ from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatt
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.io.files import refuse_no_path
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
@@ -39,6 +40,8 @@ def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(plot)
     def drawn(subject: Any, *, ax: Axes | None = None, **keywords: Any) -> Any:
         if ax is not None:
+            if not isinstance(ax, Axes):
+                raise ParameterError(f"ax = {ax!r} is none; give axes of Matplotlib, or leave it out")
             return plot(subject, ax=ax, **keywords)
         with style.context(STYLE):
             return shown(plot(subject, **keywords))
@@ -88,6 +91,9 @@ def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: graph.jpg: figures are written to .png, .pdf, .svg; choose one of these
     """
+    refuse_no_path(path)
+    if not isinstance(drawn, FigureBase | Axes):
+        raise ParameterError(f"a {type(drawn).__name__} is no figure; give what a plot_ function returned")
     suffix = Path(path).suffix.lower()
     if suffix not in FIGURES:
         raise ParameterError(f"{path}: figures are written to {', '.join(FIGURES)}; choose one of these")
