@@ -90,10 +90,7 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
         actuator = shared.actuator_of(options)
-        limits = [] if actuator is None else [actuator]
-        return more | {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
-    if options["noise"] is not None:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
+        more |= {"limits": [] if actuator is None else [actuator], "delta": options["delta"], "noise": options["noise"]}
     return more
 
 

@@ -49,7 +49,7 @@ class Screen:
 
         if not self.quiet:
             width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
-            print_lines(wrap_lines(long(), width) if self.verbose else short())
+            click.echo("\n".join(wrap_lines(long(), width) if self.verbose else short()))
 
     def note(self, text: str) -> None:
         """Print one more line on standard output."""
@@ -78,11 +78,6 @@ def _on_terminal(stream: Any) -> bool:
     return stream is not None and stream.isatty()
 
 
-def print_lines(lines: Sequence[str]) -> None:
-    """Print lines."""
-    click.echo("\n".join(lines))
-
-
 def print_json(data: Any) -> None:
     """Print one JSON object, in ASCII: no label can spoil it or steer a terminal."""
     click.echo(json.dumps(data, allow_nan=False))
@@ -90,12 +85,14 @@ def print_json(data: Any) -> None:
 
 def refuse_output(output: str | None) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
-    if not output:
+    if output is None:
         return
-    if output == "-":
+    if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out (certify: and say --json)")
     if not Path(output).parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if not os.access(Path(output).parent, os.W_OK) and not os.path.exists(output):  # noqa: PTH110 - Path.exists may raise
+        raise ParameterError(f"{output}: nothing may be written to this folder; name another one")
     _refuse_input(output, output)
 
 
