@@ -173,7 +173,8 @@ def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certi
         code = f"import sys; sys.modules['{package}'] = None; from ptcc_certify.__main__ import main; main()"
         run = process("-c", code, "check", certificate)
         assert run.code == 2 and run.err.startswith(f"ptcc: ptcc needs the package {package},"), run
-        assert "python -m ptcc_certify.checker" in run.err and len(run.err.splitlines()) == 1
+        assert "pip install . in the project's folder; " in run.err and len(run.err.splitlines()) == 1
+        assert "python -m ptcc_certify.checker" in run.err
 
 
 def test_a_run_tells_what_was_written_and_meets_noise():
