@@ -142,13 +142,24 @@ def test_a_certificate_in_the_making_gives_way_to_a_control_that_is_moved():
         server.explorer.view = explorer_view  # type: ignore[method-assign]
         assert server.view(FEW)["checked"]
         with ThreadPoolExecutor(1) as other:
-            with server._drawing:  # something else is at work
-                waiting = other.submit(server.view, FEW)
-                while not other._work_queue.empty():
-                    time.sleep(0.01)
-                time.sleep(0.1)
-                server._moves += 1
+            done = threading.Event()
+            server._shown(lambda: done.wait() and server.explorer.preview(FEW))  # something else is at work
+            waiting = other.submit(server.view, FEW)
+            while server._work.empty():
+                time.sleep(0.01)
+            server._moves += 1
+            done.set()
             assert isinstance(waiting.exception(), Superseded)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="open files are told elsewhere there")
+def test_requests_open_fonts_once(server: ExplorerServer):
+    """Every one of these has a thread of its own."""
+    fonts = []
+    for _ in range(3):
+        assert get(server, server.root + "preview?graph=fig1a")[0] == 200
+        fonts.append(sum(file.resolve().suffix == ".ttf" for file in Path("/proc/self/fd").iterdir()))
+    assert fonts[2] == fonts[1] == fonts[0] > 0
 
 
 def test_an_address_that_is_none_is_refused(server: ExplorerServer):
