@@ -7,7 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
-from click.shell_completion import BashComplete, CompletionItem, add_completion_class, get_completion_class
+from click.shell_completion import (
+    BashComplete,
+    CompletionItem,
+    FishComplete,
+    ShellComplete,
+    ZshComplete,
+    add_completion_class,
+    get_completion_class,
+)
 
 CERTIFICATES = (".json",)
 #: Endings of graphs, and of scenarios, which stand for one.
@@ -31,7 +39,34 @@ class _Bash(BashComplete):
     )
 
 
-add_completion_class(_Bash, "bash")
+class _WholeWord(ShellComplete):
+    """A shell that puts what completes in place of the whole word: of ``--option=value`` too."""
+
+    def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem]:
+        items = super().get_completions(args, incomplete)
+        option, sign, _ = incomplete.partition("=")
+        for item in items if sign and option.startswith("--") else ():
+            item.value = f"{option}={item.value}"
+        return items
+
+
+class _Zsh(_WholeWord, ZshComplete):
+    """Zsh, told to add no blank after a folder."""
+
+    source_template = ZshComplete.source_template.replace(
+        "compadd -U -V unsorted -a completions",
+        "compadd -U -V unsorted -- ${completions:#*/}; compadd -U -S '' -V unsorted -- ${(M)completions:#*/}",
+    )
+
+
+class _Fish(_WholeWord, FishComplete):
+    """Fish, told that a name may hold commas."""
+
+    source_template = FishComplete.source_template.replace('string split "," ', 'string split --max 1 "," ')
+
+
+for _shell, _name in ((_Bash, "bash"), (_Zsh, "zsh"), (_Fish, "fish")):
+    add_completion_class(_shell, _name)
 
 
 @click.command()
