@@ -65,7 +65,7 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
         return parse_exact(value)
     if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
         value = value.item()  # type: ignore[attr-defined]  # NumPy's True is no bool, but its item is
-    if isinstance(value, bool | bytes | bytearray):
+    if isinstance(value, bool | bytes | bytearray) or getattr(value, "ndim", False):
         raise NumberError(f"{name} is {shorten(repr(value))}, not a number")
     if isinstance(value, Integral):
         return Fraction(int(value))

@@ -201,7 +201,7 @@ class ExpressionDisturbance(Disturbance):
 
         try:
             return to_latex(symbolic(self._program(agent), {name: ca.SX.sym(name) for name in ATOMS}))
-        except RecursionError:
+        except (RecursionError, SystemError):  # the second: CasADi before 3.8
             raise ParameterError(f'disturbance "{shorten(self.text)}" is too long to be printed as LaTeX') from None
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:

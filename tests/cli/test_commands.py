@@ -12,7 +12,7 @@ import click
 import numpy as np
 import pytest
 from bad_inputs import Run, ptcc
-from click.shell_completion import BashComplete, ShellComplete
+from click.shell_completion import ShellComplete, get_completion_class
 from side_files import with_side_files
 
 import ptcc_certify
@@ -210,7 +210,8 @@ def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certi
         code = f"import sys; sys.modules['{package}'] = None; from ptcc_certify.__main__ import main; main()"
         run = process("-c", code, "check", certificate)
         assert run.code == 2 and run.err.startswith(f"ptcc: ptcc needs the package {package},"), run
-        assert "python -m ptcc_certify.checker" in run.err and len(run.err.splitlines()) == 1
+        assert "pip install . in the project's folder; " in run.err and len(run.err.splitlines()) == 1
+        assert "python -m ptcc_certify.checker" in run.err
 
 
 def test_a_run_tells_what_was_written_and_meets_noise():
@@ -314,11 +315,15 @@ def test_completion_imports_nothing_that_computes():
     assert process("-c", code).out == "set()\n"
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_of_each_shell_is_printed(shell: str):
+@pytest.mark.parametrize(
+    ("shell", "words"),
+    [("bash", '"${value%/}"); [[ $value == *[./]* ]] && compopt'), ("zsh", "compadd -U -S '' "), ("fish", "--max 1 ")],
+)
+def test_the_script_of_each_shell_is_printed_with_what_click_leaves_out(shell: str, words: str):
     run = ptcc("completion", shell)
-    assert run.code == 0 and f"{shell}_complete" in run.out
-    if shell == "bash":
-        assert '"${value%/}"' in run.out and "compopt -o filenames" in run.out
-        assert "COMPREPLY+=($value)" in BashComplete.source_template
+    assert run.code == 0 and f"{shell}_complete" in run.out and words in run.out
+    kind = get_completion_class(shell)
+    assert kind is not None
+    values = [item.value for item in kind(cli, {}, "ptcc", "_PTCC_COMPLETE").get_completions(["certify"], "--method=p")]
+    assert values == [f"{'' if shell == 'bash' else '--method='}{name}" for name in ("paper", "perron")]
     assert isinstance(cli, click.Group)

@@ -49,7 +49,7 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}
     there = {name: part for name, part in parts.items() if part[0].size}
     samples, colours = zip(*there.values(), strict=True)
-    ax.hist(samples, BARS, color=colours, label=list(there), stacked=True)
+    ax.hist(samples, BARS, color=list(colours), label=list(there), stacked=True)
     return finished(ax, "final state", "agents")
 
 
