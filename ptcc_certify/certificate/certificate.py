@@ -270,7 +270,9 @@ class Certificate(Content, Shown):
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
-        behaviour = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
+        behaviour = f"{len(self.structure.components)} components"
+        if self.claim:
+            behaviour = (self.claim.behaviour, *self.claim.special)[-1]
         return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
 
@@ -313,7 +315,7 @@ def read_certificate(
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
     >>> saved, saved.checked.accepted, [str(x) for x in saved.final_state.states]
-    (Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
+    (Certificate(signed-average consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
     >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
     True
     >>> saved.with_simulation(samples=11).comparison.violated
