@@ -178,9 +178,10 @@ def certify(
     FinalState(1=-1, 2=1)
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
-    >>> cert, cert.reaching
-    (Certificate(signed-average consensus, Theorem 4.1, rate 3.99999, certified), (ReachingTime(0.43409, 0.565 before T_r), \
-ReachingTime(0, 1 before T_r)))
+    >>> cert
+    Certificate(signed-average consensus, Theorem 4.1, rate 3.99999, certified)
+    >>> cert.reaching
+    (ReachingTime(0.43409, 0.565 before T_r), ReachingTime(0, 1 before T_r))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
