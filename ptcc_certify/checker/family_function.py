@@ -1,8 +1,8 @@
 """Verifies the Lyapunov functions of a family: one quadratic form for every signal, and what it says of agents.
 
 Section 15 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
-make of them at rest; ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``, ``|delta_e| <= radius_e``, in every
-mode.
+make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``,
+``|delta_e| <= radius_e``.
 """
 
 from __future__ import annotations
@@ -166,8 +166,8 @@ def _projected(component: Component, v: int, rows: dict[int, Vector]) -> Vector:
 def _decreases(doc: Document, mode: QuotientMode, P: Matrix, b: Fraction, witness: Any) -> None:
     """Verify ``P > 0`` and ``P A + A'P >= b P`` for all members of a mode.
 
-    With multipliers ``tau > 0``: ``[[P A_0 + A_0'P - b P - H diag(tau) H', P F diag(r)], [.., diag(tau)]] > 0``. Without:
-    every ``P f_e`` is a multiple ``c_e >= 0`` of ``h_e``, so that the least weights are the worst.
+    With multipliers ``tau > 0``: ``[[P A_0 + A_0'P - b P - H diag(tau) H', P F diag(r)], [.., diag(tau)]] > 0``.
+    Without: every ``P f_e`` is a multiple ``c_e >= 0`` of ``h_e``, so that the least weights are the worst.
     """
     n, zero = len(P), Fraction(0)
     moves = any(map(bool, mode.center)) or bool(mode.parts)
