@@ -243,14 +243,14 @@ def root_above(x: Fraction) -> Fraction:
 
 
 def rounded_up(x: Fraction) -> Fraction:
-    """Return a number of 53 bits that is not below ``x >= 0``.
+    """Return a number of 53 bits or so that is not below ``x``.
 
     Examples
     --------
-    >>> rounded_up(Fraction(1, 3)) > Fraction(1, 3), rounded_up(Fraction(3))
-    (True, Fraction(3, 1))
+    >>> rounded_up(Fraction(1, 3)) > Fraction(1, 3), rounded_up(Fraction(-1, 3)) > Fraction(-1, 3), rounded_up(Fraction(3))
+    (True, True, Fraction(3, 1))
     """
     if not x:
         return x
-    unit = Fraction(2) ** (x.numerator.bit_length() - x.denominator.bit_length() - _CONSTANT_BITS)
+    unit = Fraction(2) ** (abs(x.numerator).bit_length() - x.denominator.bit_length() - _CONSTANT_BITS)
     return -(-x // unit) * unit

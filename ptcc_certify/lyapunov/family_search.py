@@ -81,7 +81,7 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     >>> best = search_family(Quotient.of(decide(Family.switching([day, night]))[0])).functions[0]
     >>> round(float(best.rate), 2), len(best.rates), float(best.rates[1]) >= float(best.rate)
-    (1.76, 2, True)
+    (0.96, 2, True)
     """
     if not quotient.nodes or all(mode.at_rest for mode in quotient.modes):
         return FamilySearch()

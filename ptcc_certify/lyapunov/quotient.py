@@ -128,7 +128,7 @@ class Quotient:
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     >>> quotient = Quotient(Family.switching([day, night]))
     >>> quotient.pivots, quotient.nodes, quotient.modes[1].center
-    ((0,), (1, 2), [[Fraction(1, 1), Fraction(2, 1)], [Fraction(0, 1), Fraction(2, 1)]])
+    ((0,), (1, 2), [[Fraction(1, 1), Fraction(-2, 1)], [Fraction(0, 1), Fraction(2, 1)]])
     """
 
     def __init__(self, family: Family, kernel: Kernel | None = None):
