@@ -31,7 +31,7 @@ _STEPS, _GAIN = 12, 1e-4
 #: How much smaller than the last ``P`` the next one may be in some direction, and the largest condition of ``P``.
 _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 #: Rows up to which Clarabel takes a matrix as it is.
-_WHOLE_ROWS = 24
+_WHOLE_ROWS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,6 +280,67 @@ def _run(problem: Any, rows: int, tolerance: float) -> None:
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
         run_solver(problem, "clarabel", options)
     checkpoint()
+
+
+def least_condition(
+    modes: Sequence[UncertainMatrix], rates: Sequence[float], *, shape: str = "full", tolerance: float = 1e-7
+) -> CommonCertificate:
+    """Find one ``P`` of least condition that has given rates: ``minimise c`` subject to ``I <= P <= c I``.
+
+    Parameters
+    ----------
+    modes : sequence of UncertainMatrix
+    rates : sequence of float
+        One of each mode, less than what some ``P`` has.
+    shape : {"full", "diagonal"}
+    tolerance : float
+        Relative gap asked of the solver.
+
+    Returns
+    -------
+    CommonCertificate
+        Its rates may lie below the wanted ones by what the solver leaves.
+
+    Raises
+    ------
+    NoCertificate
+        The solver found none, or this is a forked process.
+    numpy.linalg.LinAlgError
+        What it returned is not positive definite.
+    OutOfTime
+        The time limit is reached.
+
+    Examples
+    --------
+    >>> fast = UncertainMatrix.known([[1.0, 9.0], [0.0, 2.0]])
+    >>> least_condition([fast], [1.9]).condition < common_lyapunov([fast]).condition
+    True
+    """
+    if child_process.forked:
+        raise NoCertificate("Clarabel is not run in a forked process")
+    with uncounted():
+        import cvxpy as cp
+    n = len(modes[0].A)
+    pairs = [mode.transformed(np.eye(n)) for mode in modes]
+    p = cp.Variable(n) if shape == "diagonal" else cp.Variable((n, n), symmetric=True)
+    P, c = cp.diag(p) if shape == "diagonal" else p, cp.Variable()
+    constraints = [p >= 1, p <= c] if shape == "diagonal" else [P >> np.eye(n), P << c * np.eye(n)]
+    taus = []
+    for (mode, _), rate in zip(pairs, rates, strict=True):
+        taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
+        unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
+        constraints.append(_inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
+    problem = cp.Problem(cp.Minimize(c), constraints)
+    _run(problem, n + max(mode.radii.size for mode in modes), tolerance)
+    if p.value is None or not np.isfinite(p.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
+    top = float(np.linalg.eigvalsh(value)[-1])
+    multipliers = [
+        np.zeros(0) if tau is None else np.maximum(tau.value, 1e-12) / scale / top
+        for tau, (_, scale) in zip(taus, pairs, strict=True)
+    ]
+    return evaluate(value / top, modes, multipliers)
 
 
 def evaluate(P: np.ndarray, modes: Sequence[UncertainMatrix], multipliers: Sequence[np.ndarray]) -> CommonCertificate:

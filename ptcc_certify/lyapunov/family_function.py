@@ -247,7 +247,8 @@ def rounded_up(x: Fraction) -> Fraction:
 
     Examples
     --------
-    >>> rounded_up(Fraction(1, 3)) > Fraction(1, 3), rounded_up(Fraction(-1, 3)) > Fraction(-1, 3), rounded_up(Fraction(3))
+    >>> third = Fraction(1, 3)
+    >>> rounded_up(third) > third, rounded_up(-third) > -third, rounded_up(Fraction(3))
     (True, True, Fraction(3, 1))
     """
     if not x:

@@ -4,8 +4,8 @@
 
 - ``b <= 2 Re lambda`` for every eigenvalue of every member, and of every convex combination of members, which fast
   switching approximates; and so for their mean, the trace over n;
-- ``b <= -2 ln rho(Phi) / h`` for every periodic word ``Phi = prod exp(-A_i h_i)``, ``h = sum h_i``, ``rho`` the spectral
-  radius.
+- ``b <= -2 ln rho(Phi) / h`` for every periodic word ``Phi = prod exp(-A_i h_i)``, ``h = sum h_i``, with ``rho`` the
+  spectral radius.
 
 They are found in floating point; an eigenvalue is proved by inertia (:mod:`ptcc_certify.lyapunov.rate_upper_bound`), a
 word in ball arithmetic.
@@ -119,7 +119,7 @@ def prove_family_rate_bound(quotient: Quotient, seed: int = 0) -> FamilyRateBoun
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     >>> bound = prove_family_rate_bound(Quotient(Family.switching([day, night])))
     >>> bound.kind, round(float(bound.value), 2)
-    ('word', 0.97)
+    ('word', 1.41)
     """
     if not quotient.nodes:
         return None

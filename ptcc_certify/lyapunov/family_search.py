@@ -11,13 +11,14 @@ docs/theory/families.md, "Common quadratic functions", "Uncertain weights" and "
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
-from lmi.common import CommonCertificate, best_multipliers, common_lyapunov
+from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError
 from lmi.search_time import checkpoint, seconds_left, share_of_time
@@ -31,6 +32,9 @@ from ptcc_certify.lyapunov.undirected_family import undirected_function
 FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
 #: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
 _DIAGONAL_SHARE = 0.3
+#: Losses of the rate for which a smaller overshoot constant is looked for, unless it is as good as this; and by what
+#: factor it has to be smaller.
+_LOSSES, _GOOD_CONDITION, _WORTH = (1e-3, 0.03, 0.2), 4.0, 0.7
 _MATRIX_BITS, _MULTIPLIER_BITS = 60, 40
 
 
@@ -101,7 +105,8 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
                 continue
             with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
                 try:
-                    functions += _common_function(quotient, kind, notes)
+                    for function in _common_functions(quotient, kind, notes):
+                        functions.append(function)
                 except (LMIError, np.linalg.LinAlgError) as error:
                     if type(error).__name__ == "OutOfTime":
                         raise
@@ -110,16 +115,28 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
 
 
-def _common_function(quotient: Quotient, kind: str, notes: list[str]) -> Iterator[FamilyFunction]:
+def _common_functions(quotient: Quotient, kind: str, notes: list[str]) -> Iterator[FamilyFunction]:
+    """Yield the function of the largest rate, then slower ones whose overshoot constants are much smaller."""
     moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
     arrays = [quotient.modes[number].array for number in moving]
     with np.errstate(all="ignore"):
-        certificate = best_multipliers(common_lyapunov(arrays, shape=kind), arrays)
-    function = prove_certificate(quotient, kind, certificate, moving)
-    if function is None:
-        notes.append(f"class {kind}: the rate {certificate.rate:.6g} is not proved")
-    else:
-        yield function
+        best = common_lyapunov(arrays, shape=kind)
+        condition = math.inf
+        for loss in (0.0, *_LOSSES):
+            if condition <= _GOOD_CONDITION or (loss and not best.rate > 0):
+                return
+            certificate = (
+                best if not loss else least_condition(arrays, [best.rate * (1 - loss)] * len(arrays), shape=kind)
+            )
+            if not certificate.condition < _WORTH * condition:
+                continue
+            certificate = best_multipliers(certificate, arrays)
+            function = prove_certificate(quotient, kind, certificate, moving)
+            if function is None:
+                notes.append(f"class {kind}: the rate {certificate.rate:.6g} is not proved")
+            else:
+                condition = certificate.condition
+                yield function
 
 
 def prove_certificate(
