@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -28,7 +28,7 @@ import numpy as np
 from lmi.common import UncertainMatrix
 from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
-from ptcc_certify.lyapunov.family_function import rounded_up
+from ptcc_certify.lyapunov.family_function import FamilyFunction, rounded_up
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import prove_slow_eigenvalues
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
@@ -40,8 +40,11 @@ _GAPS = (1e-8, 1e-6, 1e-4, 1e-2)
 _SHARE_BITS, _BALL_BITS = 20, (128, 512)
 #: Members improved at random for each mode, members of a mode that are mixed, and candidates that are proved.
 _RANDOM, _MIXED, _PROVED = 4, 3, 4
-#: Durations of a word, in units of the mean time of an agent.
-_DURATIONS = (0.1, 0.3, 1.0, 3.0)
+#: Functions that are played against, steps of a play and those that a word may have, letters of a word, step lengths
+#: in units of the mean time of an agent.
+_PLAYED, _STEPS, _WINDOW, _LETTERS, _STEP = 2, 400, 120, 12, (0.03, 0.2)
+#: Durations of a word, in units of the mean time of an agent, and their range.
+_DURATIONS, _RANGE = (0.1, 0.3, 1.0, 3.0), (1e-3, 10.0)
 #: Gain of a word or mixture over what it is made of, relatively, that is worth naming it.
 _WORTH = 1e-4
 
@@ -103,12 +106,16 @@ class Candidate:
     durations: tuple[float, ...] = (1.0,)
 
 
-def prove_family_rate_bound(quotient: Quotient, seed: int = 0) -> FamilyRateBound | None:
+def prove_family_rate_bound(
+    quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0
+) -> FamilyRateBound | None:
     """Find and prove an upper bound on the rate for every signal; None if none is proved, or nothing moves.
 
     Parameters
     ----------
     quotient : Quotient
+    functions : sequence of FamilyFunction
+        Lyapunov functions, against which signals are played: at every instant the member by which one falls least.
     seed : int
         Of the members that are drawn at random.
 
@@ -123,20 +130,27 @@ def prove_family_rate_bound(quotient: Quotient, seed: int = 0) -> FamilyRateBoun
     """
     if not quotient.nodes:
         return None
-    for candidate in rate_bounds(quotient, seed)[:_PROVED]:
+    candidates = rate_bounds(quotient, functions, seed)
+    proved: list[FamilyRateBound] = []
+    members = [c for c in candidates if c.kind == "member"]  # what floats say of words may be wrong, of members hardly
+    for candidate in dict.fromkeys([*candidates[:_PROVED], members[0]]):
         checkpoint()
-        if (proved := prove_candidate(quotient, candidate)) is not None:
-            return proved
-    return None
+        if proved and candidate.value >= min(proved, key=lambda b: b.value).value:
+            continue
+        if (bound := prove_candidate(quotient, candidate)) is not None:
+            proved.append(bound)
+    return min(proved, key=lambda bound: bound.value, default=None)
 
 
-def rate_bounds(quotient: Quotient, seed: int = 0) -> list[Candidate]:
+def rate_bounds(quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0) -> list[Candidate]:
     """Return upper bounds as floating point has them, the least first: of members, mixtures and words."""
     search = _CapSearch(quotient, np.random.default_rng(seed))
     members = [m for number in range(len(quotient.modes)) for m in search.members(number)]
     bounds = [*members, *search.mixtures(members)]
     best = min(c.value for c in bounds)
-    bounds += (word for word in search.words(members) if word.value < best - _WORTH * abs(best))
+    forms = [np.array([[float(x) for x in row] for row in V.matrix]) for V in functions[:_PLAYED]]
+    words = [*search.words(members), *(word for P in forms for word in search.played_words(P))]
+    bounds += (word for word in words if word.value < best - _WORTH * abs(best))
     return sorted(bounds, key=lambda c: (c.value, len(c.members)))
 
 
@@ -258,7 +272,6 @@ class _CapSearch:
         from itertools import combinations
 
         from scipy.linalg import expm
-        from scipy.optimize import minimize
 
         own = [c.members[0] for c in sorted(members, key=lambda c: c.value)][: 2 * _MIXED]
         matrices = [self.matrix(m) for m in own]
@@ -272,29 +285,75 @@ class _CapSearch:
                     rate = _word_rate(steps[j, g] @ steps[i, h], (h + g) * unit)
                     trials.append((rate, (i, j), (h, g)))
         trials.sort()
-        for _, letters, durations in trials[:2]:
+        for rate, letters, durations in trials[:2]:
             checkpoint()
-
-            def rate_of(logs: np.ndarray, letters: Sequence[int] = letters) -> float:
-                times, Phi = np.exp(logs), np.eye(len(matrices[0]))
-                for i, h in zip(letters, times, strict=True):
-                    Phi = expm(-matrices[i] * (h * unit)) @ Phi
-                return _word_rate(Phi, float(times.sum()) * unit)
-
-            found = minimize(rate_of, np.log(durations), method="Nelder-Mead", options={"maxfev": 80, "xatol": 1e-3})
-            times = tuple(float(h) * unit for h in np.exp(np.clip(found.x, -7, 4)))
-            yield Candidate(float(found.fun), "word", tuple(own[i] for i in letters), times)
-            for i in range(len(own)) if len(own) > 2 else ():
+            times = tuple(h * unit for h in durations)
+            pair = self._tuned(Candidate(rate, "word", tuple(own[i] for i in letters), times))
+            yield pair
+            for member in own if len(own) > 2 else ():
                 checkpoint()
-                logs = np.append(found.x, np.log(0.3))
-                more = minimize(
-                    lambda x, i=i, letters=letters: rate_of(x, (*letters, i)),
-                    logs,
-                    method="Nelder-Mead",
-                    options={"maxfev": 80, "xatol": 1e-3},
-                )
-                times = tuple(float(h) * unit for h in np.exp(np.clip(more.x, -7, 4)))
-                yield Candidate(float(more.fun), "word", tuple(own[k] for k in (*letters, i)), times)
+                longer = replace(pair, members=(*pair.members, member), durations=(*pair.durations, 0.3 * unit))
+                yield self._tuned(longer)
+
+    def played_words(self, P: np.ndarray) -> Iterator[Candidate]:
+        """Yield the worst word at the end of a play against ``x' P x``, with steps of several lengths."""
+        from scipy.linalg import expm
+
+        n = len(P)
+        unit = n / max(float(np.mean([np.trace(array.A) for array in self.arrays])), 1e-300)
+        for step in _STEP:
+            x, letters, flows = self.rng.standard_normal(n), [], {}
+            for _ in range(_STEPS):
+                checkpoint()
+                member = self._worst(P, x)
+                if member not in flows:
+                    flows[member] = expm(-self.matrix(member) * (step * unit))
+                x = flows[member] @ x
+                x /= max(float(np.linalg.norm(x)), 1e-300)
+                letters.append(member)
+            Phi, best, length = np.eye(n), np.inf, 0
+            for count, member in enumerate(letters[: -_WINDOW - 1 : -1], 1):
+                Phi = Phi @ flows[member]
+                if (rate := _word_rate(Phi, count * step * unit)) < best:
+                    best, length = rate, count
+            word: list[tuple[Member, float]] = []
+            for member in letters[len(letters) - length :]:
+                if word and word[-1][0] == member:
+                    member, duration = word.pop()
+                    word.append((member, duration + step * unit))
+                else:
+                    word.append((member, step * unit))
+            if 1 < len(word) <= _LETTERS:
+                yield self._tuned(Candidate(best, "word", *(tuple(column) for column in zip(*word, strict=True))))
+
+    def _worst(self, P: np.ndarray, x: np.ndarray) -> Member:
+        """Return the member by which ``x' P x`` falls least."""
+        gradient, least, worst = P @ x, np.inf, None
+        for mode, array in enumerate(self.arrays):
+            slopes = (gradient @ array.F) * (x @ array.H)
+            member = self._member(mode, np.where(slopes < 0, 1.0, 0.0))
+            if (fall := float(gradient @ self.matrix(member) @ x)) < least:
+                least, worst = fall, member
+        assert worst is not None
+        return worst
+
+    def _tuned(self, word: Candidate) -> Candidate:
+        """Improve the durations of a word."""
+        from scipy.linalg import expm
+        from scipy.optimize import minimize
+
+        matrices = [self.matrix(member) for member in word.members]
+        ends = [np.log(factor / np.mean([np.trace(A) for A in matrices]) * len(matrices[0])) for factor in _RANGE]
+
+        def rate_of(logs: np.ndarray) -> float:
+            times, Phi = np.exp(np.clip(logs, *ends)), np.eye(len(matrices[0]))
+            for A, h in zip(matrices, times, strict=True):
+                Phi = expm(-A * h) @ Phi
+            return _word_rate(Phi, float(times.sum()))
+
+        options = {"maxfev": 60 + 20 * len(matrices), "xatol": 1e-3}
+        found = minimize(rate_of, np.log(word.durations), method="Nelder-Mead", options=options)
+        return replace(word, value=float(found.fun), durations=tuple(np.exp(np.clip(found.x, *ends)).tolist()))
 
 
 def _slowest_rate(A: np.ndarray) -> float:

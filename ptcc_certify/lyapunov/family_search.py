@@ -45,7 +45,7 @@ class FamilySearch:
     Attributes
     ----------
     functions : tuple of FamilyFunction
-        Proved; the largest rate first.
+        Proved; the largest rate first, that of the slowest mode in which something moves.
     notes : tuple of str
         What failed, and why.
     cut_off : tuple of str
@@ -57,7 +57,9 @@ class FamilySearch:
     cut_off: tuple[str, ...] = ()
 
 
-def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "diagonal", "full")) -> FamilySearch:
+def search_family(
+    quotient: Quotient, kinds: Sequence[str] = ("undirected", "diagonal", "full"), enough: Fraction | None = None
+) -> FamilySearch:
     """Search and prove Lyapunov functions of a family for every signal.
 
     Parameters
@@ -67,6 +69,8 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
         at rest, which then have rates of 0 or below.
     kinds : sequence of {"undirected", "diagonal", "full"}
         What to search. ``undirected`` costs one eigenvalue and where it is optimal ends the search.
+    enough : Fraction, optional
+        A rate that ends the search, such as 0.99 of a proved upper bound.
 
     Returns
     -------
@@ -98,7 +102,9 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
     if not any(V.optimal for V in functions):
         limited = np.isfinite(seconds_left())
         for kind, rows, share in (("diagonal", DIAGONAL_ROWS, _DIAGONAL_SHARE), ("full", FULL_ROWS, 1.0)):
-            if kind not in kinds:
+            if kind not in kinds or (
+                enough is not None and any(_moving_rate(quotient, V) >= enough for V in functions)
+            ):
                 continue
             if len(quotient.nodes) > rows:
                 notes.append(f"class {kind} is searched up to {rows} rows; these are {len(quotient.nodes)}")
@@ -111,8 +117,13 @@ def search_family(quotient: Quotient, kinds: Sequence[str] = ("undirected", "dia
                     if type(error).__name__ == "OutOfTime":
                         raise
                     notes.append(f"class {kind}: {error}")
-    functions.sort(key=lambda V: (-V.rate, V.overshoot))
+    functions.sort(key=lambda V: (-_moving_rate(quotient, V), V.overshoot))
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
+
+
+def _moving_rate(quotient: Quotient, V: FamilyFunction) -> Fraction:
+    """Return the least rate of the modes in which something moves."""
+    return min(rate for rate, mode in zip(V.rates, quotient.modes, strict=True) if not mode.at_rest)
 
 
 def _common_functions(quotient: Quotient, kind: str, notes: list[str]) -> Iterator[FamilyFunction]:
