@@ -51,7 +51,7 @@ class FamilyFunction:
         Of the kind ``undirected``: ``p > 0`` with ``p' M(L) = 0`` for every member, ``M(L)`` with ``-|w|`` off the
         diagonal.
     optimal : bool
-        Whether no rate of any kind is larger: ``diag(p) L`` is symmetric in the slowest mode.
+        Whether no rate of any kind is larger: ``diag(p) L`` is symmetric in the slowest mode in which something moves.
     input_constants : tuple of N Fraction
         ``|(L X)_k|^2 <= input_constants[k] V`` for every member ``L``.
     coordinate_constants : tuple of n Fraction

@@ -33,7 +33,7 @@ Vector = tuple[Fraction, ...]
 
 
 def undirected_function(quotient: Quotient) -> FamilyFunction | None:
-    """Return the function of the module, proved; None if there is no common left vector, or too many nodes.
+    """Return the function of the module, proved; None if no common left vector is found, there are too many nodes, or all rest.
 
     Examples
     --------
@@ -63,7 +63,10 @@ def undirected_function(quotient: Quotient) -> FamilyFunction | None:
         numerical.append(guess)
         nodes = range(family.n_nodes)
         symmetric.append(all(p[i] * L[i][j] == p[j] * L[j][i] for i in nodes for j in nodes if i < j))
-    optimal = symmetric[rates.index(min(rates))]
+    moving = [i for i, own in enumerate(quotient.modes) if not own.at_rest]
+    if not moving:
+        return None
+    optimal = symmetric[min(moving, key=lambda i: rates[i])]
     function = FamilyFunction(
         "undirected",
         quotient.pivots,
