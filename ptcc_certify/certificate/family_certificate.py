@@ -28,7 +28,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, behaviour_name
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse, behaviour_name
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import search_family
@@ -36,6 +36,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_groups import FamilyGroups
 
 STEPS = ("the decision", "Lyapunov functions", "upper bound on the decay rate", "independent check")
 
@@ -172,7 +173,7 @@ class FamilyCertificate(Shown):
         if component.behaviour == BIPARTITE_CONSENSUS:
             assert component.gauge is not None
             camps = dict(enumerate(component.gauge.tolist()))
-            return dict(final_interval(range(n), camps, component.deciding_nodes.tolist(), moves, x))
+            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
         largest = max(map(abs, x))
         return {
             k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
@@ -183,7 +184,9 @@ class FamilyCertificate(Shown):
     def bounded(self) -> bool | None:
         """Whether the input is proved bounded for every signal and initial state; None if it is not."""
         pole = self.protocol.gain.pole
-        held = (part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts)
+        held = (
+            part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts
+        )
         return True if all(held) else None
 
     @cached_property
@@ -328,7 +331,7 @@ def certify_family(
         expectations = Expectations(behaviour_name(expectations))
     progress(STEPS[0])
     components = decide(family)
-    initial_state = None if x0 is None else read_initial_state(family.modes[0].mandatory, x0, "x0")
+    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     parts, notes = [], list(family.notes)
     with deadline.time_limit(time_limit):
         for component in components:

@@ -64,6 +64,7 @@ MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError
 __all__ = [
     "INPUT_NODES",
     "MANY_COMPONENTS",
+    "NOT_OF_FAMILIES",
     "OBLIGATIONS",
     "REACHING_BITS",
     "SCHEMA",

@@ -237,7 +237,7 @@ def _component(
         behaviour, kernel = CONSENSUS, {v: {number: Fraction(camps[v] * camps[pivot])} for v in nodes}
     elif len(set(balanced)) == 1 and any(balanced):
         kernel = _check_kernel(doc, modes, inside, witness)
-        behaviour = DEPENDS if not kernel else INTERVAL if balanced[0] == 1 else CONTAINMENT
+        behaviour = DEPENDS if not kernel else INTERVAL if one_group else CONTAINMENT
         return Component(nodes, camps, behaviour, kernel, pivots)
     else:
         behaviour, kernel = (DEPENDS, {}) if any(balanced) else (STABILITY, {v: {} for v in nodes})

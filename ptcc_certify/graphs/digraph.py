@@ -223,7 +223,7 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
-        _refuse_unknown_orientation(orientation)
+        refuse_unknown_orientation(orientation)
         if not isinstance(edges, Iterable):
             raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
         known: dict[str, tuple[int, Hashable]] = {}
@@ -300,7 +300,7 @@ class SignedDigraph(ReadOnly, Shown):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
         if orientation is None:
             raise GraphError(f"a matrix {WAY}")
-        _refuse_unknown_orientation(orientation)
+        refuse_unknown_orientation(orientation)
         if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
@@ -616,7 +616,18 @@ _READ_DEFAULT: dict[str, Any] = {
 }
 
 
-def _refuse_unknown_orientation(orientation: str) -> None:
+def refuse_unknown_orientation(orientation: str) -> None:
+    """Refuse an orientation that is neither "information" nor "listens".
+
+    Raises
+    ------
+    GraphError
+        It is another.
+
+    Examples
+    --------
+    >>> refuse_unknown_orientation("listens")
+    """
     if orientation not in ("information", "listens"):
         raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError
-from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels
+from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels, refuse_unknown_orientation
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 
@@ -295,7 +295,7 @@ class Family(Shown):
         Raises
         ------
         GraphError
-            ``least > largest``, both are 0, an edge occurs twice or is a loop.
+            ``least > largest``, both are 0, an edge occurs twice or is a loop, or the orientation is unknown.
 
         Examples
         --------
@@ -304,6 +304,7 @@ class Family(Shown):
         (Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional), ('1 weight of unknown sign was read as two \
 edges that may fail, one of each sign',))
         """
+        refuse_unknown_orientation(orientation)
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []
         unsure = 0
         for edge in edges:
@@ -377,9 +378,9 @@ def read_share(value: Any) -> Fraction:
     """
     percent = isinstance(value, str) and value.strip().endswith("%")
     try:
-        share = as_fraction(value.strip()[:-1] if percent else value, "the uncertainty") / (100 if percent else 1)
+        share = as_fraction(value.strip()[:-1] if percent else value, "it") / (100 if percent else 1)
     except NumberError as error:
-        raise GraphError(str(error)) from None
+        raise GraphError(f"uncertainty {shorten(str(value))}: {error}") from None
     if not 0 <= share <= 1:
         hint = f"; write {format_exact(share)}% if it is one" if not percent and 1 < share <= 100 else ""
         raise GraphError(f"uncertainty {shorten(str(value))} is not from 0 to 1{hint}")

@@ -1,0 +1,108 @@
+"""Families of signed digraphs: what is taken, what is refused, and that names and orders do not count."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from ptcc_certify.errors import GraphError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from tests.families import KINDS, random_family
+
+GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Family.from_intervals([("a", "b", 2, 1)]), "least weight 2 is above the largest"),
+        (lambda: Family.from_intervals([("a", "b", 0, 0)]), "its weight is always 0"),
+        (lambda: Family.from_intervals([("a", "a", 1, 2)]), "a"),
+        (lambda: Family.from_intervals([("a", "b", 1, 2), ("a", "b", 1, 3)]), "a -> b"),
+        (lambda: Family.from_intervals([("a", "b", 1, 2), ("a", "b", -2, -1)]), "both signs in one mode"),
+        (lambda: Family.from_intervals([("a", "b", -1, 1), ("a", "b", 2, 3)]), "a -> b"),
+        (lambda: Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 2)], undirected=True), "->"),
+        (lambda: Family.from_intervals([("a", "b", 1)]), "is not (source, target, least, largest)"),
+        (lambda: Family.from_intervals([("a", "b", "nan", 1)]), 'edge a -> b: "nan"'),
+        (lambda: Family.from_intervals([("a", "b", 1, float("inf"))]), "edge a -> b:"),
+        (lambda: Family.from_intervals([("a", "b", 1, "x")]), "edge a -> b:"),
+        (lambda: Family.from_intervals([("a", "b", 1, 2)], orientation="up"), 'orientation "up" is unknown'),
+        (lambda: Family.from_intervals([]), "node"),
+        (lambda: Family.switching({}), "at least one mode"),
+        (
+            lambda: Family.switching({"day": GRAPH, "night": SignedDigraph.from_edges([("a", "b", 1)])}),
+            "night has no node c",
+        ),
+        (
+            lambda: Family.switching({"day": SignedDigraph.from_edges([("a", "b", 1)]), "night": GRAPH}),
+            "day has no node c",
+        ),
+        (lambda: Family.from_graph(GRAPH, uncertainty=-1), "is not from 0 to 1"),
+        (lambda: Family.from_graph(GRAPH, uncertainty=10), "write 10% if it is one"),
+        (lambda: Family.from_graph(GRAPH, uncertainty="much"), "uncertainty much"),
+        (lambda: Family.from_graph(GRAPH, optional=[("c", "b")]), "c -> b is not in the graph"),
+        (lambda: Family.from_graph(GRAPH, optional=["a"]), "is no pair of nodes"),
+        (lambda: Family.from_graph(GRAPH, optional=[("a", "z")]), "is no pair of nodes"),
+    ],
+)
+def test_a_bad_family_is_refused_in_one_line(make, words):
+    with pytest.raises(GraphError) as error:
+        make()
+    text = str(error.value)
+    assert words in text
+    assert "\n" not in text
+    assert len(text) < 200
+
+
+def test_a_mode_without_edges_and_a_single_node_are_families():
+    outage = SignedDigraph.from_edges([], nodes="abc")
+    assert len(Family.switching([GRAPH, outage]).modes) == 2
+    assert Family.from_intervals([], nodes=["a"]).n_nodes == 1
+
+
+def test_a_graph_is_a_family_of_one_mode_and_keeps_its_hash():
+    assert Family.from_graph(GRAPH).sha256 == GRAPH.sha256
+    assert Family.from_graph(GRAPH).graph == GRAPH
+
+
+def test_a_member_has_no_pair_with_both_signs():
+    mode = Family.from_intervals([("a", "b", -1, 2)]).modes[0]
+    assert mode.member(np.array([True, False])).edges == (("a", "b", Fraction(-1)),)
+    with pytest.raises(GraphError):
+        mode.member(np.array([True, True]))
+
+
+def test_all_members_lie_in_the_intervals():
+    for seed in range(60):
+        rng = random.Random(seed)
+        for mode in random_family(rng, KINDS[seed % len(KINDS)], wide=seed % 2 == 0).family.modes:
+            same = np.array([False, *((mode.source[1:] == mode.source[:-1]) & (mode.target[1:] == mode.target[:-1]))])
+            largest = np.array([rng.random() < 0.5 for _ in same], dtype=bool) & ~same
+            intervals = {}
+            for edge in range(mode.n_edges):
+                pair = mode.labels[mode.source[edge]], mode.labels[mode.target[edge]]
+                intervals.setdefault(pair, []).append(mode.edge_interval(edge))
+            for source, target, weight in mode.member(largest).edges:
+                assert any(low <= weight <= high for low, high in intervals[source, target])
+
+
+def test_the_order_of_nodes_and_rows_changes_neither_family_nor_hash():
+    rows = [("a", "b", 1, 2), ("c", "b", -1, 1), ("b", "a", "1/3", "1/2")]
+    one = Family.from_intervals(rows)
+    other = Family.from_intervals(rows[::-1], nodes="cba")
+    assert one == other
+    assert hash(one) == hash(other)
+    assert Family.switching([one, other]).modes[1].labels == one.labels
+    assert Family.switching([one, other]).modes[0].edge_interval(0) == Family.switching([one, other]).modes[
+        1
+    ].edge_interval(0)
+
+
+def test_undirected_edges_are_one_parameter_for_both_directions():
+    family = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 3, 3)], undirected=True)
+    assert family.modes[0].parameters.size == 1
+    assert family.modes[0].n_edges == 4
