@@ -20,6 +20,7 @@ import shutil
 import statistics
 import threading
 import time
+from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 from urllib.parse import urlencode
@@ -83,7 +84,7 @@ class Client:
         return seconds[0], seconds[1]
 
 
-def tell(label: str, pairs: list[tuple[float, ...]]) -> None:
+def tell(label: str, pairs: Sequence[tuple[float, ...]]) -> None:
     columns = [f"{statistics.median(seconds):7.2f} {max(seconds):7.2f}" for seconds in zip(*pairs, strict=True)]
     print(f"{label:<34}{len(pairs):>6}   {'   '.join(columns)}", flush=True)
 
@@ -104,7 +105,7 @@ def in_browser(server: ExplorerServer) -> None:
                 for k in range(10):
                     page.wait_for_selector("#verdict:not(.open)")
                     seconds.append((page.evaluate(MOVE_ON_PAGE, str(0.5 + k / 10)) / 1000,))
-                tell(f"{graph}, {kind}, in Chromium", seconds)  # type: ignore[arg-type]
+                tell(f"{graph}, {kind}, in Chromium", seconds)
         browser.close()
 
 
@@ -135,9 +136,9 @@ def main() -> None:
         for graph in (*GRAPHS, FORTY):
             client = Client(server, graph, kind)
             pairs = [client.move(name, value) for name, values in MOVES[kind].items() for value in values]
-            tell(f"{graph}, {kind}", pairs)  # type: ignore[arg-type]
+            tell(f"{graph}, {kind}", pairs)
             everything += pairs
-    tell("all", everything)  # type: ignore[arg-type]
+    tell("all", everything)
     if browser:
         in_browser(server)
     server.shutdown()

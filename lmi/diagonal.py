@@ -611,14 +611,14 @@ def solve(A: np.ndarray, least: float, tolerance: float, solver: str) -> np.ndar
         options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
-        _run(problem, solver, options)
+        run_solver(problem, solver, options)
     checkpoint()
     if omega.value is None or not np.isfinite(omega.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
     return omega.value
 
 
-def _run(built: Any, solver: str, options: dict[str, Any]) -> None:
+def run_solver(built: Any, solver: str, options: dict[str, Any]) -> None:
     """Run a solver; where Clarabel panics, once more without splitting the matrix, which makes rings 100 times slower.
 
     Raises
@@ -638,4 +638,4 @@ def _run(built: Any, solver: str, options: dict[str, Any]) -> None:
             raise
         if not options.get("chordal_decomposition_enable", True):
             raise NoCertificate("the solver failed: Clarabel panicked") from None
-    _run(built, solver, options | {"chordal_decomposition_enable": False})
+    run_solver(built, solver, options | {"chordal_decomposition_enable": False})

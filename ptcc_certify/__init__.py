@@ -31,10 +31,11 @@ Everything else is in the rooms of the package, which are loaded when they are n
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 _EXPORTS = {
@@ -104,10 +105,12 @@ class Room(ModuleType):
     """A package whose modules are loaded when they are named; called like a function, it names what is meant."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
+        from ptcc_certify.errors import ParameterError
+
         name = self.__name__.rpartition(".")[2]
         near = [public for public in _EXPORTS if name in public.split("_")]
         hint = f"; did you mean ptcc_certify.{' or '.join(near)}?" if near else ""
-        raise TypeError(f"{self.__name__} is a package of modules, not a function{hint}")
+        raise ParameterError(f"{self.__name__} is a package of modules, not a function{hint}")
 
 
 def modules_of(package: str) -> Callable[[str], Any]:
@@ -122,13 +125,13 @@ def modules_of(package: str) -> Callable[[str], Any]:
     def load(name: str) -> Any:
         if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
+        from ptcc_certify.errors import UnknownName, did_you_mean
+
         hint = ""
         if package == __name__:
-            from ptcc_certify.errors import did_you_mean
-
             meant = _ALSO_CALLED.get(name)
             hint = f"; did you mean {meant}?" if meant else did_you_mean(name, _EXPORTS)
-        raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
+        raise UnknownName(f"module {package!r} has no attribute {name!r}{hint}")
 
     sys.modules[package].__class__ = Room
     return load
@@ -139,13 +142,25 @@ _room = modules_of(__name__)
 
 def __getattr__(name: str) -> Any:
     if name in _EXPORTS:
-        return getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+        return _export(name)
     if name == "__version__":
         try:
             return version("ptcc-certify")
         except PackageNotFoundError:
             return "unknown"
     return _room(name)
+
+
+@cache
+def _export(name: str) -> Any:
+    """Return what is public; a function with the gate for its calls, which belongs to this module, as pickle asks."""
+    from ptcc_certify.errors import gated
+
+    public = getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+    if isinstance(public, FunctionType):
+        public = gated(public)
+        public.__module__ = __name__
+    return public
 
 
 def __dir__() -> list[str]:

@@ -10,9 +10,9 @@ def main() -> None:
 
         run()
     except ModuleNotFoundError as error:
-        what = f"ptcc needs the package {error.name}, which is not installed; pip install ptcc-certify"
+        what = f"ptcc needs the package {error.name}, which is not installed; pip install . in the project's folder"
         without = "without other packages: python -m ptcc_certify.checker CERTIFICATE"
-        print(f"ptcc: {what}, or, {without}", file=sys.stderr)
+        print(f"ptcc: {what}; {without}", file=sys.stderr)
         sys.exit(2)
 
 

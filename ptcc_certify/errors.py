@@ -4,12 +4,17 @@ Each class inherits :class:`PTCCError` and the built-in exception that fits, so 
 A message is one line: what is wrong, where, and how to mend it.
 """
 
+import inspect
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from enum import IntEnum
+from functools import wraps
 from itertools import islice
 from pathlib import Path
+from typing import Any, TypeVar
+
+Called = TypeVar("Called", bound=Callable[..., Any])
 
 
 class ExitCode(IntEnum):
@@ -106,6 +111,10 @@ class HypothesisError(PTCCError, ValueError):
     """
 
 
+class UnknownName(PTCCError, AttributeError):
+    """A room has no module, and the package no public name, that is called so."""
+
+
 class SimulationError(PTCCError, RuntimeError):
     """The integrator failed; the message names the cause.
 
@@ -155,6 +164,65 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
         return f"; did you mean {same}?"
     near = [lower[match] for match in get_close_matches(name.lower()[:200], lower, n=3, cutoff=0.6)]
     return f"; did you mean {' or '.join(near)}?" if near else ""
+
+
+#: Where a keyword belongs that a function does not have.
+_PLACES = dict.fromkeys(("T", "rho1", "rho2", "kappa"), "NominalProtocol")
+_PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtocol")
+_PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
+_PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
+#: What a parameter is called elsewhere, on the command line for one.
+_ALSO_CALLED = {"edges": "orientation", "direction": "orientation", "initial_state": "x0", "t": "times"}
+_ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
+
+
+def gated(called: Called) -> Called:
+    """Decorate a function, or a class: a call that does not fit its parameters is a :class:`ParameterError`.
+
+    Signature and documentation stay those of what is decorated.
+
+    Examples
+    --------
+    >>> @gated
+    ... def area(width, height=1): ...
+    >>> area(2, heigth=3)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: area has no parameter heigth; did you mean height?
+    """
+    if isinstance(called, type):
+        called.__init__ = gated(called.__init__)  # type: ignore[misc]
+        return called
+    signature = inspect.signature(called)
+
+    @wraps(called)
+    def gate(*args: Any, **keywords: Any) -> Any:
+        try:
+            signature.bind(*args, **keywords)
+        except TypeError:
+            raise ParameterError(_misfit(called, signature, args, keywords)) from None
+        return called(*args, **keywords)
+
+    return gate  # type: ignore[return-value]
+
+
+def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> str:
+    """Return what does not fit, and the mend."""
+    name = called.__qualname__.split(".")[-2] if called.__name__ == "__init__" else called.__name__
+    parameters = {key: one for key, one in signature.parameters.items() if key not in ("self", "cls")}
+    places = [key for key, one in parameters.items() if one.kind is one.POSITIONAL_OR_KEYWORD]
+    given = places[: len(args) - (len(parameters) < len(signature.parameters))]
+    if unknown := next((key for key in keywords if key not in parameters), None):
+        hint = did_you_mean(unknown, parameters) or f"; it has {', '.join(parameters)}"
+        if (meant := _ALSO_CALLED.get(unknown)) in parameters:
+            hint = f"; did you mean {meant}?"
+        elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
+            hint = f"; give it to {place}({unknown}=...)"
+        return f"{name} has no parameter {unknown}{hint}"
+    required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
+    if missing := [key for key in required if key not in given and key not in keywords]:
+        call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
+        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)})"
+    return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; write any other as name=value"
 
 
 def explain(error: Exception) -> str:

@@ -319,7 +319,7 @@ class Design(Shown):
     def deadline_text(self) -> str:
         """What is proved of shorter deadlines, in one line; empty where nothing is."""
         least, most = self.shortest_possible, self.shortest_certified
-        parts = [] if most is None else [f"{up(most, DIGITS)} is met"]
+        parts = [] if most is None else [f"{up(most, DIGITS)} is met" if most else "every one is met"]
         if most is not None and self.asked.deadline is not None and most < self.asked.deadline:
             parts = [f"every one from {up(most, DIGITS)} on is met (a search for the shortest may go lower)"]
         parts += [] if least is None else [f"no gains meet one below {down(least)}"]

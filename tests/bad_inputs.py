@@ -423,7 +423,7 @@ SLIDING = [
     _sliding("simulated: layer NaN", "boundary_layer", "--boundary-layer", "nan", command="simulate"),
     _sliding(
         "simulated: layer of the nominal protocol",
-        "boundary_layer",
+        "--boundary-layer belongs to --protocol sliding-mode",
         "--protocol",
         "nominal",
         "--boundary-layer",

@@ -195,12 +195,12 @@ def ours(function: Any) -> bool:
 
 
 def plain(function: Any) -> Any:
-    """Return the function behind a method, property or cached property."""
+    """Return the function behind a method, property, cached property or gate for its calls."""
     if isinstance(function, classmethod | staticmethod):
-        return function.__func__
-    if isinstance(function, property):
-        return function.fget
-    return function.func if isinstance(function, cached_property) else function
+        function = function.__func__
+    elif isinstance(function, property | cached_property):
+        function = function.fget if isinstance(function, property) else function.func
+    return inspect.unwrap(function) if callable(function) else function
 
 
 def own_docs(cls: type, name: str | None = None) -> list[str]:
@@ -386,7 +386,7 @@ def faults_of_parts(name: str, doc: str) -> Iterator[str]:
 
 def faults_of_function(function: Any, found: NumpyDocString) -> Iterator[str]:
     """Compare a function's sections with its signature and its source."""
-    signature, names = inspect.signature(function), aliases(function.__module__)
+    signature, names = inspect.signature(function), aliases(plain(function).__module__)
     yield from faults_of_entries(entries(found["Parameters"]), signature.parameters, names)
     yield from faults_of_result(function, found)
     if not found["Raises"] and raises(function):

@@ -3,6 +3,7 @@
 import builtins
 import copy
 import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -53,6 +54,44 @@ def test_a_copy_of_a_result_equals_it_and_has_its_hash(objects):
         for other in (pickle.loads(pickle.dumps(one)), copy.copy(one), copy.deepcopy(one)):  # noqa: S301 - our own
             assert other == one and hash(other) == hash(one), name
         assert one != 5 and len(repr(one)) < 2000
+
+
+def test_a_copy_of_a_graph_can_no_more_be_written_to_than_the_graph(cert):
+    for one in (cert, pickle.loads(pickle.dumps(cert)), copy.copy(cert), copy.deepcopy(cert)):  # noqa: S301 - our own
+        graph, structure, run = one.graph, one.structure, one.trajectory
+        for array in (graph.sign, graph.weights, graph.source, structure.leaders, structure.strong_component, run.t):
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0
+        for name in ("labels", "weights", "n_nodes"):
+            with pytest.raises(AttributeError, match="make another graph"):
+                setattr(graph, name, ())
+
+
+def test_parts_of_a_certificate_have_a_hash(cert):
+    parts = cert.effort, cert.proof, cert.search, cert.observed, cert.comparison, cert.obligations, cert.request
+    assert len({*parts, copy.deepcopy(cert.effort)}) == len(parts)
+
+
+def test_what_is_done_to_the_json_leaves_the_certificate_as_it_is(cert):
+    for one in (cert, ptcc.read_certificate(cert)):
+        one.to_dict()["claim"]["behaviour"] = "chaos"
+        assert one.to_dict()["claim"]["behaviour"] == cert.claim.behaviour
+
+
+def test_another_initial_state_has_its_own_final_state_and_no_run(cert):
+    other = cert.changed(initial_state=(Fraction(1), Fraction(1), Fraction(1)))
+    assert other.final_state == ptcc.final_state(TEAM, [1, 1, 1]) and other.trajectory is None
+
+
+def test_a_certificate_tells_what_its_graph_is_called_and_where_its_initial_state_comes_from():
+    fast = {"method": "perron", "simulation": False}
+    cert = ptcc.certify("fig1b", PROTOCOL, "random", **fast)
+    for one in (cert, ptcc.read_certificate(cert)):
+        assert one.request.origins == {"graph": "fig1b", "x(0)": "random, seed 0"}
+        assert one.summary().startswith("graph      fig1b: 6 nodes") and "; x(0) random, seed 0" in one.summary()
+    named = ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], origins={"graph": "team"}, **fast)
+    assert "team: 3 nodes" in named.summary() and "x(0) given" in named.summary()
+    assert named == ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], **fast)
 
 
 def test_results_that_differ_are_not_equal(cert):
@@ -134,7 +173,7 @@ def test_without_pandas_a_line_names_it(cert, monkeypatch):
 
 def test_parameters_of_a_protocol_are_replaced_by_name():
     assert PROTOCOL.replace(T=3, kappa="1/2") == ptcc.NominalProtocol(T=3, rho1=1, rho2=1, kappa="1/2")
-    with pytest.raises(ParameterError, match="gamma is no parameter of NominalProtocol; it has T, rho1, rho2, kappa"):
+    with pytest.raises(ParameterError, match="NominalProtocol has no parameter gamma; it has T, rho1, rho2, kappa"):
         PROTOCOL.replace(gamma=3)
 
 

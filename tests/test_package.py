@@ -1,5 +1,7 @@
 """Facts about the package as a whole: what it exports, and under which names."""
 
+import inspect
+import pickle
 import pkgutil
 import re
 import subprocess
@@ -15,6 +17,13 @@ def test_every_export_is_there_and_stays_what_it_is():
         assert getattr(ptcc_certify, name) == getattr(ptcc_certify, name)
         assert getattr(ptcc_certify, name).__doc__
     assert set(ptcc_certify.__all__) <= set(dir(ptcc_certify))
+
+
+def test_a_function_at_the_top_keeps_its_signature_and_is_pickled_by_its_name():
+    from ptcc_certify.certificate.procedure import certify
+
+    assert inspect.signature(ptcc_certify.certify) == inspect.signature(inspect.unwrap(certify))
+    assert pickle.loads(pickle.dumps(ptcc_certify.certify)) is ptcc_certify.certify  # noqa: S301 - our own
 
 
 def test_the_docstring_lists_every_name_at_the_top_and_there_are_few():

@@ -72,13 +72,13 @@ def test_transcripts_are_what_ptcc_prints(page: str):
 
 def test_the_reference_has_every_public_name(tmp_path: Path):
     write_reference(tmp_path / "reference")
-    named = set(
+    documented = set(
         re.findall(r"^\.\. auto\w+:: (\S+)", "".join(page.read_text() for page in tmp_path.rglob("*.rst")), re.M)
     )
-    assert {f"lmi.{name}" for name in lmi.__all__} <= named
+    assert {f"lmi.{name}" for name in lmi.__all__} <= documented
     functions = {name for name in ptcc_certify._EXPORTS if callable(getattr(ptcc_certify, name))}
-    assert {f"ptcc_certify.{name}" for name in functions} <= named
-    assert {name.rpartition(".")[2] for name in named} >= set(ptcc_certify._EXPORTS)
+    assert {f"ptcc_certify.{name}" for name in functions} <= documented
+    assert {name.rpartition(".")[2] for name in documented} >= set(ptcc_certify._EXPORTS)
 
 
 def test_the_gallery_has_every_figure():
@@ -87,15 +87,15 @@ def test_the_gallery_has_every_figure():
 
 
 @pytest.mark.parametrize(
-    ("lines", "kept"),
+    ("lines", "more"),
     [
         (["With", "", "    a + b", "    c"], 2),
         (["- a point", "", "  of two"], 0),
         (["Parameters", "---", "", "  x"], 0),
     ],
 )
-def test_equations_of_docstrings_are_literal(lines: list[str], kept: int):
-    assert len(literal(lines)) == len(lines) + kept
+def test_equations_of_docstrings_are_literal(lines: list[str], more: int):
+    assert len(literal(lines)) == len(lines) + more
     assert [line for line in literal(lines) if line != "::"][-1] == lines[-1]
 
 

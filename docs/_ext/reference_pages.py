@@ -48,9 +48,9 @@ def heading(text: str, line: str) -> str:
 
 def entries(module: str, names: list[str]) -> str:
     """Return a table of names, and below it all that their docstrings say."""
-    named = {f"{module}.{name}": getattr(import_module(module), name) for name in names}
-    table = "".join(f"   ~{name}\n" for name in named)
-    return f".. autosummary::\n   :nosignatures:\n\n{table}\n" + "".join(map(entry, named, named.values()))
+    things = {f"{module}.{name}": getattr(import_module(module), name) for name in names}
+    table = "".join(f"   ~{name}\n" for name in things)
+    return f".. autosummary::\n   :nosignatures:\n\n{table}\n" + "".join(map(entry, things, things.values()))
 
 
 def entry(name: str, thing: Any) -> str:

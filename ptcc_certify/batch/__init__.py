@@ -23,9 +23,11 @@ from ptcc_certify.batch.output import Journal, Table, journal_path, refuse_table
 from ptcc_certify.batch.rows import COLUMNS, Row
 from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
+from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph
+from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.protocols import Protocol
 
@@ -40,7 +42,7 @@ def certify_many(
     scheduler: str | None = None,
     output: str | os.PathLike[str] | None = None,
     restart: bool = False,
-    progress: Callable[[int, int, int], None] = lambda done, total, errors: None,
+    progress: Callable[[int, int, int], None] | None = None,
     **settings: Any,
 ) -> Table:
     """Certify many graphs, and return or write a table with one row for each.
@@ -67,7 +69,7 @@ def certify_many(
         are left out. After an interruption or a failure the file holds the rows so far.
     restart : bool
         Drop such a journal and replace such a table.
-    progress : callable
+    progress : callable, optional
         Is told how many rows are there, how many there will be, and how many of them have an error; first before any
         work.
     **settings : keywords of :class:`Settings`
@@ -106,6 +108,9 @@ def certify_many(
     [('fig1a', 'stability', 'certified'), ('fig1b', 'bipartite consensus', 'certified')]
     """
     request, workers = Settings.of(protocol, **settings), whole_number(workers, "workers", 1, LARGEST_SETTING)
+    progress = listener(progress)
+    if output is not None:
+        refuse_no_path(output)
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')

@@ -110,6 +110,7 @@ def _own_workers(workers: int) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # silence_logs ends before what an interrupt breaks
     with dask.config.set(_OWN_CLUSTER), ExitStack() as stack:
         with _hold_back_interrupts():
             try:
@@ -117,7 +118,8 @@ def _own_workers(workers: int) -> Iterator[Any]:
                     n_workers=workers,
                     threads_per_worker=1,
                     memory_limit=0,
-                    dashboard_address=None,
+                    dashboard_address=":0",  # a port that is free, also beside another batch
+                    scheduler_kwargs={"dashboard": False},
                     silence_logs=logging.CRITICAL,
                 )
             except RuntimeError as error:

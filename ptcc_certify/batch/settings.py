@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ptcc_certify.certificate.request import refuse
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
@@ -47,6 +47,7 @@ class Reading:
     undirected: bool = False
 
 
+@gated
 @dataclass(frozen=True)
 class Settings:
     """Everything that a row depends on besides its graph.

@@ -6,13 +6,11 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence, Set, ValuesView
 from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -70,7 +68,8 @@ class Source:
 
 def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
-    if isinstance(sources, str | os.PathLike | Ensemble) or not isinstance(sources, Iterable) or _is_one_graph(sources):
+    several = Sequence | Set | Mapping | ValuesView | Iterator  # graphs, matrices and tables are none of these
+    if isinstance(sources, str) or not isinstance(sources, several):
         sources = [sources]
     selection: dict[Hashable, Source] = {}
     graphs = ensembles = 0
@@ -95,14 +94,6 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     if not selection:
         raise ParameterError("there are no graphs; name files or patterns")
     return list(selection.values())
-
-
-def _is_one_graph(source: Any) -> bool:
-    """Tell one graph, matrix or table of edges, which can be iterated over, from a sequence of graphs."""
-    held = isinstance(source, SignedDigraph) or isinstance(getattr(source, "graph", None), SignedDigraph)
-    return (
-        held or isinstance(source, np.ndarray) or any(hasattr(source, x) for x in ("is_multigraph", "columns", "tocoo"))
-    )
 
 
 def _expand(text: str, own: Sequence[Path]) -> list[Source]:

@@ -80,8 +80,7 @@ def is_stability(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     >>> is_stability(final_state(st, [3, 4]), st)
     True
     """
-    structure = analyse(graph)
-    return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, structure, tolerance))
+    return all(all(abs(v) <= tol for v in state) for state, tol in _states(x, analyse(graph), tolerance))
 
 
 def is_bipartite_consensus(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
@@ -109,8 +108,7 @@ def is_bipartite_consensus(x: Any, graph: Any, tolerance: float = 0.0) -> bool:
     >>> is_bipartite_consensus(final_state(st, [3, 4]), st), is_bipartite_consensus(final_state(st, [3, 3]), st)
     (True, False)
     """
-    structure = analyse(graph)
-    return all(_same_modulus(state, tol) for state, tol in _states(x, structure, tolerance))
+    return all(_same_modulus(state, tol) for state, tol in _states(x, analyse(graph), tolerance))
 
 
 def is_interval_bipartite_consensus(x: Any, graph: Any, tolerance: float = 0.0) -> bool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
-
-if TYPE_CHECKING:
-    from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Instants, as fractions of the deadline, at which ratios and residuals are reported.
 FRACTIONS = (0.5, 0.9, 0.99)
@@ -132,7 +130,7 @@ class Comparison:
     tolerance: float
     resolved_until: float
     judged: int
-    ratios: dict[float, float]
+    ratios: dict[float, float] = field(hash=False)
     stop: float
     deadline_resolved: bool
     sliding_ratio: float | None = None
@@ -433,6 +431,8 @@ class Envelope:
             The run is of another graph or protocol, disturbed or held over periods under the nominal protocol, or has
             no sample before the deadline.
         """
+        if not isinstance(trajectory, Trajectory):
+            raise ParameterError(f"{shorten(repr(trajectory))} is no run; give what simulate returned")
         if trajectory.forcing is not None or trajectory.held_input is not None:
             raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
         if trajectory.graph.labels != self.structure.graph.labels or trajectory.graph != self.structure.graph:

@@ -29,9 +29,8 @@ from lmi.errors import LMIError
 from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
-from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
-from ptcc_certify.graphs.tables import import_pandas, series
+from ptcc_certify.graphs.tables import import_pandas, position, series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -347,10 +346,7 @@ class FinalState:
         return np.array([float(x) for x in self.states])
 
     def __getitem__(self, label: Hashable) -> Number:
-        if str(label) not in self.labels:
-            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
-            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
-        return self.states[self.labels.index(str(label))]
+        return self.states[position(label, self.labels)]
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -429,6 +425,8 @@ def final_state(
     structure = analyse(graph, orientation)
     initial_state = as_state(x0, structure.graph)
     matrix = influence(structure, exact=exact) if matrix is None else matrix
+    if not isinstance(matrix, Influence) or matrix.structure != structure:
+        raise ParameterError("matrix is not the influence of this graph; leave it out, or give influence(graph)")
     final, values = matrix.apply(initial_state if matrix.exact else [float(x) for x in initial_state])
     numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
     size = max((abs(float(x)) for x in initial_state), default=0.0)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +20,7 @@ from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import read_bytes, refuse_no_path
@@ -61,6 +62,7 @@ class RejectedCertificate(PTCCError, ValueError):
         super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
 
 
+@gated
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(Content, Shown):
     """A claim about a signed digraph under a protocol, with its proof.
@@ -113,7 +115,10 @@ class Certificate(Content, Shown):
     @property
     def document(self) -> Mapping[str, Any]:
         """The JSON. What stands under ``unverified`` is its own word."""
-        return self.to_dict() if self.source is None else self.source.document
+        if self.source is not None:
+            return self.source.document
+        document, out = self._document(self.verdict)
+        return document if not out.files else certificate_document(self, self.verdict)[0]
 
     @property
     def report(self) -> CheckReport:
@@ -168,19 +173,17 @@ class Certificate(Content, Shown):
         return documents[verdict]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files.
+        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files: a copy.
 
         One that was read is what its file says.
         """
-        if self.source is not None:
-            return dict(self.source.document)
-        document, out = self._document(self.verdict)
-        return dict(document if not out.files else certificate_document(self, self.verdict)[0])
+        return deepcopy(dict(self.document))
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
-        return _json(self.to_dict())
+        return _json(self.document)
 
+    @gated
     def save(self, path: str | Path) -> None:
         """Write the certificate to ``path``; the file appears whole or not at all.
 
@@ -189,20 +192,26 @@ class Certificate(Content, Shown):
         Parameters
         ----------
         path : str or Path
+            Ends in ``.json``, or has no ending.
 
         Raises
         ------
+        ParameterError
+            Another ending.
         FormatError
             The file cannot be written.
         """
         refuse_no_path(path)
         path = Path(path)
+        if path.suffix.lower() not in ("", ".json"):
+            other = ", a page or LaTeX by write_report, a figure by save_figure"
+            raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
         if self.source is None:
             document, out = self._document(self.verdict)
             for name, content in out.files.items():
                 write_atomically(path.parent / name, content)
         else:
-            document = self.to_dict()
+            document = dict(self.source.document)
             for name in set(_side_files(document)):
                 if not (path.parent / name).exists():
                     shutil.copyfile(self.source.path.parent / name, path.parent / name)
@@ -261,7 +270,9 @@ class Certificate(Content, Shown):
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
-        behaviour = self.claim.behaviour if self.claim else f"{len(self.structure.components)} components"
+        behaviour = f"{len(self.structure.components)} components"
+        if self.claim:
+            behaviour = (self.claim.behaviour, *self.claim.special)[-1]
         return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
 
@@ -304,7 +315,7 @@ def read_certificate(
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     saved = read_certificate(f"{folder}/c.json")
     >>> saved, saved.checked.accepted, [str(x) for x in saved.final_state.states]
-    (Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
+    (Certificate(signed-average consensus, Theorem 1.1, rate 3.99999, certified), True, ['-1', '1'])
     >>> bool(saved.norm_bound([0.5])[0] < saved.norm_bound([1])[0])
     True
     >>> saved.with_simulation(samples=11).comparison.violated
@@ -351,10 +362,10 @@ def _side_files(value: Any) -> Iterator[str]:
         yield from _side_files(part)
 
 
-def _json(document: dict[str, Any]) -> str:
+def _json(document: Mapping[str, Any]) -> str:
     return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _bytes(document: dict[str, Any]) -> bytes:
+def _bytes(document: Mapping[str, Any]) -> bytes:
     """Return the file: what UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape."""
     return _json(document).encode("utf-8", "backslashreplace")

@@ -17,7 +17,7 @@ import numpy as np
 
 from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
-from ptcc_certify.bounds.final_state import FinalState, Influence, influence
+from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
@@ -27,7 +27,7 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError, PTCCError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
@@ -149,6 +149,12 @@ class Content:
             raise ParameterError("a certificate that was read is what its file says; certify the graph again")
         if (search := values.pop("search", None)) is not None:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
+        if values.keys() & {"protocol", "initial_state", "sigma0"}:
+            values.setdefault("trajectory", None)
+        if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
+            x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
+            first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
+            values["final_state"] = first and final_state(self.structure, first, matrix=self.influence)
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
@@ -369,6 +375,7 @@ class Content:
             return SlidingEnvelope(self.structure, gain, self.functions, sliding, sigma0, reaching)
         return Envelope(self.structure, gain, self.functions)
 
+    @gated
     def norm_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``||E(t)||`` (or ``||eps(t)||``, see ``envelope.coordinates``) from the initial state.
 
@@ -391,6 +398,7 @@ class Content:
         """
         return self.envelope.norm_bound(remaining, self._require_initial_state())
 
+    @gated
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` from the initial state, for every agent.
 

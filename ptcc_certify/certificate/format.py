@@ -37,6 +37,7 @@ from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckRepo
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.side_files import beside
+from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
@@ -423,6 +424,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         "final_state": floats,
         "asked": _write_request(content.request),
         "scenario": None if content.request.scenario is None else dict(content.request.scenario),
+        "origins": dict(content.request.origins),
         "simulation": _write_run(content),
         "time_limit": finite(content.time_limit),
         "cut_off": list(content.cut_off),
@@ -476,7 +478,8 @@ def _write_request(request: Request) -> dict[str, Any]:
 def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
     """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
     section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
-    scenario = unverified.get("scenario")
+    scenario, origins = unverified.get("scenario"), unverified.get("origins")
+    origins = origins.items() if isinstance(origins, dict) else ()
     section = section if isinstance(section, dict) else {}
     method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
     try:
@@ -494,6 +497,7 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
         expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
         scenario=scenario if isinstance(scenario, dict) else None,
+        origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )
 
 

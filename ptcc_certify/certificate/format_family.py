@@ -1,21 +1,124 @@
-"""Modes, structures and claims of a family in a certificate's file."""
+"""The file of a family's certificate: modes, structures, claims, Lyapunov functions, bounds, and their proof."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.exact.numbers import longest
+from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+
+#: Bits of the middles and radii of final states, which are rounded outwards.
+_BITS = 64
+
+
+def family_document(certificate: FamilyCertificate) -> dict[str, Any]:
+    """Return a certificate of a family as JSON-ready data."""
+    family, parts = certificate.family, certificate.parts
+    components = [part.component for part in parts]
+    functions = [(k, V) for k, part in enumerate(parts) for V in part.functions]
+    finals, peaks, labels = certificate.final_states, certificate.input_peaks, family.labels
+    document: dict[str, Any] = {
+        "schema": SCHEMA,
+        "producer": producer(),
+        **family_sections(family, components),
+        "protocol": certificate.protocol.to_dict(),
+        **dict.fromkeys(NOT_OF_FAMILIES),
+        "lyapunov": {"functions": [_function(family, components[k], k, V) for k, V in functions]},
+        "initial_state": Writer(labels).state("start", certificate.initial_state),
+        "final_state": None
+        if finals is None
+        else {label: None if ends is None else _enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
+        "input": {
+            "bounded": certificate.bounded,
+            "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
+        },
+        "proof": _proof(certificate, components, functions),
+        "verdict": "certified",
+    }
+    return document | {"digest": digest(document), "unverified": _unverified(certificate)}
+
+
+def _function(family: Family, component: FamilyComponent, number: int, V: FamilyFunction) -> dict[str, Any]:
+    labels = [family.labels[v] for v in component.nodes.tolist()]
+    return {
+        "class": V.kind,
+        "component": number,
+        "nodes": [labels[v] for v in V.nodes],
+        "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
+        "rate": format_exact(V.rate),
+        "inputs": dict(zip(labels, map(_up, V.input_constants), strict=True)),
+        "coordinates": dict(zip([labels[v] for v in V.nodes], map(_up, V.coordinate_constants), strict=True)),
+    }
+
+
+def _up(x: Fraction) -> str:
+    """Write a bound, rounded up to 60 bits or so; the check forms it with other roundings."""
+    if not x:
+        return "0"
+    unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
+    return format_exact((-(-x // unit) + 2**20) * unit)
+
+
+def _enclosed(low: Fraction, high: Fraction) -> Any:
+    """Write ends as a middle and a radius, rounded outwards."""
+    if low == high == 0:
+        return "0"
+    size = max(abs(low), abs(high))
+    unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
+    below, above = low // unit - 2**20, -(-high // unit) + 2**20
+    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
+
+
+def _proof(
+    certificate: FamilyCertificate,
+    components: Sequence[FamilyComponent],
+    functions: Sequence[tuple[int, FamilyFunction]],
+) -> list[dict[str, Any]]:
+    family = certificate.family
+    steps = [_step("structure", f"graph.modes[{k}]") for k in range(len(family.modes))]
+    steps.append(_step("family-claim", "graph", claim_witnesses(family, components)))
+    for k, (_, V) in enumerate(functions):
+        for mode, rate in enumerate(V.rates):
+            multipliers = V.multipliers[mode] if V.multipliers else ()
+            witness = {"multipliers": [format_exact(x) for x in multipliers]} if V.kind != "undirected" else None
+            of = f"lyapunov.functions[{k}].modes[{mode}]"
+            steps.append(_step("family-rate", of, witness, b=format_exact(rate)))
+        steps.append(_step("family-constants", f"lyapunov.functions[{k}]"))
+    steps += [_step("family-final-state", "final_state")] * (certificate.final_states is not None)
+    return steps + [_step("family-input", "input")] * (certificate.bounded is not None)
+
+
+def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, Any]:
+    proves, lemma = OBLIGATIONS[kind]
+    return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers, "witness": witness}
+
+
+def _unverified(certificate: FamilyCertificate) -> dict[str, Any]:
+    expectations = certificate.expectations
+    bounds = [part.upper_bound for part in certificate.parts]
+    return {
+        "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
+        "asked": {"behaviour": expectations.behaviour},
+        "notes": list(certificate.notes),
+    }
 
 
 def family_sections(family: Family, components: Sequence[FamilyComponent]) -> dict[str, Any]:

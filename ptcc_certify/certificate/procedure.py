@@ -35,6 +35,8 @@ from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,
+    listener,
+    origins_of,
     read_initial_state,
     read_request,
     read_sliding_variable,
@@ -42,7 +44,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import HypothesisError, SimulationError
+from ptcc_certify.errors import HypothesisError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
@@ -79,6 +81,7 @@ FEW_SAMPLES = 51
 SETTLED = 1e-6
 
 
+@gated
 def certify(
     graph: Any,
     protocol: Protocol,
@@ -97,7 +100,8 @@ def certify(
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    origins: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Certificate:
     """Certify what a protocol does on a signed digraph.
 
@@ -143,6 +147,9 @@ def certify(
         ``assessment``.
     scenario : mapping, optional
         The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
+    origins : mapping of str to str, optional
+        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from, where the arguments do not tell:
+        kept under ``unverified.origins``, and told by ``summary``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
 
@@ -166,19 +173,21 @@ def certify(
     >>> g = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(g, NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1), [3, 5])
     >>> cert
-    Certificate(bipartite consensus, Theorem 1.1, rate 3.99999, certified)
+    Certificate(signed-average consensus, Theorem 1.1, rate 3.99999, certified)
     >>> cert.final_state
     FinalState(1=-1, 2=1)
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
-    >>> cert, cert.reaching
-    (Certificate(bipartite consensus, Theorem 4.1, rate 3.99999, certified), (ReachingTime(0.43409, 0.565 before T_r), \
-ReachingTime(0, 1 before T_r)))
+    >>> cert
+    Certificate(signed-average consensus, Theorem 4.1, rate 3.99999, certified)
+    >>> cert.reaching
+    (ReachingTime(0.43409, 0.565 before T_r), ReachingTime(0, 1 before T_r))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
     """
-    limits = list(limits) if isinstance(limits, Iterable) else [limits]
+    limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)

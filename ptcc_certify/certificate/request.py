@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -30,6 +32,7 @@ from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reachin
 LONGEST_BITS = 470_000
 
 
+@gated
 @dataclass(frozen=True)
 class Expectations:
     """What is asked of a certificate besides.
@@ -100,6 +103,9 @@ class Request:
         What is asked besides; what became of it is part of ``assessment``.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
+    origins : mapping of str to str
+        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from: of a random state its seed. What
+        is missing was given as it is.
     """
 
     method: str = "best"
@@ -111,6 +117,22 @@ class Request:
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
+    origins: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+
+def origins_of(graph: Any, x0: Any, sigma0: Any) -> dict[str, str]:
+    """Return what the arguments of :func:`ptcc_certify.certify` tell of where they come from.
+
+    Examples
+    --------
+    >>> origins_of("graphs/team.csv", "random", None)
+    {'graph': 'team.csv', 'x(0)': 'random, seed 0'}
+    """
+    origins = {"graph": Path(graph).name} if isinstance(graph, str | os.PathLike) else {}
+    states = {"x(0)": x0, "sigma(0)": sigma0}
+    return origins | {
+        name: "random, seed 0" for name, state in states.items() if isinstance(state, str) and state.strip() == "random"
+    }
 
 
 def refuse(
@@ -133,6 +155,10 @@ def refuse(
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
     seconds, n = arguments["time_limit"], structure.graph.n_nodes
+    if not isinstance(scenario := arguments["scenario"], Mapping | None):
+        raise ParameterError(
+            f"scenario = {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
+        )
     request = Request(
         method=arguments["method"],
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
@@ -140,12 +166,20 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
         time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
         expectations=_expectations(arguments["expectations"]),
-        scenario=arguments["scenario"],
+        scenario=scenario,
+        origins=arguments["origins"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
     if not request.time_limit > 0:
         raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
     return request
+
+
+def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
+    """Return what is told how the work goes on; None: nobody is."""
+    if progress is not None and not callable(progress):
+        raise ParameterError(f"progress = {shorten(repr(progress))} is no function; give print, say, or leave it out")
+    return progress or (lambda *_: None)
 
 
 def _seconds(time_limit: Any) -> float:

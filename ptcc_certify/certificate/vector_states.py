@@ -16,7 +16,6 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -50,16 +49,6 @@ class VectorCertificate:
     """
 
     components: tuple[Certificate, ...]
-
-    @property
-    def graph(self) -> SignedDigraph:
-        """The graph."""
-        return self.components[0].graph
-
-    @property
-    def protocol(self) -> Protocol:
-        """The protocol."""
-        return self.components[0].protocol
 
     @property
     def claim(self) -> Any:

@@ -1,8 +1,8 @@
 """The verdict of a certificate in one line, and the exit code that agrees with it.
 
 To ``certified`` and ``undecided`` it adds three things: whether the bound says something by the deadline with the gains
-at hand, if not which gains would; what to try next where nothing was decided; and which expectation was met, refuted or
-left open.
+at hand, and whether they bound the input, if not which gains would; what to try next where nothing was decided; and
+which expectation was met, refuted or left open.
 
 *Useful* is a bound that leaves at most 1 % at 0.99 T, by one of two measures:
 
@@ -74,9 +74,13 @@ class Assessment:
     remark : str
         What it says, or does not, or what to try next.
     advice : str
-        Gains with which the bound would be useful; empty if it is, or if none are known.
+        Gains with which the bound would be useful and the input bounded; empty if both hold, or if none are known.
     answers : tuple of Answer
         One for each expectation.
+    caveat : str
+        That the input is not bounded, or not proved bounded; empty if it is, or if limits of the gain bound it.
+    without : str
+        Which of limits, noise and disturbances were asked for and are not counted in.
 
     References
     ----------
@@ -97,6 +101,8 @@ class Assessment:
     remark: str
     advice: str
     answers: tuple[Answer, ...]
+    caveat: str = ""
+    without: str = ""
 
     @property
     def exit_code(self) -> int:
@@ -122,7 +128,7 @@ class Assessment:
     @property
     def certified_part(self) -> str:
         """What is certified where something asked is not."""
-        return f"the rest is {CERTIFIED}" if self.asked in (REFUTED, OPEN) else CERTIFIED
+        return "the rest is " * (self.asked in (REFUTED, OPEN)) + CERTIFIED + self.without
 
     @property
     def text(self) -> str:
@@ -131,9 +137,9 @@ class Assessment:
         if self.verdict != CERTIFIED:
             return self.line(f"{self.verdict}: {self.remark}")
         if self.useful is not False:
-            return self.line(self.certified_part, "" if crowded else self.remark)
+            return self.line(self.certified_part, "" if crowded else self.remark, self.caveat, self.advice)
         little = f"{self.certified_part}, but with these gains the bound says little by T"
-        return self.line(little if crowded else f"{little}: {self.remark}", self.advice)
+        return self.line(little if crowded else f"{little}: {self.remark}", self.caveat, self.advice)
 
     def line(self, *verdict: str) -> str:
         """Return a verdict in its place among what became of what was asked.
@@ -205,7 +211,7 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
     >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
     >>> print(certify(pair, weak, [3, 1], simulation=False).assessment.text)
     certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
---rho2 0.286 (rho2 kappa 0.286) leaves 1 %
+the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds the input
     >>> assessment = certify(pair, strong, [3, 1], simulation=False).assessment
     >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
@@ -215,7 +221,7 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
-    useful, remark, advice = None, "", ""
+    useful, remark, caveat, advice = None, "", "", ""
     verdict = verdict_of(report)
     if verdict != CERTIFIED:
         remark = _next_step(certificate, report)
@@ -223,10 +229,13 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
         useful, remark = True, "nothing to decay"
     else:
         limited = certificate.effort is not None and certificate.effort.residual
-        useful, remark, advice = (_limited_usefulness if limited else _usefulness)(certificate)
-        remark += "" if certificate.delta is None else ", without disturbances"
+        useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
+        caveat, advice = ("", "") if limited else _advise(certificate, rho2)
     violated = comparison is not None and comparison.violated
-    return Assessment(verdict, violated, useful, remark, advice, tuple(answers))
+    ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
+    ignored += ["disturbances"] * (certificate.delta is not None)
+    without = f" without {' and '.join(ignored)}" if ignored else ""
+    return Assessment(verdict, violated, useful, remark, advice, tuple(answers), caveat, without)
 
 
 # ---------------------------------------------------------------------- expectations
@@ -303,28 +312,30 @@ def judge_limits(certificate: Content) -> list[Answer]:
     """Tell which of the limits, noise and disturbances that were asked for are not certified."""
     effort, answers = certificate.effort, []
     residual = () if effort is None else effort.residual
+    no_bound = "no bound of its effect is proved" + "; try --method best" * (certificate.method != "best")
     if len(residual) < len(certificate.limits) and not certificate.constant:
         period = None if effort is None else effort.longest_period
-        why = "nothing is certified under them" if period is None else f"certified with a period of {down(period, 4)}"
+        why = no_bound.replace("its", "their") if period is None else f"certified with a period of {down(period, 4)}"
         answers.append(Answer(OPEN, "limits", why))
     silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
     if certificate.noise is not None and silent and not certificate.constant:
         why = "without a limit it meets an infinite gain: add --gain-cap or --stop-before"
         if any(entry.sample_period is not None for entry in certificate.limits):
-            why = "together with a sample period it has no proved bound: ask for each alone"
+            why = "with a sample period no bound is proved: ask for each alone"
         elif certificate.limits:
-            why = "nothing is certified under the limits"
+            why = no_bound
         answers.append(Answer(OPEN, "noise", why))
     if certificate.delta is not None and (effort is None or effort.disturbed is None):
-        answers.append(Answer(OPEN, "delta", "the rate proves no bounded input"))
+        bounded = effort is not None and effort.bounded
+        answers.append(Answer(OPEN, "delta", no_bound if bounded else "the rate proves no bounded input"))
     return answers
 
 
 # ---------------------------------------------------------------------- use
 
 
-def _usefulness(certificate: Content) -> tuple[bool, str, str]:
-    """Return whether the bound is useful, what it says, and which gains would make it so."""
+def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
+    """Return whether the bound is useful, what it says, and a ``rho2`` that would make it so."""
     envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
     span = p.T if direct else p.span
     z, instant = envelope.coordinates, "0.99 T"
@@ -335,19 +346,16 @@ def _usefulness(certificate: Content) -> tuple[bool, str, str]:
     share = _share(envelope, constant + pole * math.log(1 / LAST))
     remark = f"||{z}|| <= {up(share, 2)} ||{begin}|| at {instant}"
     if share <= USEFUL:
-        return True, remark, ""
+        return True, remark, None
     of_set = certificate.effort is not None and certificate.effort.initial_set is not None
     if direct and not of_set and (way := certificate.longest_way) is not None:
         worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
         if worst <= USEFUL * way:
-            return True, f"every agent within {up(worst, 2)} of its final state at {instant}", ""
-    rho2 = _useful_rho2(envelope, constant, p.kappa)
-    if rho2 is None:
-        return False, remark, ""
-    return False, remark, f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)}) leaves 1 %"
+            return True, f"every agent within {up(worst, 2)} of its final state at {instant}", None
+    return False, remark, _useful_rho2(envelope, constant, p.kappa)
 
 
-def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
+def _limited_usefulness(certificate: Content) -> tuple[bool, str, None]:
     """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
     effort, x0, way = certificate.effort, certificate.initial_state, certificate.longest_way
     residual = () if effort is None else effort.residual
@@ -356,18 +364,39 @@ def _limited_usefulness(certificate: Content) -> tuple[bool, str, str]:
     if region is None and way is not None and not noisy and all(entry.agents is not None for entry in residual):
         worst = max(x for entry in residual for x in entry.agents or ())
         if worst <= Fraction(USEFUL) * Fraction(way):
-            return True, f"under the limits every agent within {up(worst, 2)} of its final state at T", ""
+            return True, f"under the limits every agent within {up(worst, 2)} of its final state at T", None
     norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
     remark = f"under the limits ||E|| <= {up(norm, 2)} at T"
     rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
     if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
         largest = max(region.largest(row) for row in rows)
-        return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states", ""
+        return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states", None
     first = Fraction(0) if x0 is None else sum((InitialSet(x0).largest(row) ** 2 for row in rows), Fraction(0))
     if not first:
-        return norm == 0, remark, ""
+        return norm == 0, remark, None
     share = root_above(norm**2 / first)
-    return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T", ""
+    return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T", None
+
+
+def _advise(certificate: Content, rho2: Fraction | None) -> tuple[str, str]:
+    """Return what is not proved of the input, and gains that bound it and, given ``rho2``, leave a hundredth."""
+    effort, p, rate = certificate.effort, certificate.protocol, certificate.rate
+    if effort is None:
+        return "", ""
+    sliding_open = effort.peak is None and effort.sliding is not None and not effort.sliding.bounded
+    caveat = "" if effort.bounded else f"the input is not {'' if effort.bounded is False else 'proved '}bounded"
+    caveat = caveat or "the input is not proved bounded" * sliding_open
+    effects = ["leaves 1 %"] * (rho2 is not None) + ["bounds the input"] * bool(caveat)
+    if not effort.bounded and rate is not None:
+        rho2 = max(rho2 or Fraction(0), _rounded_up(2 / rate / p.kappa))
+    gains = [] if rho2 is None else [f"--rho2 {near(rho2)} (rho2 kappa {near(rho2 * p.kappa)})"]
+    gains += [f"--mu3 {near(_rounded_up(1 / p.kappa))}"] * sliding_open
+    return caveat, " ".join([*gains, " and ".join(effects)]) if gains else ""
+
+
+def _rounded_up(gain: Fraction) -> Fraction:
+    """Return a gain of few digits that is no smaller."""
+    return Fraction(up(gain, _DIGITS))
 
 
 def _share(envelope: Envelope, clock: float) -> float:
@@ -386,7 +415,7 @@ def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fracti
         middle = (low + high) / 2
         low, high = (middle, high) if _share(envelope, middle) > USEFUL else (low, middle)
     rho2 = Fraction(high - constant) / Fraction(math.log(1 / LAST)) / kappa
-    return Fraction(up(rho2 * (1 + Fraction(1, 10**9)), _DIGITS)) if rho2 > 0 else None
+    return _rounded_up(rho2 * (1 + Fraction(1, 10**9))) if rho2 > 0 else None
 
 
 # ---------------------------------------------------------------------- what to try next

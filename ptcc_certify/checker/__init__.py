@@ -23,6 +23,8 @@ from typing import Any
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
 from ptcc_certify.checker.family import check_family
+from ptcc_certify.checker.family_bounds import check_family_bounds
+from ptcc_certify.checker.family_function import check_family_functions
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
@@ -33,6 +35,7 @@ from ptcc_certify.checker.protocol import (
     REACHING_BITS,
     SLIDING_BOUND,
     SLIDING_CLOCK,
+    Protocol,
     check_begin,
     check_protocol,
     check_sliding,
@@ -53,7 +56,7 @@ KEYS = (
 )
 
 #: Parts that are null in a certificate of a family.
-NOT_OF_FAMILIES = ("paper", "overshoot", "sliding_variable", "influence", "reaching_time")
+NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "sliding_variable", "influence", "reaching_time")
 
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
@@ -61,6 +64,7 @@ MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError
 __all__ = [
     "INPUT_NODES",
     "MANY_COMPONENTS",
+    "NOT_OF_FAMILIES",
     "OBLIGATIONS",
     "REACHING_BITS",
     "SCHEMA",
@@ -152,7 +156,7 @@ def _verdict(doc: Document) -> str:
     entries(data["proof"], "proof")
     protocol = check_protocol(doc)
     if isinstance(data["graph"], dict) and "modes" in data["graph"]:
-        return _family_verdict(doc)
+        return _family_verdict(doc, protocol)
     graph = check_graph(doc)
     structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
@@ -177,9 +181,13 @@ def _close(doc: Document, proved: bool) -> str:
     return verdict
 
 
-def _family_verdict(doc: Document) -> str:
+def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
-    check_family(doc)
+    family = check_family(doc)
+    begin = check_begin(doc, family.modes[0].structure.graph, protocol)
+    functions = check_family_functions(doc, family)
+    state = None if begin.state is None else list(begin.state)
+    check_family_bounds(doc, family, functions, protocol.gains, state)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
     return _close(doc, True)

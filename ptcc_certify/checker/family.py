@@ -28,6 +28,7 @@ THEOREM = "common kernel"
 STABILITY, CONSENSUS, DEPENDS = "stability", "bipartite consensus", "depends on the signal"
 INTERVAL, CONTAINMENT = "interval bipartite consensus", "bipartite containment"
 
+Row = dict[int, Fraction]
 #: Source, target, sign, least and largest size of an edge.
 Edge = tuple[int, int, int, Fraction, Fraction]
 
@@ -78,16 +79,24 @@ class Component:
     ----------
     nodes : list of int
     camps : dict of int to +1/-1, or None
-    closed, balanced : list of int
-        How many closed components, and balanced ones, the mandatory graph of each mode has there.
     behaviour : str
+    kernel : dict of int to (dict of int to Fraction)
+        The rows of the basis of the common kernel, without zeros, by the numbers of the balanced closed components of
+        the first mandatory graph; empty if there is no common kernel.
+    pivots : dict of int to int
+        The first node of each of these.
     """
 
     nodes: list[int]
     camps: dict[int, int] | None
-    closed: list[int]
-    balanced: list[int]
     behaviour: str
+    kernel: dict[int, Row]
+    pivots: dict[int, int]
+
+    @property
+    def depends(self) -> bool:
+        """Whether there is no common kernel."""
+        return self.behaviour == DEPENDS
 
 
 def check_family(doc: Document) -> Family:
@@ -218,31 +227,31 @@ def _component(
 ) -> Component:
     inside = set(nodes)
     groups = [[k for k, group in enumerate(m.structure.closed) if group[0] in inside] for m in modes]
-    closed = [len(numbers) for numbers in groups]
     balanced = [
         sum(m.structure.gauges[k] is not None for k in numbers) for m, numbers in zip(modes, groups, strict=True)
     ]
-    if not any(balanced):
-        behaviour = STABILITY
-    elif camps is not None and closed == [1] * len(modes):
-        behaviour = CONSENSUS
-    elif len(set(balanced)) > 1:
-        behaviour = DEPENDS
-    else:
+    pivots = {k: group[0] for k, group, _ in modes[0].structure.balanced if group[0] in inside}
+    one_group = all(len(numbers) == 1 for numbers in groups)
+    if camps is not None and one_group and all(balanced):
+        ((number, pivot),) = pivots.items()
+        behaviour, kernel = CONSENSUS, {v: {number: Fraction(camps[v] * camps[pivot])} for v in nodes}
+    elif len(set(balanced)) == 1 and any(balanced):
         kernel = _check_kernel(doc, modes, inside, witness)
-        behaviour = DEPENDS if not kernel else INTERVAL if closed == [1] * len(modes) else CONTAINMENT
-        return Component(nodes, camps, closed, balanced, behaviour)
+        behaviour = DEPENDS if not kernel else INTERVAL if one_group else CONTAINMENT
+        return Component(nodes, camps, behaviour, kernel, pivots)
+    else:
+        behaviour, kernel = (DEPENDS, {}) if any(balanced) else (STABILITY, {v: {} for v in nodes})
     need(witness is None, "a witness that nothing asks for")
-    return Component(nodes, camps, closed, balanced, behaviour)
+    return Component(nodes, camps, behaviour, kernel, pivots)
 
 
-def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witness: Any) -> bool:
+def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witness: Any) -> dict[int, Row]:
     """Verify that all members share a kernel, by the rows of its basis, or that they do not, by a state at rest.
 
     Returns
     -------
-    bool
-        Whether they share it.
+    dict of int to Row
+        The basis; empty if they do not.
     """
     if isinstance(witness, dict) and "rows" in witness:
         rows = _basis(doc, modes[0].structure, inside, fields(witness, ("rows",), "a kernel")["rows"])
@@ -254,7 +263,7 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witnes
             for s, t, sign, _, _ in mode.uncertain:
                 agrees = s not in inside or rows[t] == {j: sign * x for j, x in rows[s].items()}
                 need(agrees, "an uncertain edge does not agree with the kernel")
-        return True
+        return rows
     fields(witness, ("mode", "other", "edge", "state"), "a counterexample")
     numbers = witness["mode"], witness["other"]
     need(all(type(k) is int and 0 <= k < len(modes) for k in numbers), "an unknown mode")
@@ -272,12 +281,12 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witnes
         if state[t].get(0, 0) != sign * state[s].get(0, 0):
             moved.add(t)
     need(bool(moved), "the state is at rest in both")
-    return False
+    return {}
 
 
-def _basis(doc: Document, structure: Structure, inside: set[int], entry: Any) -> dict[int, dict[int, Fraction]]:
+def _basis(doc: Document, structure: Structure, inside: set[int], entry: Any) -> dict[int, Row]:
     """Return the rows of the basis, without zeros: camps of leaders, and what is told of followers."""
-    rows: dict[int, dict[int, Fraction]] = {v: {} for v in inside}
+    rows: dict[int, Row] = {v: {} for v in inside}
     numbers = set()
     for number, nodes, gauge in structure.balanced:
         if nodes[0] in inside:
@@ -300,9 +309,9 @@ def _state(doc: Document, graph: Digraph, entry: Any) -> dict[int, Fraction]:
     return dict(zip(nodes, map(exact, entry.values()), strict=True))
 
 
-def _row_product(row: dict[int, int], rows: dict[int, dict[int, Fraction]]) -> dict[int, Fraction]:
+def _row_product(row: dict[int, int], rows: dict[int, Row]) -> Row:
     """Return a row of ``L B``, without zeros."""
-    total: dict[int, Fraction] = {}
+    total: Row = {}
     for v, weight in row.items():
         for j, x in rows[v].items():
             total[j] = total.get(j, Fraction(0)) + weight * x

@@ -1,8 +1,8 @@
 """The command line ``ptcc``: parses, calls, prints.
 
 Exit codes: 0 proved and everything asked holds; 1 a bound is violated, or a certificate rejected; 2 bad input or
-usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program. Data go to standard output, everything
-else to standard error.
+usage; 3 an expectation is refuted; 4 undecided; 70 an error of this program; 130 Ctrl-C; 141 who reads the output has
+gone. Data go to standard output, everything else to standard error.
 
 Modules are named after their commands. :mod:`~ptcc_certify.cli.options` are those that several share, and what becomes
 of them; :mod:`~ptcc_certify.cli.terminal` prints.
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import os
-import re
 import sys
 from typing import Any
 
@@ -40,26 +39,26 @@ __all__ = ["cli", "main"]
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
-#: What the help says of each command, and in which order: these words, or those of the command itself.
+#: The commands, and what the help says of each, in this order.
 GROUPS = {
     "Ask about a graph": {
-        "classify": "Tell its structure and the theorem that applies.",
-        "certify": "Prove what the protocol does on it; write a certificate.",
-        "simulate": "Run the protocol: a table, or a figure of the states.",
-        "design": "Find gains and a deadline that keep the input within limits.",
-        "batch": "Certify many graphs: one table.",
+        classify.classify: "Tell its structure and the theorem that applies.",
+        certify.certify: "Prove what the protocol does on it; write a certificate.",
+        simulate.simulate: "Run the protocol: a table, or a figure of the states.",
+        design.design: "Find gains and a deadline that keep the input within limits.",
+        batch.batch: "Certify many graphs: one table.",
     },
     "Certificates": {
-        "check": "Check a certificate exactly, without a solver.",
-        "report": "Write a page, or LaTeX, to send to somebody.",
-        "plot": "Draw a figure of a certificate or a graph.",
+        check_and_report.check: "Check a certificate exactly, without a solver.",
+        check_and_report.report: "Write a page, or LaTeX, to send to somebody.",
+        plot.plot: "Draw a figure of a certificate or a graph.",
     },
     "Set up and learn": {
-        "new": "Write a commented scenario file to begin with.",
-        "examples": "Run the paper's examples, figures included.",
-        "explore": "Try graph, deadline and gains in a browser.",
-        "cite": "Print BibTeX of the theorem used.",
-        "completion": "Complete names with TAB in bash, zsh or fish.",
+        new.new: "Write a commented scenario file to begin with.",
+        examples_and_cite.examples: "Run the paper's examples, figures included.",
+        explore.explore: "Try graph, deadline and gains in a browser.",
+        examples_and_cite.cite: "Print BibTeX of the theorem used.",
+        completion.completion: "Complete names with TAB in bash, zsh or fish.",
     },
 }
 
@@ -68,16 +67,12 @@ class _Commands(click.Group):
     """Commands in groups, each with one plain line; near names of one that is not there."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        named = [name for group in GROUPS.values() for name in group if name in self.commands]
-        return [*named, *(name for name in self.commands if name not in named)]
+        return [name for group in GROUPS.values() for command in group if (name := command.name)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        lines = {name: command.get_short_help_str(60) for name, command in self.commands.items()}
-        for title, group in {**GROUPS, "More": {}}.items():
-            rows = [(name, text) for name, text in group.items() if lines.pop(name, None) is not None]
-            if rows := rows if group else list(lines.items()):
-                with formatter.section(title):
-                    formatter.write_dl(rows)
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(command.name or "", text) for command, text in group.items()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -91,12 +86,14 @@ class _Commands(click.Group):
         try:
             return super().invoke(ctx)
         except (PTCCError, click.BadParameter) as error:
-            raise placed(ctx, _with_near_choices(error)) from None
+            raise placed(ctx, error) from None
         except click.NoSuchOption as error:
-            files = [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]  # noqa: PTH110
-            if not files:
+            if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
+                raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
+            flag, others = error.option_name, self.commands.items()
+            if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 raise
-            raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
+            raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}") from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
@@ -112,31 +109,9 @@ def cli() -> None:
     """
 
 
-for command in (
-    new.new,
-    classify.classify,
-    certify.certify,
-    check_and_report.check,
-    check_and_report.report,
-    simulate.simulate,
-    design.design,
-    plot.plot,
-    explore.explore,
-    examples_and_cite.examples,
-    batch.batch,
-    examples_and_cite.cite,
-    completion.completion,
-):
-    cli.add_command(command)
-
-
-def _with_near_choices(error: PTCCError | click.BadParameter) -> PTCCError | click.BadParameter:
-    """Return the refusal of a value that is none of an option's, with those that are near it."""
-    if not isinstance(error, click.BadParameter) or not error.param or not isinstance(error.param.type, click.Choice):
-        return error
-    given = re.match("'(.*)' is not one of", error.message)
-    hint = did_you_mean(given[1], map(str, error.param.type.choices)) if given else ""
-    return click.BadParameter(error.message.rstrip(".") + hint, error.ctx, error.param) if hint else error
+for group in GROUPS.values():
+    for command in group:
+        cli.add_command(command)
 
 
 def main() -> None:
@@ -160,11 +135,11 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         click.echo("ptcc: interrupted", err=True)
         code = ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        code = ExitCode.OK
-        sys.stderr.close()
+    except SystemExit:  # by click, where who reads the output has gone; the code is that of other programs then
+        code = 141
     except OSError as error:
         code = _refuse(f"the result cannot be written ({error.strerror or error})")
+        sys.stdout = sys.stderr  # Python would try again at its end
     except ModuleNotFoundError:
         raise  # what is told of a package that is missing is in ptcc_certify.__main__
     except Exception as error:

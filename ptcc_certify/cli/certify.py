@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -59,8 +60,10 @@ def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **opt
     if options["x0"] == "random" and options["initial_bound"] is not None:
         x0 = [x * options["initial_bound"] / 10 for x in x0]  # drawn within 10: now of the set that is asked about
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
+    origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:
-        certificate = run(signed, protocol, x0, progress=begin, **more)
+        named = {"graph": Path(graph).name, **origins}
+        certificate = run(signed, protocol, x0, origins=named, progress=begin, **more)
     _log_result(certificate)
     if output:
         certificate.save(output)
@@ -71,7 +74,7 @@ def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **opt
         if assessment.exit_code and not screen.quiet:
             click.echo(f"verdict    {assessment.text}", err=True)
         return assessment.exit_code
-    case = certificate, graph, _origins(options)
+    case = certificate, graph, origins
     screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))
     if output:
         screen.note(shared.written(certificate, output))
@@ -89,11 +92,8 @@ def _requests(options: shared.Options) -> dict[str, Any]:
     more |= {"initial_set": options["initial_bound"]}
     more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
     if options["kind"] == "nominal":
-        actuator = shared.actuator_of(options)
-        limits = [] if actuator is None else [actuator]
-        return more | {"limits": limits, "delta": options["delta"], "noise": options["noise"]}
-    if options["noise"] is not None:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
+        own = {name: options[name] for name in ("delta", "noise")}
+        return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
     return more
 
 

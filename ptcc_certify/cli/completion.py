@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
-from click.shell_completion import BashComplete, CompletionItem, add_completion_class, get_completion_class
+from click import shell_completion as shells
+from click.shell_completion import CompletionItem
 
 CERTIFICATES = (".json",)
 #: Endings of graphs, and of scenarios, which stand for one.
@@ -23,15 +24,42 @@ THEOREMS = tuple(f"{chapter}.{row}" for chapter in range(1, 7) for row in (1, 2)
 MOST = 1000
 
 
-class _Bash(BashComplete):
+class _Bash(shells.BashComplete):
     """Bash, told that what it completes are names of files: it quotes blanks, and adds no blank after a folder."""
 
-    source_template = BashComplete.source_template.replace(
+    source_template = shells.BashComplete.source_template.replace(
         "COMPREPLY+=($value)", 'COMPREPLY+=("${value%%/}"); [[ $value == *[./]* ]] && compopt -o filenames'
     )
 
 
-add_completion_class(_Bash, "bash")
+class _WholeWord(shells.ShellComplete):
+    """A shell that puts what completes in place of the whole word: of ``--option=value`` too."""
+
+    def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem]:
+        items = super().get_completions(args, incomplete)
+        option, sign, _ = incomplete.partition("=")
+        for item in items if sign and option.startswith("--") else ():
+            item.value = f"{option}={item.value}"
+        return items
+
+
+class _Zsh(_WholeWord, shells.ZshComplete):
+    """Zsh, told to add no blank after a folder."""
+
+    source_template = shells.ZshComplete.source_template.replace(
+        "compadd -U -V unsorted -a completions",
+        "compadd -U -V unsorted -- ${completions:#*/}; compadd -U -S '' -V unsorted -- ${(M)completions:#*/}",
+    )
+
+
+class _Fish(_WholeWord, shells.FishComplete):
+    """Fish, told that a name may hold commas."""
+
+    source_template = shells.FishComplete.source_template.replace('string split "," ', 'string split --max 1 "," ')
+
+
+for _shell, _name in ((_Bash, "bash"), (_Zsh, "zsh"), (_Fish, "fish")):
+    shells.add_completion_class(_shell, _name)
 
 
 @click.command()
@@ -47,7 +75,7 @@ def completion(shell: str) -> int:
 
     Then open a new shell.
     """
-    kind = get_completion_class(shell)
+    kind = shells.get_completion_class(shell)
     assert kind is not None
     click.echo(kind(click.get_current_context().find_root().command, {}, "ptcc", "_PTCC_COMPLETE").source())
     return 0

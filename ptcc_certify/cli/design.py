@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from ptcc_certify.cli.options import (
     Options,
@@ -46,6 +47,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
     The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
+    A saturation, a sample period and noise are not searched under: give them to that command.
 
     Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
@@ -87,16 +89,21 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 
-def _refuse_incomplete(options: Options) -> None:
-    """Name everything that is missing, at once."""
+def _refuse_incomplete(options: dict[str, Any]) -> None:
+    """Name everything that is missing, at once; of the two questions about the deadline the flag's counts."""
     names = {"max_input": "--max-input U", "initial_bound": "--initial-bound R"}
     missing = [flag for name, flag in names.items() if options[name] is None]
     if options["deadline"] is None and not options["shortest_deadline"]:
         missing = [*filter(None, [", ".join(missing)]), "one of --deadline T, --shortest-deadline"]
     if missing:
         raise ParameterError(f"design needs {' and '.join(missing)}; e.g. {_EXAMPLE}")
-    if options["deadline"] is not None and options["shortest_deadline"]:
+    if options["deadline"] is None or not options["shortest_deadline"]:
+        return
+    source = click.get_current_context().get_parameter_source
+    if source("deadline") is source("shortest_deadline"):
         raise ParameterError("--deadline and --shortest-deadline ask for two things; leave one out")
+    if source("shortest_deadline") is ParameterSource.COMMANDLINE:  # which displaces that of the scenario
+        options["deadline"] = None
 
 
 def _certify_command(answer: Design, graph: str, options: Options) -> list[str] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def refuse_as_graph(path: str) -> None:
     """
     from ptcc_certify.graphs.io.packaged import GRAPHS
 
-    name, kind, word = shorten(path, 200), kind_of(path), shell_word(path)
+    name, kind, word = shorten(path, 200) or '""', kind_of(path), shell_word(path)
     mends = {
         "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(path, '*.csv')))}",
         "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it",
@@ -138,13 +139,15 @@ def refuse_as_certificate(path: str) -> None:
 
 
 def near_files(path: str, names: tuple[str, ...] = ()) -> str:
-    """Return near names of files in the folder of a path that does not exist, and of ``names``."""
+    """Return near names of files in the folder of a path that does not exist, and ``names``; endings do not count."""
     try:
         with os.scandir(Path(path).parent) as entries:
             files = [entry.name for entry in islice(entries, 5000)]
     except (OSError, ValueError):
         files = []
-    return did_you_mean(Path(path).name, [*names, *files])
+    stem = Path(path).name.partition(".")[0].lower()
+    near = [n for n in (*names, *files) if get_close_matches(stem, [n.partition(".")[0].lower()], cutoff=0.7)]
+    return did_you_mean(Path(path).name, near)
 
 
 def shell_word(text: str) -> str:

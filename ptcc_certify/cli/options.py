@@ -16,8 +16,8 @@ import click
 
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.cli.scenario import graph_of, is_scenario, kind_of_protocol, read_scenario
-from ptcc_certify.errors import NumberError, ParameterError, PTCCError
+from ptcc_certify.cli.scenario import FOREIGN, graph_of, is_scenario, kind_of_protocol, read_scenario
+from ptcc_certify.errors import ParameterError, PTCCError
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -112,6 +112,8 @@ def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 #: Options whose value is an exact number.
 number_option = partial(click.option, callback=_exact)
+#: Options that are true or false, also where a scenario has the other.
+_switch = partial(click.option, default=False, show_default=False)
 
 
 def expect_option(text: str) -> Callable[[Any], Any]:
@@ -133,14 +135,13 @@ reading_options = _options(
         default="refuse",
         help="What becomes of two rows for one ordered pair.",
     ),
-    click.option("--drop-self-loops", is_flag=True, help="Ignore edges of a node to itself."),
-    click.option("--undirected", is_flag=True, help="Every row counts in both directions."),
+    _switch("--drop-self-loops/--no-drop-self-loops", help="Ignore edges of a node to itself."),
+    _switch("--undirected/--no-undirected", help="Every row counts in both directions."),
 )
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED)
 )
-graph_options = _options(graph_argument, reading_options)
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
 protocol_options = _options(
     click.option(
@@ -251,15 +252,13 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
 
     shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     nominal = options["kind"] == "nominal"
-    others = (*_SLIDING, "disturbance", "sigma0") if nominal else LIMITS
-    for name in others:
-        if options.get(name) is not None and not (nominal and name in disturbed):
-            other = "sliding-mode" if nominal else "nominal"
-            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; leave it out or change the protocol")
+    other = "sliding-mode" if nominal else "nominal"
+    for name in (*FOREIGN[options["kind"]], *["delta"] * nominal):
+        if options.get(name) is not None and name not in disturbed:
+            mend = "the deadline is --T-r plus --T-s" if name == "T" else "leave it out or change the protocol"
+            raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; {mend}")
     if nominal:
         return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
-    if options["T"] is not None:
-        raise ParameterError("--T belongs to --protocol nominal; under sliding-mode the deadline is --T-r plus --T-s")
     defaults = {name: default for name, (default, _) in _SLIDING.items()} | {"delta": "1"}
     own = {name: default if options[name] is None else options[name] for name, default in defaults.items()}
     return SlidingModeProtocol(**own, **shared)
@@ -279,6 +278,13 @@ def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph)
     }
 
 
+def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
+    """Return what acts on a simulated run, as the library takes it."""
+    if protocol.reaching is not None:
+        return sliding_keywords(protocol, options, graph)
+    return {"actuator": actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
+
+
 def actuator_of(options: Options) -> GainLimits | None:
     """Return the limits of the gain; None if there are none."""
     from ptcc_certify.protocols.gain_limits import GainLimits
@@ -288,14 +294,9 @@ def actuator_of(options: Options) -> GainLimits | None:
 
 
 def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
-    from ptcc_certify.graphs.rationals import parse_exact
-
-    try:
-        if text is None or parse_exact(text) == 0:
-            return [Fraction(0)] * graph.n_nodes
-    except NumberError:
-        pass
-    return read_initial_state(text or "", [seed, 1], graph, "--sigma0: sigma(0)")
+    if text is None or ("0" in text and not text.strip("0. ")):
+        return [Fraction(0)] * graph.n_nodes
+    return read_initial_state(text, [seed, 1], graph, "--sigma0: sigma(0)")
 
 
 def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:

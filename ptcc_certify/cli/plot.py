@@ -112,18 +112,19 @@ def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Tr
     from ptcc_certify.certificate.procedure import STEPS, certify
     from ptcc_certify.simulation.run import simulate
 
-    signed, protocol = shared.read(path, options), shared.protocol_of(options, ("delta", "disturbance"))
+    signed = shared.read(path, options)
+    protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    more = shared.sliding_keywords(protocol, options, signed)
     if what == "decay":
+        if shared.actuator_of(options) is not None:
+            raise ParameterError("decay is drawn without limits of the gain; leave them out, or ask for --what states")
+        more = shared.sliding_keywords(protocol, options, signed)
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
-    if options["kind"] == "nominal":
-        more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
-    return simulate(signed, protocol, x0, **more)
+    return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
 def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:

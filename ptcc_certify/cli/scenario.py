@@ -10,7 +10,6 @@ import csv
 import io
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,7 +98,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     ),
     "simulation": (
         "How ptcc simulate runs it.",
-        {"samples": ("samples", "201"), "boundary_layer": ("boundary_layer", "0.01")},
+        {"samples": ("samples", "201"), "steps": ("steps", "100"), "boundary_layer": ("boundary_layer", "0.01")},
     ),
     "design": (
         "What ptcc design asks, beside max_input and initial_bound.",
@@ -112,8 +111,8 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     ),
 }
 _STATES = ("x0", "sigma0")
-#: What does not count where a flag chooses the protocol: keys of the other one.
-_OTHERS = {
+#: Options of the other protocol: a flag that chooses the protocol leaves such keys out.
+FOREIGN = {
     "nominal": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
     "sliding-mode": ("T", "gain_cap", "stop_before", "sample_period", "noise"),
 }
@@ -204,6 +203,8 @@ def read_scenario(path: str) -> Scenario:
 
 def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
     """Return the sections of a file, or refuse it."""
+    from ptcc_certify.graphs.io.files import parse_toml
+
     try:
         with Path(path).open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -211,11 +212,7 @@ def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
         raise FormatError(f"{name}: cannot be read ({(error.strerror or str(error)).lower()})") from None
     if len(data) > MAX_BYTES:
         raise FormatError(f"{name}: more than {MAX_BYTES} bytes; give a long initial state as a CSV file")
-    try:
-        sections = tomllib.loads(data.decode("utf-8").removeprefix("\ufeff"), parse_float=str)
-    except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
-        reason = shorten(" ".join(str(error).split()), 160)
-        raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
+    sections = parse_toml(data, name, str)
     if {"count", "nodes"} <= set(sections):
         raise FormatError(f"{name}: describes random graphs, not a scenario; ptcc batch takes it")
     if not any(isinstance(sections.get(section), dict) for section in SECTIONS):
@@ -224,7 +221,8 @@ def _parsed(path: str, name: str) -> dict[str, dict[str, Any]]:
         if section not in SECTIONS:
             what = "section" if isinstance(keys, dict) else "key outside of a section"
             hint = did_you_mean(section, SECTIONS) if isinstance(keys, dict) else _where(section)
-            raise ParameterError(f"{name}: [{shorten(section)}]: no such {what}{hint or '; ' + _list(SECTIONS)}")
+            hint = hint or f"; there are {', '.join(SECTIONS)}"
+            raise ParameterError(f"{name}: [{shorten(section)}]: no such {what}{hint}")
         if not isinstance(keys, dict):
             raise ParameterError(f"{name}: [{section}]: is a section; write its keys below [{section}]")
     return sections
@@ -237,10 +235,6 @@ def _texts(value: Any) -> Any:
     if isinstance(value, list):
         return [_texts(part) for part in value]
     return value if isinstance(value, bool) else str(value)
-
-
-def _list(names: Mapping[str, Any]) -> str:
-    return f"there are {', '.join(names)}"
 
 
 def _where(key: str) -> str:
@@ -278,10 +272,12 @@ def _state(value: Any, folder: Path, place: str) -> str:
 
 def _beside(text: str, folder: Path) -> str:
     """Return a path relative to the folder of the scenario; a packaged graph, and standard input, by name."""
-    from ptcc_certify.graphs.io.packaged import GRAPHS
+    from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
 
     path = folder / text
-    return text if text == "-" or (text in GRAPHS and not path.is_file()) else str(path)
+    if text == "-" or text not in GRAPHS or path.is_file():
+        return text if text == "-" else str(path)
+    return text if kind_of(text) in ("missing", "a folder") else str(graph_path(text))  # not the file of this folder
 
 
 # ---------------------------------------------------------------------- in a command
@@ -311,6 +307,9 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: str) -> 
             raise FormatError(f"{scenario.place('graph')}: {error}") from None
     context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: graph})
     own = {parameter.name for parameter in context.command.params}
+    if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
+        why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
+        raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")
     context.default_map = {name: value for name, value in scenario.options.items() if name in own}
     kind_of_protocol(context, None, context.params.get("kind"))
     return scenario.graph
@@ -322,7 +321,7 @@ def kind_of_protocol(context: click.Context, parameter: click.Parameter | None, 
     The callback of ``--protocol``; eager, as GRAPH is, in whichever order they are given.
     """
     if kind is not None and context.get_parameter_source("kind") is ParameterSource.COMMANDLINE:
-        context.default_map = {k: v for k, v in (context.default_map or {}).items() if k not in _OTHERS[kind]}
+        context.default_map = {k: v for k, v in (context.default_map or {}).items() if k not in FOREIGN[kind]}
     return kind
 
 

@@ -16,11 +16,13 @@ _TABLES = ("", ".csv", ".txt")
 
 
 @click.command()
-@shared.graph_options
+@shared.graph_argument
+@shared.reading_options
 @shared.protocol_options
 @shared.limit_options
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
-@click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T.")
+@click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
+@click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
 @click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
 @shared.number_option("--noise", metavar="NU", help="Nominal: telegraph noise of size NU on every measurement.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
@@ -46,18 +48,14 @@ def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **optio
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     refuse_output(output)
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
-    nominal = options["kind"] == "nominal"
-    if options["noise"] is not None and not nominal:
-        raise ParameterError("--noise belongs to --protocol nominal; leave it out or change the protocol")
-    if vectors and not nominal:
+    if vectors and options["kind"] != "nominal":
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = shared.read(graph, options)
-    more = shared.sliding_keywords(protocol, options, signed)
-    if nominal:
-        more = {"actuator": shared.actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
-        if options["noise"] is not None:
-            more |= {"noise": "telegraph", "noise_bound": options["noise"]}
-    more |= {name: options[name] for name in ("samples", "boundary_layer")}
+    more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
+    if options["noise"] is not None:
+        more |= {"noise": "telegraph", "noise_bound": options["noise"]}
+    if (steps := options["steps"]) is not None:
+        more["times"] = [protocol.T * k / steps for k in range(steps + 1)]
     trajectory = run(signed, protocol, shared.read_initial_states(options, signed), **more)
     if output and suffix in FIGURES:
         from ptcc_certify.report.plots.style import save_figure

@@ -49,7 +49,7 @@ class Screen:
 
         if not self.quiet:
             width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
-            print_lines(wrap_lines(long(), width) if self.verbose else short())
+            click.echo("\n".join(wrap_lines(long(), width) if self.verbose else short()))
 
     def note(self, text: str) -> None:
         """Print one more line on standard output."""
@@ -78,11 +78,6 @@ def _on_terminal(stream: Any) -> bool:
     return stream is not None and stream.isatty()
 
 
-def print_lines(lines: Sequence[str]) -> None:
-    """Print lines."""
-    click.echo("\n".join(lines))
-
-
 def print_json(data: Any) -> None:
     """Print one JSON object, in ASCII: no label can spoil it or steer a terminal."""
     click.echo(json.dumps(data, allow_nan=False))
@@ -90,12 +85,14 @@ def print_json(data: Any) -> None:
 
 def refuse_output(output: str | None) -> None:
     """Refuse before the work what could not, or should not, be written after it."""
-    if not output:
+    if output is None:
         return
-    if output == "-":
+    if output in ("", "-"):
         raise ParameterError("-o names a file; for standard output leave it out (certify: and say --json)")
     if not Path(output).parent.is_dir():
         raise ParameterError(f"{output}: the folder does not exist; make it first")
+    if not os.access(Path(output).parent, os.W_OK) and not os.path.exists(output):  # noqa: PTH110 - Path.exists may raise
+        raise ParameterError(f"{output}: nothing may be written to this folder; name another one")
     _refuse_input(output, output)
 
 
@@ -156,30 +153,20 @@ class _LogFile(logging.FileHandler):
 @contextmanager
 def progress(steps: Sequence[str], quiet: bool = False) -> Iterator[Callable[[str], None]]:
     """Show which of some steps is at work, and log each with its seconds; on a terminal the line goes at the end."""
-    clock = _StepClock()
+    began, last = time.monotonic(), ""
     with _bar("TimeElapsedColumn", quiet=quiet) as add:
         update = add("", total=len(steps))
 
         def begin(step: str) -> None:
-            clock.begin(step)
-            update(completed=steps.index(step), description=step)
+            nonlocal began, last
+            if last:
+                LOG.info("%s: %.3f s", last, time.monotonic() - began)
+            began, last = time.monotonic(), step
+            if step:
+                update(completed=steps.index(step), description=step)
 
         yield begin
-        clock.begin("")
-
-
-class _StepClock:
-    """Logs each step, when it is done, with the seconds that it took."""
-
-    def __init__(self) -> None:
-        self.step, self.began = "", time.monotonic()
-
-    def begin(self, step: str) -> None:
-        """End the step at work, and begin another, or none."""
-        now = time.monotonic()
-        if self.step:
-            LOG.info("%s: %.3f s", self.step, now - self.began)
-        self.step, self.began = step, now
+        begin("")
 
 
 @contextmanager

@@ -13,16 +13,18 @@ import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
+from dataclasses import FrozenInstanceError
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.tables import first_five, import_pandas
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -37,7 +39,7 @@ _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 Exact = Fraction | int | float | str
 
 
-class Weights:
+class Weights(ReadOnly):
     """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
 
     def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
@@ -100,7 +102,8 @@ def _common_scale(values: Sequence[Fraction]) -> int | None:
 _HASHED = 65_536
 
 
-class SignedDigraph(Shown):
+@gated
+class SignedDigraph(ReadOnly, Shown):
     """A signed digraph with exact weights.
 
     Build one with :meth:`from_edges`, :meth:`from_matrix`, :meth:`from_networkx` or
@@ -164,9 +167,14 @@ class SignedDigraph(Shown):
         self._weights = weights.take(order)
         self.sign = self._weights.signs()
         self.read = dict(_READ_DEFAULT, **(read or {}))
-        for array in (self.source, self.target, self._weights.table, self.sign):
-            array.flags.writeable = False
+        self.lock()
+        self._weights.lock()
         self._refuse_bad_edges()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in vars(self) or hasattr(type(self), name):
+            raise FrozenInstanceError(f"{name} of a graph stays as it is; make another graph")
+        super().__setattr__(name, value)
 
     def _refuse_bad_edges(self) -> None:
         source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
@@ -186,6 +194,7 @@ class SignedDigraph(Shown):
     # ------------------------------------------------------------------ constructors
 
     @classmethod
+    @gated
     def from_edges(
         cls,
         edges: Iterable[tuple[Hashable, Hashable, Exact]],
@@ -215,10 +224,14 @@ class SignedDigraph(Shown):
         ('b', 'a', Fraction(1, 1))
         """
         refuse_unknown_orientation(orientation)
+        if not isinstance(edges, Iterable):
+            raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
         known: dict[str, tuple[int, Hashable]] = {}
 
         def number(node: Hashable) -> int:
             label = str(node)
+            if label not in known:
+                refuse_unnamed(node, "an edge")
             place, first = known.setdefault(label, (len(known), node))
             if first is not node and first != node:
                 raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
@@ -246,6 +259,7 @@ class SignedDigraph(Shown):
         return cls(labels, source, target, Weights(values), {"orientation": orientation})
 
     @classmethod
+    @gated
     def from_matrix(
         cls, matrix: Any, labels: Iterable[Hashable] | None = None, *, orientation: str | None = None
     ) -> SignedDigraph:
@@ -285,16 +299,15 @@ class SignedDigraph(Shown):
         if hasattr(matrix, "is_multigraph"):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
         if orientation is None:
-            raise GraphError(
-                'a matrix does not tell its direction: say orientation="listens" if row k holds whom k listens to (the '
-                'paper\'s W), or "information" if row k holds whom k informs (networkx.to_numpy_array)'
-            )
+            raise GraphError(f"a matrix {WAY}")
         refuse_unknown_orientation(orientation)
         if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
-            labels, matrix = rows, _aligned_frame(matrix, rows)
+            labels, matrix = matrix.index, _aligned_frame(matrix, rows)
         dense = not hasattr(matrix, "tocoo")
+        if np.ma.is_masked(matrix):
+            raise GraphError("an entry of the adjacency matrix is masked; write 0 where there is no edge: filled(0)")
         try:
             entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
         except ValueError:
@@ -313,7 +326,10 @@ class SignedDigraph(Shown):
         except (TypeError, ValueError):  # pandas' NA is neither zero nor not
             raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
         values = entries[row, column] if dense else entries.data[entries.data != 0]
-        names = [str(i + 1) for i in range(shape[0])] if labels is None else [str(x) for x in labels]
+        own: list[Hashable] = list(range(1, shape[0] + 1)) if labels is None else list(labels)
+        for label in own:
+            refuse_unnamed(label, "the matrix")
+        names = [str(label) for label in own]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
         if values.dtype.kind == "f":
@@ -335,6 +351,7 @@ class SignedDigraph(Shown):
         return cls(names, column, row, weights, {"orientation": "matrix"})
 
     @classmethod
+    @gated
     def from_networkx(
         cls, graph: nx.DiGraph, weight: str = "weight", *, orientation: str = "information"
     ) -> SignedDigraph:
@@ -482,8 +499,18 @@ class SignedDigraph(Shown):
         return rows
 
     def subgraph(self, nodes: Sequence[int] | np.ndarray) -> SignedDigraph:
-        """Return the graph induced by the node indices ``nodes``, in that order."""
-        nodes = np.asarray(nodes, dtype=np.int64)
+        """Return the graph induced by the node indices ``nodes``, in that order.
+
+        Raises
+        ------
+        GraphError
+            There is no such node, or none at all.
+        """
+        nodes = np.asarray(nodes)
+        if not nodes.size:
+            nodes = nodes.astype(np.int64)
+        elif nodes.ndim != 1 or nodes.dtype.kind not in "iu" or not 0 <= nodes.min() <= nodes.max() < self.n_nodes:
+            raise GraphError(f"a node of a subgraph is an index from 0 to {self.n_nodes - 1}; index[label] tells it")
         position = np.full(self.n_nodes, -1, dtype=np.int64)
         position[nodes] = np.arange(nodes.size)
         keep = np.flatnonzero((position[self.source] >= 0) & (position[self.target] >= 0))
@@ -534,6 +561,8 @@ class SignedDigraph(Shown):
     def to_pandas(self) -> pd.DataFrame:
         """Return the edges as a DataFrame with columns ``source``, ``target``, ``weight`` (float64).
 
+        A node without edges is in no row; :meth:`to_networkx` keeps it.
+
         Raises
         ------
         ParameterError
@@ -573,6 +602,11 @@ class SignedDigraph(Shown):
         return f"SignedDigraph({self.n_nodes} nodes, {self.n_edges} edges, {negative} negative)"
 
 
+#: What a matrix without an orientation is refused with.
+WAY = (
+    'does not tell its direction: say orientation="listens" if row k holds whom k listens to (the paper\'s W), or '
+    '"information" if row k holds whom k informs (networkx.to_numpy_array)'
+)
 _READ_DEFAULT: dict[str, Any] = {
     "orientation": "information",
     "duplicates": "refused",
@@ -598,6 +632,19 @@ def refuse_unknown_orientation(orientation: str) -> None:
         raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
 
 
+def refuse_unnamed(node: Any, where: str) -> None:
+    """Refuse what stands where a node has no name: None, NaN, and NA or NaT of pandas.
+
+    Examples
+    --------
+    >>> refuse_unnamed(None, "row 2")
+    Traceback (most recent call last):
+    ptcc_certify.errors.GraphError: row 2 names no node (None); leave it out or name the node
+    """
+    if node is None or (str(node) in ("nan", "<NA>", "NaT") and not isinstance(node, str)):
+        raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
+
+
 def labels_beside(values: Any) -> list[str] | None:
     """Return the labels of a pandas Series, or of the rows of a DataFrame, as nodes are written; None of other data.
 
@@ -620,8 +667,7 @@ def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
             twice = labels[labels.duplicated()][0]
             raise GraphError(f"two {what} of the matrix are both labelled {shorten(twice)}; rename one of them")
     if odd := frame.index.symmetric_difference(frame.columns).tolist():
-        named = ", ".join(map(shorten, odd[:5])) + (", ..." if len(odd) > 5 else "")
-        raise GraphError(f"rows and columns of the matrix have different labels: {named}; give both the same")
+        raise GraphError(f"rows and columns of the matrix have different labels: {first_five(odd)}; give both the same")
     # One type for all columns would round the integers of one beside the floats of another.
     return frame[rows].to_numpy(dtype=object if len(set(frame.dtypes)) > 1 else None)
 

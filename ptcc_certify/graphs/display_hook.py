@@ -42,13 +42,13 @@ def _html_of(shown: Any) -> str | None:
 shows = _html_of.register
 
 
-#: What ``plot(what=...)`` of an object draws, and the module of the function.
+#: What ``plot(what=...)`` of an object draws, and the public function that draws it.
 _FIGURES = {
-    "decay": ("report.plots.decay", "plot_decay"),
-    "input": ("report.plots.input", "plot_input"),
-    "graph": ("report.plots.graph", "plot_graph"),
-    "spectrum": ("report.plots.spectrum", "plot_spectrum"),
-    "states": ("report.plots.trajectory", "plot_trajectory"),
+    "decay": "plot_decay",
+    "input": "plot_input",
+    "graph": "plot_graph",
+    "spectrum": "plot_spectrum",
+    "states": "plot_trajectory",
 }
 
 
@@ -68,10 +68,11 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     """
     if what not in _FIGURES:
         raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FIGURES)}")
-    module, function = _FIGURES[what]
-    return getattr(import_module(f"ptcc_certify.{module}"), function)(subject, **keywords)
+    return getattr(import_module("ptcc_certify"), _FIGURES[what])(subject, **keywords)
 
 
 def summary(subject: Any) -> str:
     """Return what the command line prints of a certificate."""
-    return "\n".join(import_module("ptcc_certify.report.screen").summary_lines(subject, "graph"))
+    origins = subject.request.origins
+    lines = import_module("ptcc_certify.report.screen").summary_lines(subject, origins.get("graph", "graph"), origins)
+    return "\n".join(lines)

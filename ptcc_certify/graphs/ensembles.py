@@ -10,7 +10,6 @@ Graph ``i`` depends on the ensemble and on ``i`` alone, so that any machine can 
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
@@ -20,9 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.errors import FormatError, NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
-from ptcc_certify.graphs.io.files import read_bytes
+from ptcc_certify.graphs.io.files import parse_toml, read_bytes
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
@@ -41,6 +40,7 @@ class _Block(NamedTuple):
     leads: bool
 
 
+@gated
 @dataclass(frozen=True)
 class Ensemble:
     """A family of random signed digraphs of stated classes, each a function of its number alone.
@@ -157,13 +157,7 @@ class Ensemble:
         (range(5, 41), ('weak', False))
         """
         name = shorten(os.fspath(path), 200)
-        data = read_bytes(Path(path), name)
-        try:
-            # Decimals are read exactly, as in every other input.
-            spec = tomllib.loads(data.decode("utf-8"), parse_float=parse_exact)
-        except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
-            reason = shorten(" ".join(str(error).split()), 160)
-            raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
+        spec = parse_toml(read_bytes(Path(path), name), name, parse_exact)
         keys = [field.name for field in fields(cls)]
         for key in spec:
             if key not in keys:

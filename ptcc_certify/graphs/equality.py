@@ -1,4 +1,4 @@
-"""Equality by value of frozen dataclasses that hold arrays, which ``==`` of tuples cannot compare."""
+"""Objects that hold arrays: read-only, copies too, and equal by value, which ``==`` of tuples cannot tell."""
 
 from __future__ import annotations
 
@@ -8,7 +8,30 @@ from typing import Any
 import numpy as np
 
 
-class ByValue:
+class ReadOnly:
+    """What holds arrays that are not written to, nor are those of its copies and of what was pickled.
+
+    Examples
+    --------
+    >>> from copy import deepcopy
+    >>> graph = deepcopy(SignedDigraph.from_edges([("a", "b", 1)]))
+    >>> graph.sign[0] = -1
+    Traceback (most recent call last):
+    ValueError: assignment destination is read-only
+    """
+
+    def lock(self) -> None:
+        """Let no array be written to."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.lock()
+
+
+class ByValue(ReadOnly):
     """A frozen dataclass whose instances are equal when all fields that compare are: arrays entry by entry.
 
     Examples

@@ -65,7 +65,7 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
         return parse_exact(value)
     if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
         value = value.item()  # type: ignore[attr-defined]  # NumPy's True is no bool, but its item is
-    if isinstance(value, bool | bytes | bytearray):
+    if isinstance(value, bool | bytes | bytearray) or getattr(value, "ndim", False):
         raise NumberError(f"{name} is {shorten(repr(value))}, not a number")
     if isinstance(value, Integral):
         return Fraction(int(value))
@@ -103,6 +103,26 @@ def whole_number(value: Any, name: str, least: int, most: int) -> int:
         domain = f"an integer from {least} to {most}"
         raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
     return number
+
+
+def number_within(value: Any, name: str, least: float, most: float) -> float:
+    """Return a float from ``least`` to ``most``; refuse anything else by name.
+
+    Raises
+    ------
+    ParameterError
+        The message tells the value and the domain.
+
+    Examples
+    --------
+    >>> number_within("1/2", "past", 0, 1)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: past = 1/2 is outside its domain; it must be a number from 0 to 1
+    """
+    if isinstance(value, int | float | Fraction) and least <= value <= most:
+        return float(value)
+    domain = f"a number from {least:g} to {most:g}"
+    raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
 
 
 def given(value: Any) -> str:

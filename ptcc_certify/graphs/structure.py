@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import did_you_mean
+from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.tables import import_pandas
 
@@ -86,7 +87,7 @@ def behaviour_name(text: str) -> str:
 
     Raises
     ------
-    ValueError
+    ParameterError
         No such behaviour; the message lists them.
 
     Examples
@@ -94,11 +95,12 @@ def behaviour_name(text: str) -> str:
     >>> behaviour_name("interval-bipartite-consensus")
     'interval bipartite consensus'
     """
+    text = str(text)
     for name in BEHAVIOURS:
         if text.replace("-", " ") == name.replace("-", " "):
             return name
     names = [name.replace(" ", "-") for name in BEHAVIOURS]
-    raise ValueError(f'unknown behaviour "{text}"; one of {", ".join(names)}{did_you_mean(text, names)}')
+    raise ParameterError(f'unknown behaviour "{text}"; one of {", ".join(names)}{did_you_mean(text, names)}')
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ class WeakComponent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Structure(Shown):
+class Structure(ReadOnly, Shown):
     """The structure of a signed digraph; made by :func:`analyse`.
 
     Attributes
@@ -196,6 +198,9 @@ class Structure(Shown):
     undirected: bool
     all_positive: bool
 
+    def __post_init__(self) -> None:
+        self.lock()
+
     @property
     def balanced(self) -> bool:
         """Whether the whole graph is structurally balanced."""
@@ -223,7 +228,7 @@ class Structure(Shown):
 
         Raises
         ------
-        ValueError
+        ParameterError
             No behaviour is called so.
         """
         wanted = behaviour_name(behaviour)

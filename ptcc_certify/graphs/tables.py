@@ -1,13 +1,38 @@
-"""Tables for pandas, which is optional: imported here, and named where it is missing."""
+"""Entries by label, and tables for pandas, which is optional: imported here, and named where it is missing."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def position(label: Hashable, labels: Sequence[str]) -> int:
+    """Return where an agent stands among the labels.
+
+    Raises
+    ------
+    ParameterError
+        No agent is called so.
+
+    Examples
+    --------
+    >>> position(2, ["1", "2"])
+    1
+    """
+    if str(label) not in labels:
+        raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}")
+    return labels.index(str(label))
+
+
+def first_five(labels: Sequence[str]) -> str:
+    """Return the first five labels, for a message."""
+    return ", ".join(map(shorten, labels[:5])) + (", ..." if len(labels) > 5 else "")
 
 
 def import_pandas() -> Any:

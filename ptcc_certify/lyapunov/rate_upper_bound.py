@@ -95,9 +95,9 @@ def prove_rate_bound(structure: Structure) -> RateBound | None:
         for gap in _GAPS:
             if not np.isfinite(decay * (1 + gap)):
                 break
-            candidate = _prove_component(nodes, A, round_to_bits(decay * (1 + gap), 53), dimension)
-            if candidate is not None:
-                return min(mean, candidate, key=lambda bound: bound.value)
+            c = round_to_bits(decay * (1 + gap), 53)
+            if (witness := prove_slow_eigenvalues(A, c, dimension)) is not None:
+                return min(mean, RateBound(2 * c, nodes, *witness), key=lambda bound: bound.value)
     return mean
 
 
@@ -166,7 +166,17 @@ def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:
     return best
 
 
-def _prove_component(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: int) -> RateBound | None:
+def prove_slow_eigenvalues(
+    A: Matrix, c: Fraction, dimension: int = 1
+) -> tuple[Matrix, tuple[tuple[Fraction, ...], ...]] | None:
+    """Prove that ``dimension`` eigenvalues of ``A`` have a real part below ``c``; return ``H`` and vectors, or None.
+
+    Examples
+    --------
+    >>> A = [[Fraction(1), Fraction(1)], [Fraction(0), Fraction(2)]]
+    >>> prove_slow_eigenvalues(A, Fraction(11, 10)) is not None, prove_slow_eigenvalues(A, Fraction(9, 10))
+    (True, None)
+    """
     from scipy.linalg import matrix_balance, solve_continuous_lyapunov
 
     B = [[x - c * (i == j) for j, x in enumerate(row)] for i, row in enumerate(A)]
@@ -192,4 +202,4 @@ def _prove_component(nodes: tuple[int, ...], A: Matrix, c: Fraction, dimension: 
         return None
     if not prove_positive_definite(integer_rows(-(X * H * X.transpose()))):
         return None
-    return RateBound(2 * c, nodes, form, vectors)
+    return form, vectors

@@ -101,7 +101,7 @@ class Search:
     """
 
     functions: tuple[LyapunovFunction, ...] = ()
-    searched: dict[str, float] = field(default_factory=dict)
+    searched: dict[str, float] = field(default_factory=dict, hash=False)
     diagonal_limit: float | None = None
     notes: tuple[str, ...] = ()
     cut_off: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten, whole_number
@@ -117,6 +117,7 @@ class Disturbance(ABC):
         return None
 
 
+@gated
 @dataclass(frozen=True, init=False)
 class ExpressionDisturbance(Disturbance):
     r"""Disturbances written as expressions of ``k`` and ``t``.
@@ -200,7 +201,7 @@ class ExpressionDisturbance(Disturbance):
 
         try:
             return to_latex(symbolic(self._program(agent), {name: ca.SX.sym(name) for name in ATOMS}))
-        except RecursionError:
+        except (RecursionError, SystemError):  # the second: CasADi before 3.8
             raise ParameterError(f'disturbance "{shorten(self.text)}" is too long to be printed as LaTeX') from None
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
@@ -267,6 +268,7 @@ class ExpressionDisturbance(Disturbance):
         return budget, sampled
 
 
+@gated
 @dataclass(frozen=True, init=False, eq=False)
 class SampledDisturbance(ByValue, Disturbance):
     """Disturbances given at instants, linear between them, constant before the first and after the last.
@@ -329,7 +331,7 @@ class SampledDisturbance(ByValue, Disturbance):
         parts = {"times": instants, "samples": samples, "hold": bool(hold)}
         for name, part in (parts | {"text": text or f"{instants.size} samples, {between}"}).items():
             object.__setattr__(self, name, part)
-        instants.flags.writeable = samples.flags.writeable = False
+        self.lock()
 
     def values(self, t: ArrayLike, agents: ArrayLike, signs: ArrayLike = ()) -> np.ndarray:
         """Return ``d_k(t)``: floats (A, M); ``signs`` does not matter."""
@@ -485,6 +487,7 @@ class WorstCaseDisturbance(Disturbance):
         return "by definition"
 
 
+@gated
 @dataclass(frozen=True)
 class StateDependent(Disturbance):
     """A disturbance computed by a Python function of time and state.

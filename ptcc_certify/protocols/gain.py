@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.casadi_latex import to_latex
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _PARAMETERS = ("T", "rho1", "rho2", "kappa")
 
 
+@gated
 @dataclass(frozen=True, repr=False)
 class Gain(Parameters):
     r"""``gain(t) = rho1 + rho2 kappa/(T - t)`` before the deadline ``T``, ``rho1`` from there on.

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.parameters import Given, Parameters, readable
 
@@ -33,6 +33,7 @@ MAX_PERIODS = 10**6
 _SMALLEST_SHARE = Fraction(1, 10**300)
 
 
+@gated
 @dataclass(frozen=True, repr=False)
 class GainLimits(Parameters, Limits):
     """What an actuator leaves of a gain: saturation, switch-off, zero-order hold; None for what it does not.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import Protocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _LATEX_NODES = 20
 
 
+@gated
 @dataclass(frozen=True, repr=False)
 class NominalProtocol(Protocol):
     """The nominal protocol (4) of the paper: every agent steers by what it hears from those it listens to.

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any, Self, overload
 
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 
@@ -72,6 +72,7 @@ class Parameters:
         every = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {name: value for name, value in every.items() if value is not None}
 
+    @gated
     def replace(self, **changes: Exact) -> Self:
         """Return the same with other values of some parameters.
 
@@ -90,9 +91,6 @@ class Parameters:
         >>> NominalProtocol(T=1, rho1=1, rho2=1, kappa=2).replace(T=3)
         NominalProtocol(T=3, rho1=1, rho2=1, kappa=2)
         """
-        names = [field.name for field in fields(self)]  # type: ignore[arg-type]
-        if unknown := [name for name in changes if name not in names]:
-            raise ParameterError(f"{unknown[0]} is no parameter of {type(self).__name__}; it has {', '.join(names)}")
         return replace(self, **changes)  # type: ignore[type-var]
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 
+@gated
 @dataclass(frozen=True, repr=False)
 class SlidingModeProtocol(ReachingProtocol):
     r"""The sliding-mode protocol (47)-(48) of the paper, for agents ``x_k' = u_k + d_k`` with ``|d_k| <= delta``.

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import value_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort, Limited
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker.input_formulas import InitialSet
-
-#: The head of a line, and its text; a line without a head belongs to the one before.
-Lines = Iterator[tuple[str, str]]
 
 
 def input_lines(certificate: Certificate) -> Lines:
@@ -33,13 +30,12 @@ def input_lines(certificate: Certificate) -> Lines:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         yield "INPUT", "NOT BOUNDED: the state converges, but from some initial states the input grows without limit"
         enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
-        yield "", f"rho2 kappa min Re lambda{below}; it takes 1: raise rho2 * kappa{enough}"
+        yield "", f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 * kappa{enough}"
     else:
-        yield "input", f"bounded or not is undecided: {product}, it takes 1"
+        yield "input", f"not proved bounded: {product}, 1 is needed"
     sizes = []
     if effort.peak is not None:
-        most = max(range(len(effort.peak.agents)), key=effort.peak.agents.__getitem__)
-        label = certificate.graph.labels[most]
+        label = certificate.graph.labels[effort.peak.agents.index(effort.peak.largest)]
         sizes = [f"|u_k| <= {up(effort.peak.largest, 4)} (k = {label}), ||u|| <= {up(effort.peak.norm, 4)}"]
     sizes += [f"int ||u||^2 dt <= {up(effort.energy.value, 4)}"] if effort.energy is not None else []
     sizes += [f"int ||u|| dt <= {up(effort.path_length.value, 4)}"] if effort.path_length is not None else []
@@ -64,12 +60,11 @@ def disturbed_lines(certificate: Certificate) -> Lines:
     effort = certificate.effort
     if effort is not None and (d := effort.disturbed) is not None:
         held = any(entry.sample_period is not None for entry in certificate.limits)
-        text = (
-            f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|" + ", without the hold" * held
-        )
-        if d.drift is not None and not certificate.limits:
-            most = max(d.drift)
-            text += f" and moves x_k(T) by at most {up(most, 4)}" if most else " and moves no x_k(T)"
+        text = f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|"
+        if d.drift is None or certificate.limits:
+            text += " without a sample period" * held + "; of x(T) nothing is proved"
+        else:
+            text += f" and moves x_k(T) by at most {up(max(d.drift), 4)}" if any(d.drift) else " and moves no x_k(T)"
         yield "disturbed", text
 
 

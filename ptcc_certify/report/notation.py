@@ -201,7 +201,8 @@ def agent_parts(saved: Certificate) -> list[str]:
     for k, component in enumerate(groups, start=1):
         name = f"leader of group {k}" if len(groups) > 1 else "leader"
         for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
-            parts[v] = name + {1: ", camp 1", -1: ", camp 2", 0: ", unbalanced"}[sign]
+            camp = {1: "camp 1", -1: "camp 2", 0: "unbalanced"}[sign]
+            parts[v] = f"{name}, {'alone' if len(component.nodes) == 1 else camp}"
     return parts
 
 

@@ -6,6 +6,7 @@ Its sentences are in ``templates/``, which Jinja2 fills: every text of the file 
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections import Counter
 from datetime import date
@@ -27,6 +28,7 @@ from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
+from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.structure_text import camps, remarks_on
 from ptcc_certify.theorems.table import THEOREMS
@@ -119,13 +121,8 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags}
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
-    environment.globals |= {
-        "ROWS": ROWS,
-        "EXTREMES": EXTREMES,
-        "GROUPS": GROUPS,
-        "FEW": FEW,
-        "LABELLED_NODES": LABELLED_NODES,
-    }
+    environment.globals |= {"ROWS": ROWS, "EXTREMES": EXTREMES, "GROUPS": GROUPS, "FEW": FEW}
+    environment.globals |= {"LABELLED_NODES": LABELLED_NODES}
     return environment
 
 
@@ -139,8 +136,6 @@ def _view(saved: Certificate) -> dict[str, Any]:
     more = f" --memory {math.ceil(report.memory)}" if report.memory > 1 else ""
     commands = [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]
     notes = saved.document["unverified"].get("notes")
-    sizes = Counter(part.partition(", ")[2] for part in agent_parts(saved))
-    named = {"camp 1": "in camp 1", "camp 2": "in camp 2", "unbalanced": "unbalanced"}
     peaks = effort.peak.agents if effort and effort.peak else ()
     verdict_text, larger_rho2 = _in_words(saved)
     return texts.facts(saved) | {
@@ -159,7 +154,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
         "figures": draw(saved, ("graph", "states", "sliding", "decay", "input")) | _distributions(saved),
-        "camp_counts": [(word, sizes[camp]) for camp, word in named.items() if sizes[camp]],
+        "camp_counts": Counter(camp_groups(saved.structure)[saved.structure.leaders]).items(),
         "gap": _gap(saved),
         "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
         "commands": commands,
@@ -168,11 +163,10 @@ def _view(saved: Certificate) -> dict[str, Any]:
 
 
 def _in_words(saved: Certificate) -> tuple[Markup, str]:
-    """Return the verdict without options of the command line, and the ``rho2`` that it advises, empty if none."""
-    text, advice = Markup(escape(saved.assessment.text)), saved.assessment.advice
-    rho2 = advice.split()[1] if advice else ""
-    plain = Markup("\u03c1<sub>2</sub> = {} would leave 1 %").format(rho2)
-    return text.replace(escape(advice), plain) if advice else text, rho2
+    """Return the verdict without options of the command line, and the ``rho2`` that leaves 1 %, empty if none."""
+    text = re.sub(r"--rho2 (\S+) \([^)]*\)", "\u03c1<sub>2</sub> = \\1", str(escape(saved.assessment.text)))
+    useful = re.match(r"--rho2 (\S+) .*leaves 1 %", saved.assessment.advice)
+    return Markup(re.sub(r"--mu3 (\S+)", "\u03bc<sub>3</sub> = \\1", text)), useful[1] if useful else ""
 
 
 def _title(saved: Certificate, invariant: str) -> Markup:

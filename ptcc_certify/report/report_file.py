@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
@@ -27,7 +28,7 @@ def write_report(
     output: str | Path,
     *,
     simulation: bool | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    progress: Callable[[str], None] | None = None,
     memory: float = 1,
     day: date | None = None,
 ) -> str:
@@ -44,7 +45,7 @@ def write_report(
         The suffix decides what is written.
     simulation : bool, optional
         Whether to repeat the CVODES run for the figures; by default up to 1,000 agents.
-    progress : callable
+    progress : callable, optional
         Told which of ``independent check``, ``simulation``, ``report`` begins.
     memory : float
         GB that the check may take; see :func:`ptcc_certify.checker.check`.
@@ -88,6 +89,7 @@ def write_report(
         raise ParameterError(f"{output}: the folder does not exist; make it first")
     if suffix == ".tex" and not re.fullmatch(r"[A-Za-z0-9_.-]+", path.stem):
         raise ParameterError(f"{output}: LaTeX wants a plain name; use letters, digits, -, _ and .")
+    progress = listener(progress)
     progress("independent check")
     try:
         saved = read_certificate(certificate, memory=memory)

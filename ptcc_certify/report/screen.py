@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -27,10 +28,12 @@ from ptcc_certify.report.structure_text import (
 )
 from ptcc_certify.report.text_layout import (
     TEXT,
+    columns,
     counted,
     format_lines,
     printable,
     short_number,
+    shorten_label,
     shorten_list,
     shorten_text,
     value_list,
@@ -44,9 +47,10 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker import CheckReport
+    from ptcc_certify.protocols.base import Protocol
 
-#: Lines of a short screen of a connected graph, and of one whose answers take more.
-SHORT, LONGEST = 8, 10
+#: Lines of a short screen of a connected graph, if its answers do not take more.
+SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
@@ -85,37 +89,36 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     input      bounded; |u_k| <= 24.01, the largest of agent a
     verdict    certified; checked without a solver
     """
-    claims = _component_claims(certificate)
+    p = certificate.protocol
+    whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
+    claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate, origins)
-    for room, bounds in ((SHORT, _bounds), (SHORT, _short_bounds), (LONGEST, _short_bounds)):
+    for agents in (True, False):
         entries = [
             *graph_entries(certificate.structure, name),
             ("protocol", _protocol_text(certificate, origins)),
-            *zip(chain(["claim"], repeat("")), claims, strict=False),
+            *_headed("claim", claims),
             *([] if drawn else _short_final_state(certificate)),
-            *bounds(certificate, drawn),
+            *_bounds(certificate, agents, drawn),
             *disturbed_lines(certificate),
             ("verdict", _short_verdict(certificate)),
         ]
         lines = wrap_lines(format_lines(entries))
-        if len(lines) < room + len(claims):
+        if len(lines) < SHORT + len(claims):
             break
     return lines
 
 
 def structure_summary(structure: Structure, name: str) -> list[str]:
     """Return the short screen of ``ptcc classify``: at most 8 lines of 80 columns, 12 of a disconnected graph."""
-    labels = structure.graph.labels
-
-    def lines() -> Lines:
-        yield from graph_entries(structure, name)
-        yield from ((head, shorten_text(text, TEXT)) for head, text in leader_lines(structure, 3, 20))
-        if structure.followers.size:
-            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()], TEXT)
-        claims = [component.claim for component in structure.components]
-        yield from zip(chain(["claim"], repeat("")), _claim_texts(structure, claims), strict=False)
-
-    return format_lines(lines())
+    followers = [structure.graph.labels[v] for v in structure.followers.tolist()]
+    claims = _claim_texts(structure, [component.claim for component in structure.components])
+    leaders = (
+        (head, text if columns(text) <= TEXT else shorten_text(text.partition(", negative cycle")[0], TEXT))
+        for head, text in leader_lines(structure, 3, 20)
+    )
+    told = [("followers", shorten_list(followers, TEXT))] if followers else []
+    return format_lines([*graph_entries(structure, name), *leaders, *told, *_headed("claim", claims)])
 
 
 def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
@@ -131,34 +134,34 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
+    if report.accepted and path:
         with suppress(PTCCError):
-            certificate = Certificate(**read_document(Path(path), document, "", report)) if path else None
-            origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
-            told = [] if certificate is None else summary_lines(certificate, path, origins)
-            told = list(dropwhile(lambda line: not line.startswith("protocol"), told))
-            lines = list(takewhile(lambda line: not line.startswith("verdict"), told)) or lines
+            certificate = Certificate(**read_document(Path(path), document, "", report))
+            told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
+            answers = dropwhile(lambda line: not line.startswith("protocol"), told)
+            lines = list(takewhile(lambda line: not line.startswith("verdict"), answers))
     return wrap_lines([*lines, report.lines()[-1]])
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     """Tell the protocol with its parameters, and where the initial state comes from."""
-    p = certificate.protocol
-    names = [name for name in p.to_dict() if name != "kind"]
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
     if certificate.initial_set is not None and (not begin or _is_set_asked(certificate, origins)):
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
-    text = f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
-    lines = wrap_text("; ".join([text, ", ".join(begin) or "no x(0)"]))
+    lines = wrap_text("; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"]))
     return " ".join(lines[:2]) if len(lines) <= 2 else f"{lines[0]} {shorten_text(f'{lines[1]} ...', TEXT)}"
 
 
-def _component_claims(certificate: Certificate) -> list[str]:
-    """Tell what is claimed, of each of the largest components if there are several."""
-    p = certificate.protocol
-    whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
-    return _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
+def _gains_text(p: Protocol) -> str:
+    """Tell a protocol with its parameters."""
+    return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
+
+
+def _headed(head: str, texts: Iterable[str]) -> Lines:
+    """Put a head before the first of some texts."""
+    return zip(chain([head], repeat("")), texts, strict=False)
 
 
 def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> list[str]:
@@ -183,17 +186,21 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
-    kind = f"({_accuracy(result, ', rounded')}{degenerate}{limits})"
-    if len(result.states) > 1 and len(set(result.states)) == 1:
-        yield "x(T)", f"every agent at {short_number(result.states[0])} {kind}"
-        return
-    text = f"{value_list(labels, result.states, 2 * TEXT)} {kind}"
-    if ", ... (" in text or len(wrap_text(text)) > 2:
+    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; no limits" * bool(certificate.limits)
+    kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
+    groups: dict[Fraction | float, list[str]] = {}
+    for label, state in zip(labels, result.states, strict=True):
+        groups.setdefault(state, []).append(printable(label))
+    listed = value_list(labels, result.states, 2 * TEXT)
+    grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
+    text = min(listed, grouped, key=columns)
+    if len(groups) == 1 < len(labels):
+        text = f"every agent at {short_number(result.states[0])}"
+    elif ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
-        text = f"least {least}, largest {most}, of {len(labels):,} agents {kind}"
-    yield "x(T)", text
+        text = f"least {least}, largest {most}, of {len(labels):,} agents"
+    yield "x(T)", f"{text} {kind}"
 
 
 def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
@@ -201,24 +208,18 @@ def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
     return certificate.initial_set is not None and "x(0)" in origins
 
 
-def _bounds(certificate: Certificate, drawn: bool) -> Lines:
-    """Tell how near the agents are by when, and how large the input gets."""
+def _bounds(certificate: Certificate, single: bool, drawn: bool) -> Lines:
+    """Tell how near the agents are by when, and how large the input gets, with or without single agents."""
     if certificate.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
         yield "error", f"none: no agent listens to another, each keeps {invariant}"
         return
     norm, agents = _error_texts(certificate)
     if norm:
-        yield "error", norm + agents * (not drawn)
+        yield "error", norm + agents * (single and not drawn)
     if certificate.effort is not None:
-        bounded, size = _input_texts(certificate, certificate.effort)
-        yield "INPUT" if certificate.effort.bounded is False else "input", "; ".join(filter(None, (bounded, size)))
-
-
-def _short_bounds(certificate: Certificate, drawn: bool) -> Lines:
-    """Tell the same of no single agent."""
-    for head, text in _bounds(certificate, drawn):
-        yield head, text.partition(", every agent" if head == "error" else ", the largest")[0]
+        loud = certificate.effort.bounded is False and not certificate.effort.residual
+        yield "INPUT" if loud else "input", _input_text(certificate, certificate.effort, single)
 
 
 def _error_texts(certificate: Certificate) -> tuple[str, str]:
@@ -257,25 +258,26 @@ def _instant(certificate: Certificate) -> tuple[float, str]:
     return 0.01 * _sliding_share(certificate), "T_r + 0.99 T_s"
 
 
-def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
-    """Return whether the input is bounded, and its proved size, empty if none is proved."""
-    if effort.residual:
-        entry = effort.residual[0]
-        largest = entry.noisy_largest if entry.noise is not None else entry.largest
-        text, size = "bounded under these limits", "" if largest is None else f"|u_k| <= {up(largest, 4)}"
+def _input_text(certificate: Certificate, effort: Effort, single: bool) -> str:
+    """Tell whether the input is bounded, its proved size, and whose it is."""
+    entry = effort.residual[0] if effort.residual else None
+    if entry is not None:
+        text, largest = "bounded under these limits", entry.largest if entry.noise is None else entry.noisy_largest
+        nothing = "; under a sample period no number is proved"
     else:
-        states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "bounded or not is undecided"}
-        text, size = states[effort.bounded], ""
-        if effort.bounded and effort.peak is None and effort.sliding is not None and not effort.sliding.bounded:
-            text = "the nominal part is bounded, of the sliding part nothing is proved"
-        if effort.bounded is False and certificate.rate is not None:
-            text += f"; rho2 kappa >= {up(2 / certificate.rate, 4)} bounds it"
-        if effort.peak is not None:
-            agents = effort.peak.agents
-            label = certificate.graph.labels[max(range(len(agents)), key=agents.__getitem__)]
-            states_text = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
-            size = f"|u_k| <= {up(effort.peak.largest, 4)}{states_text}, the largest of agent {shorten_text(label, 20)}"
-    return text, size
+        states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}
+        text, largest = states[effort.bounded], None if effort.peak is None else effort.peak.largest
+        nothing = "; no number is proved" * bool(effort.bounded and certificate.initial_state is not None)
+        if largest is None and effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
+            text, nothing = "the nominal part is bounded", ", of the sliding part nothing is proved"
+    if largest is None:
+        return text + nothing
+    whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
+    agent = ""
+    if single and entry is None and effort.peak is not None:
+        label = certificate.graph.labels[effort.peak.agents.index(largest)]
+        agent = f", the largest of agent {shorten_label(label, 22)}"
+    return f"{text}; |u_k| <= {up(largest, 4)}{whom}{agent}"
 
 
 def _short_verdict(certificate: Certificate) -> str:
@@ -285,31 +287,21 @@ def _short_verdict(certificate: Certificate) -> str:
     assessment = certificate.assessment
     if assessment.verdict != CERTIFIED:
         return assessment.line(f"{assessment.verdict}: {assessment.remark}")
-    certified = assessment.certified_part + " without disturbances" * (certificate.delta is not None)
-    option = assessment.advice.partition(" (")[0]
-    more = f"{option} leaves 1 %" if option else ""
-    if assessment.useful is False:
-        certified += ", but says little by T"
-    elif not assessment.answers and certificate.delta is None:
-        more = "checked without a solver"
+    certified, advice = assessment.certified_part, re.sub(r" \(.*?\)", "", assessment.advice)
+    certified += ", but says little by T" * (assessment.useful is False)
+    checked = "" if certified != CERTIFIED or assessment.answers or assessment.caveat else "checked without a solver"
     ended = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-    return assessment.line(certified, more, ended * bool(certificate.cut_off))
+    return assessment.line(certified, checked, assessment.caveat, advice, ended * bool(certificate.cut_off))
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
     """Return the lines of ``ptcc classify``."""
     labels = structure.graph.labels
-
-    def lines() -> Lines:
-        yield from _graph_lines(structure, name)
-        yield "nodes", shorten_list(labels)
-        yield "structure", structure_text(structure)
-        yield from leader_lines(structure, 4)
-        if structure.followers.size:
-            yield "followers", shorten_list([labels[v] for v in structure.followers.tolist()])
-        yield from _claim_lines([component.claim for component in structure.components])
-
-    return format_lines(lines())
+    followers = [labels[v] for v in structure.followers.tolist()]
+    claims = _claim_lines(structure, [component.claim for component in structure.components])
+    told = [("followers", shorten_list(followers))] if followers else []
+    facts = [("nodes", shorten_list(labels)), ("structure", structure_text(structure))]
+    return format_lines([*_graph_lines(structure, name), *facts, *leader_lines(structure, 4), *told, *claims])
 
 
 def certificate_lines(
@@ -322,9 +314,10 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(certificate.claims, f" {when}")
-        names = [name for name in p.to_dict() if name != "kind"]
-        yield "protocol", f"{p.kind}: {', '.join(f'{name}={near(getattr(p, name), 12)}' for name in names)}"
+        yield from _claim_lines(structure, certificate.claims, f" {when}")
+        yield "protocol", _gains_text(p)
+        if certificate.limits or certificate.noise is not None or certificate.delta is not None:
+            yield "", "a line that names no limits, noise or disturbances is without them"
         if certificate.initial_state is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
             alone = ", of the simulated run alone" * _is_set_asked(certificate, origins)
@@ -332,7 +325,7 @@ def certificate_lines(
         states = () if _is_set_asked(certificate, origins) else (_final_state_lines, _deviation_lines)
         for part in (_sliding_lines, *states, _rate_lines, input_lines):
             yield from part(certificate)
-        yield from zip(chain(["simulated"], repeat("")), _simulated(certificate), strict=False)
+        yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
             named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
             yield "cut off", f"{named}; what was proved by then stands"
@@ -359,14 +352,13 @@ def _final_state_lines(certificate: Certificate) -> Lines:
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
-def _accuracy(result: FinalState, rounded: str = "; here to 5 digits") -> str:
-    """Tell how exactly a final state is known, and if it is written with fewer digits."""
+def _accuracy(result: FinalState, rounded: str = "exact; here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and of exact ones whether they are written with fewer digits."""
     if result.radius is None and not result.exact:
         return "floating point"
-    widest = max(result.radius or (0,))
-    known = f"to within {up(widest, 2)}, proved" if widest else "exact"
-    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
-    return known + rounded * cut
+    if widest := max(result.radius or (0,)):
+        return f"to within {up(widest, 2)}, proved"
+    return rounded if any(Fraction(short_number(x)) != x for x in result.states[:100]) else "exact"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:
@@ -485,10 +477,14 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         yield f"end state within {gap:.1e} of the final state{remark}"
 
 
-def _claim_lines(claims: Sequence[Claim], when: str = "") -> Lines:
-    counts = sorted(Counter(claims).items(), key=lambda item: item[0].theorem)
-    for head, (claim, count) in zip(chain(["claim"], repeat("")), counts, strict=False):
-        yield head, f"{count} component(s): " * (len(claims) > 1) + _claim_text(claim, when)
+def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> Lines:
+    """Tell each claim in full, and of several components which one it is of, or how many."""
+    labels, texts = structure.graph.labels, []
+    for claim, count in sorted(Counter(claims).items(), key=lambda item: item[0].theorem):
+        nodes = structure.components[claims.index(claim)].nodes
+        whose = f"{count} components" if count > 1 else shorten_list([labels[v] for v in nodes], 40)
+        texts.append(f"{whose}: " * (len(claims) > 1) + _claim_text(claim, when))
+    return _headed("claim", texts)
 
 
 def _sliding_lines(certificate: Certificate) -> Lines:
@@ -523,8 +519,8 @@ def _sliding_lines(certificate: Certificate) -> Lines:
 
 
 def _claim_text(claim: Claim, when: str) -> str:
-    numbers = ", ".join(claim.corollaries)
-    also = f"; {', '.join(claim.special)} (Corollary {numbers})" if claim.special else ""
-    if claim.corollaries and not claim.special:
-        also = f"; Corollary {numbers}"
-    return f"{claim.behaviour}{when} (Theorem {claim.theorem}{also})"
+    numbers = f"Corollar{'y' if len(claim.corollaries) == 1 else 'ies'} {', '.join(claim.corollaries)}"
+    theorem = f"{claim.behaviour}{when} (Theorem {claim.theorem}"
+    if claim.special:
+        return f"{theorem}), in particular {', '.join(claim.special)} ({numbers})"
+    return f"{theorem}, {numbers})" if claim.corollaries else f"{theorem})"

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from ptcc_certify.graphs.io.edge_list import BY_HEADER
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
-from ptcc_certify.report.text_layout import TEXT, columns, counted, printable, shorten_list, shorten_text
+from ptcc_certify.report.text_layout import TEXT, columns, counted, printable, shorten_label, shorten_list, shorten_text
 
 ORIENTATION = {
     "information": "a row a,b: information flows a -> b, b listens",
@@ -77,8 +77,10 @@ def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int =
     """Tell how a group of leaders splits, or why it does not."""
     nodes = [labels[v] for v in component.nodes]
     if component.negative_cycle is not None:
-        steps = " ".join(f"{labels[s]}->{labels[t]}" for s, t in component.negative_cycle[:12])
-        more = " ..." if len(component.negative_cycle) > 12 else ""
+        steps = ", ".join(
+            f"{shorten_label(labels[s])}->{shorten_label(labels[t])}" for s, t in component.negative_cycle[:12]
+        )
+        more = ", ..." if len(component.negative_cycle) > 12 else ""
         return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
     sides = camps(component)
     text = " against ".join("{" + shorten_list([labels[v] for v in camp], width) + "}" for camp in sides)

@@ -56,6 +56,17 @@ def shorten_text(text: str, width: int) -> str:
     return text if columns(text) <= width else _cut(text, width - 3) + "..."
 
 
+def shorten_label(label: str, width: int = 24) -> str:
+    """Cut a long label before its end: labels that begin alike often differ there.
+
+    Examples
+    --------
+    >>> shorten_label("school of mathematics, room 12")
+    'school ...atics, room 12'
+    """
+    return label if columns(label) <= width else f"{_cut(label, 7)}...{_cut(label[::-1], width - 10)[::-1]}"
+
+
 def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     """List as many words as fit, and tell how many there are: ``total``, if these are the first of more.
 
@@ -75,12 +86,12 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
         return ", ".join(words)
     if fitting:
         return ", ".join(words[:fitting]) + rest
-    return shorten_text(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
+    return shorten_label(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
 
 
-def value_list(labels: Sequence[str], values: Iterable[object], width: int = 90) -> str:
+def value_list(labels: Sequence[str], values: Iterable[object], width: int = 4 * TEXT) -> str:
     """List the value of every node, long labels shortened."""
-    entries = (f"{shorten_text(label, 24)}={short_number(value)}" for label, value in zip(labels, values, strict=True))
+    entries = (f"{shorten_label(label)}={short_number(value)}" for label, value in zip(labels, values, strict=True))
     return shorten_list([printable(entry) for entry in entries], width)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graphs.rationals import as_fraction
+from ptcc_certify.graphs.rationals import as_fraction, number_within, whole_number
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact
@@ -52,12 +52,9 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     ParameterError
         A number is outside its domain.
     """
-    if not 1e-300 <= remaining < 1:
-        raise ParameterError(f"remaining = {remaining} is outside its domain; it must be between 1e-300 and 1")
-    if samples < 2:
-        raise ParameterError(f"samples = {samples} is outside its domain; it must be at least 2")
-    if not 0 <= past <= 1e6:
-        raise ParameterError(f"past = {past} is outside its domain; it must be between 0 and 1e6")
+    remaining = number_within(remaining, "remaining", 1e-300, 1 - 2**-53)
+    samples = whole_number(samples, "samples", 2, 10**9)
+    past = number_within(past, "past", 0, 1e6)
     T_r, T_s, T = (float(x) for x in (protocol.T - protocol.span, protocol.span, protocol.T))
     grid = np.linspace(1, 0, samples)
     if protocol.prescribed:

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_states
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 
 
+@gated
 def simulate(
     graph: Any,
     protocol: Protocol,
@@ -155,8 +156,8 @@ def simulate(
         )
     if actuator is not None and not isinstance(actuator, GainLimits):
         raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
-    if boundary_layer is not None and not 1e-12 <= boundary_layer <= 1e12:
-        raise ParameterError(f"boundary_layer = {boundary_layer} is outside its domain, 1e-12 to 1e12")
+    if boundary_layer is not None:
+        boundary_layer = number_within(boundary_layer, "boundary_layer", 1e-12, 1e12)
     if times is None:
         instants = default_instants(protocol, remaining, samples, past)
     else:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Hashable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +14,8 @@ import numpy as np
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, plot
 from ptcc_certify.graphs.equality import ByValue
-from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.graphs.tables import import_pandas, position
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,9 +91,7 @@ class Trajectory(ByValue, Shown):
     held_input: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        for own in fields(self):
-            if isinstance(array := getattr(self, own.name), np.ndarray):
-                array.flags.writeable = False
+        self.lock()
 
     @property
     def sliding(self) -> SlidingTrajectory | None:
@@ -163,6 +162,7 @@ class Trajectory(ByValue, Shown):
         ParameterError
             No instant of the trajectory is there: give it to :func:`simulate` as one of ``times``.
         """
+        fraction = number_within(fraction, "fraction", 0, math.inf)
         if fraction == 1 and self.deadline_index is not None:
             return self.final_state
         wanted = fraction * float(self.protocol.T)
@@ -173,10 +173,7 @@ class Trajectory(ByValue, Shown):
 
     def __getitem__(self, label: Hashable) -> np.ndarray:
         """(M,) or (S, M) array: the states of one agent."""
-        if str(label) not in self.graph:
-            nodes = ", ".join(map(shorten, self.labels[:5])) + (", ..." if len(self.labels) > 5 else "")
-            raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {nodes}")
-        return self.states[self.graph.index[str(label)]]
+        return self.states[position(label, self.labels)]
 
     def __len__(self) -> int:
         return self.t.size

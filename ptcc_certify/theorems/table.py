@@ -100,9 +100,9 @@ def cite(theorem: str | None = None) -> str:
     """
     note, statements = "Manuscript", {row.number: row.statement for row in THEOREMS}
     if theorem is not None:
-        if theorem not in statements:
-            hint = did_you_mean(str(theorem), statements)
-            raise ParameterError(f'no theorem "{shorten(str(theorem))}"; one of {", ".join(statements)}{hint}')
+        if (theorem := str(theorem)) not in statements:
+            hint = did_you_mean(theorem, statements)
+            raise ParameterError(f'no theorem "{shorten(theorem)}"; one of {", ".join(statements)}{hint}')
         note += f"; Theorem {theorem}: {statements[theorem]}"
     return (
         "@unpublished{zhu_prescribed_time_coordination,\n"

@@ -50,8 +50,8 @@ class Obligation(ProofObligation):
         What makes the statement easy to verify, JSON-ready or to be written by the document; need not be trusted.
     """
 
-    numbers: Mapping[str, Fraction] = field(default_factory=dict)
-    witness: Any = None
+    numbers: Mapping[str, Fraction] = field(default_factory=dict, hash=False)
+    witness: Any = field(default=None, hash=False)
 
 
 @dataclass(frozen=True)

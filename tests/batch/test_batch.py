@@ -474,6 +474,7 @@ def test_a_worker_ends_native_code_at_a_time_limit(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
+    pytest.importorskip("distributed", "2026.8", "before, Dask starts for ever what fails to start")
     call = f"certify_many(['fig1a', 'fig1b'], {PROTOCOL!r}, method='perron', workers=2)"
     Path("script.py").write_text(f"from ptcc_certify import NominalProtocol, certify_many\n{call}\n")
     done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, timeout=120, check=False)
@@ -481,7 +482,7 @@ def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
 
 
 def test_an_unknown_setting_is_refused():
-    with pytest.raises(TypeError, match="speed"):
+    with pytest.raises(ParameterError, match="speed"):
         quickly(TRIANGLE, speed=3)
 
 

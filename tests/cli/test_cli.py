@@ -633,7 +633,7 @@ def test_the_screen_of_classify_names_camps_and_cycles():
     cycle = structure.closed_components[0].negative_cycle
     assert cycle is not None
     labels = structure.graph.labels
-    assert "negative cycle " + " ".join(f"{labels[s]}->{labels[t]}" for s, t in cycle) in ptcc("classify", "fig1a").out
+    assert "negative cycle " + ", ".join(f"{labels[s]}->{labels[t]}" for s, t in cycle) in ptcc("classify", "fig1a").out
 
 
 def test_help_is_printed():

@@ -12,11 +12,11 @@ import click
 import numpy as np
 import pytest
 from bad_inputs import Run, ptcc
-from click.shell_completion import BashComplete, ShellComplete
+from click.shell_completion import ShellComplete, get_completion_class
 from side_files import with_side_files
 
 import ptcc_certify
-from ptcc_certify.cli import GROUPS, cli
+from ptcc_certify.cli import cli
 from ptcc_certify.cli.completion import PACKAGED, PAPER, THEOREMS
 from ptcc_certify.examples import GRAPHS as EXAMPLES
 from ptcc_certify.graphs.io.packaged import GRAPHS
@@ -53,13 +53,29 @@ def test_the_help_names_every_command_once_in_one_plain_line():
     for name in cli.commands:
         (line,) = (line for line in lines if line.startswith(f"  {name} "))
         assert not line.endswith("...")
-    assert {name for group in GROUPS.values() for name in group} >= set(cli.commands)
 
 
 @pytest.mark.parametrize("name", ["", *cli.commands])
 def test_every_help_fits_80_columns(name: str):
     run = ptcc(*filter(None, [name]), "--help")
     assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("words", [("ptcc_certify", "check"), ("ptcc_certify.checker",)])
+def test_nobody_who_reads_the_output_is_no_traceback_and_no_verdict(words: tuple[str, ...], certificate: str):
+    """The code is that of other programs whose reader goes away; on a full disk it is that of bad input."""
+    command = [sys.executable, "-m", *words, certificate]
+    env = os.environ | {"PYTHONPATH": str(Path(ptcc_certify.__file__).parents[1])}
+    own, other = os.pipe()
+    os.close(own)
+    gone = subprocess.run(command, stdout=other, stderr=subprocess.PIPE, env=env)
+    os.close(other)
+    assert (gone.returncode, gone.stderr) == (141, b"")
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("wb") as full:
+            failed = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, env=env)
+        assert failed.returncode == 2 and b"the result cannot be written" in failed.stderr.splitlines()[-1]
+        assert len(failed.stderr.splitlines()) == 1
 
 
 def test_the_package_runs_as_the_command():
@@ -87,6 +103,27 @@ def test_the_package_runs_as_the_command():
 def test_a_wrong_name_is_answered_with_near_ones(words: tuple[str, ...], near: str):
     run = ptcc(*words)
     assert run.code == 2 and len(run.err.splitlines()) == 1 and near in run.err, run.err
+
+
+def test_only_near_names_of_files_are_told():
+    for name in ("b.csv", "noread.csv"):
+        Path(name).touch()
+    for name in ("a.csv", "nope.csv"):
+        assert "did you mean" not in ptcc("certify", name).err
+    assert "; did you mean team.csv?" in ptcc("certify", "team.tsv").err
+
+
+def test_an_option_of_another_command_is_told_with_it():
+    words = ("design", "team.csv", "--max-input", "9", "--initial-bound", "1", "--deadline", "1", "--gain-cap", "5")
+    assert "--gain-cap'. It is an option of ptcc certify, ptcc simulate, ptcc plot" in ptcc(*words).err
+
+
+def test_a_first_row_without_a_weight_may_be_a_header():
+    for rows in ("a,b\n", "a,b,1\n"):
+        Path("said.csv").write_text(f"listener,speaker\n{rows}")
+        run = ptcc("classify", "said.csv")
+        assert run.code == 2 and len(run.err.splitlines()) == 1
+        assert run.err.endswith("if this row is a header, name its columns source, target, weight\n")
 
 
 # ---------------------------------------------------------------------- wrong kinds of file
@@ -173,7 +210,8 @@ def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certi
         code = f"import sys; sys.modules['{package}'] = None; from ptcc_certify.__main__ import main; main()"
         run = process("-c", code, "check", certificate)
         assert run.code == 2 and run.err.startswith(f"ptcc: ptcc needs the package {package},"), run
-        assert "python -m ptcc_certify.checker" in run.err and len(run.err.splitlines()) == 1
+        assert "pip install . in the project's folder; " in run.err and len(run.err.splitlines()) == 1
+        assert "python -m ptcc_certify.checker" in run.err
 
 
 def test_a_run_tells_what_was_written_and_meets_noise():
@@ -182,8 +220,9 @@ def test_a_run_tells_what_was_written_and_meets_noise():
     assert "gain_cap or stop_before" in ptcc("simulate", "team.csv", "--noise", "0.1").err
 
 
-def test_a_value_near_a_choice_is_told():
-    assert "did you mean listens?" in ptcc("classify", "team.csv", "--edges", "listen").err
+def test_steps_are_equal_and_end_at_the_deadline():
+    rows = ptcc("simulate", "team.csv", "--T", "0.3", "--steps", "3", "--x0", "1,2,3,4").out.splitlines()[1:]
+    assert [float(row.split(",")[0]) for row in rows] == [0, 0.1, 0.2, 0.3]
 
 
 # ---------------------------------------------------------------------- plot
@@ -213,6 +252,7 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(certificate: str):
         ((certificate, "--T", "2"), "--T is for a graph"),
         (("fig1a", "-o", "x.jpg"), "figures are written to"),
         (("fig1a", "-o", "nowhere/x.png"), "the folder does not exist"),
+        (("fig1a", "--what", "decay", "--gain-cap", "5"), "decay is drawn without limits"),
         (("fig1b", "--what", "decay", "--x0", "0,0,0,0,0,0"), "nothing decays"),
     ):
         run = ptcc("plot", *words)
@@ -275,11 +315,15 @@ def test_completion_imports_nothing_that_computes():
     assert process("-c", code).out == "set()\n"
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_of_each_shell_is_printed(shell: str):
+@pytest.mark.parametrize(
+    ("shell", "words"),
+    [("bash", '"${value%/}"); [[ $value == *[./]* ]] && compopt'), ("zsh", "compadd -U -S '' "), ("fish", "--max 1 ")],
+)
+def test_the_script_of_each_shell_is_printed_with_what_click_leaves_out(shell: str, words: str):
     run = ptcc("completion", shell)
-    assert run.code == 0 and f"{shell}_complete" in run.out
-    if shell == "bash":
-        assert '"${value%/}"' in run.out and "compopt -o filenames" in run.out
-        assert "COMPREPLY+=($value)" in BashComplete.source_template
+    assert run.code == 0 and f"{shell}_complete" in run.out and words in run.out
+    kind = get_completion_class(shell)
+    assert kind is not None
+    values = [item.value for item in kind(cli, {}, "ptcc", "_PTCC_COMPLETE").get_completions(["certify"], "--method=p")]
+    assert values == [f"{'' if shell == 'bash' else '--method='}{name}" for name in ("paper", "perron")]
     assert isinstance(cli, click.Group)

@@ -126,6 +126,12 @@ def test_a_flag_that_changes_the_protocol_leaves_out_the_parameters_of_the_other
         ("T = 2", f"T = {'9' * 5000}", "no TOML that can be read"),
         ("T = 2", f"a = {'[' * 9999}", "no TOML that can be read"),
         ("T = 2", "#" * MAX_BYTES, "more than 1000000 bytes"),
+        ("T = 2", f"[a{'.a' * 100_000}]", "no TOML that can be read (a name of more than 32 parts)"),
+        (
+            "[expectations]",
+            "dimension = 2\n[expectations]",
+            "s.toml: [initial_state] dimension: ptcc certify takes scalar agents",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_scenario_is_told_by_section_and_key(old: str, new: str, says: str):
@@ -135,6 +141,28 @@ def test_what_is_wrong_with_a_scenario_is_told_by_section_and_key(old: str, new:
     assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1), run
     assert says in run.err, run.err
     assert not Path("c.json").exists()
+
+
+def test_a_packaged_name_is_a_file_beside_the_scenario_or_none():
+    Path("my data/p.toml").write_text('[graph]\nfile = "fig1b"\n')
+    Path("fig1b").write_text("a,b,1\n")
+    assert "6 nodes" in ptcc("classify", "my data/p.toml").out
+    Path("my data/fig1b").write_text("a,b,1\nb,c,1\n")
+    assert "3 nodes" in ptcc("classify", "my data/p.toml").out
+
+
+def test_a_flag_displaces_what_the_scenario_has_instead():
+    """A true boolean by ``--no-``; of deadline and shortest deadline the one that is not in the file."""
+    Path("my data/team.csv").write_text(f"{TEAM}dan,dan,1\n")
+    scenario = write()
+    text = Path(scenario).read_text().replace("[protocol]", "drop_self_loops = true\n[protocol]")
+    Path(scenario).write_text(text.replace("rho1 = 0.1", "rho1 = 1_000.5e-3"))
+    assert ptcc("classify", scenario).code == 0
+    assert "self-loop at node dan" in ptcc("classify", scenario, "--no-drop-self-loops").err
+    assert "rho1=1.0005" in ptcc("certify", scenario).out
+    design = ("design", scenario, "--initial-bound", "5")
+    assert "deadline 1" in ptcc(*design).out and "shortest deadline" in ptcc(*design, "--shortest-deadline").out
+    assert ptcc(*design, "--shortest-deadline", "--deadline", "1").code == 2
 
 
 def test_a_flag_that_is_wrong_is_told_as_the_flag():

@@ -106,7 +106,7 @@ def test_frames_that_are_no_graph_are_refused_with_the_mend():
     pd = pytest.importorskip("pandas")
     frame = pd.DataFrame({"source": ["a", None], "target": ["b", "c"], "weight": [1, 2]})
     for bad, words in (
-        (frame, "row 2 of the DataFrame has no source"),
+        (frame, "row 2, source of the DataFrame names no node"),
         (frame.rename(columns={"source": "who"}), "name them source, target, weight"),
         (frame[["source", "target"]], "names no weight"),
     ):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import http.client
 import json
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -142,13 +141,24 @@ def test_a_certificate_in_the_making_gives_way_to_a_control_that_is_moved():
         server.explorer.view = explorer_view  # type: ignore[method-assign]
         assert server.view(FEW)["checked"]
         with ThreadPoolExecutor(1) as other:
-            with server._drawing:  # something else is at work
-                waiting = other.submit(server.view, FEW)
-                while not other._work_queue.empty():
-                    time.sleep(0.01)
-                time.sleep(0.1)
-                server._moves += 1
+            done = threading.Event()
+            server._shown(lambda: done.wait() and server.explorer.preview(FEW))  # something else is at work
+            waiting = other.submit(server.view, FEW)
+            while server._work.empty():
+                time.sleep(0.01)
+            server._moves += 1
+            done.set()
             assert isinstance(waiting.exception(), Superseded)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="open files are told elsewhere there")
+def test_requests_open_fonts_once(server: ExplorerServer):
+    """Every one of these has a thread of its own."""
+    fonts = []
+    for _ in range(3):
+        assert get(server, server.root + "preview?graph=fig1a")[0] == 200
+        fonts.append(sum(file.resolve().suffix == ".ttf" for file in Path("/proc/self/fd").iterdir()))
+    assert fonts[2] == fonts[1] == fonts[0] > 0
 
 
 def test_an_address_that_is_none_is_refused(server: ExplorerServer):
@@ -227,18 +237,6 @@ def test_ctrl_c_ends_the_explorer_at_once_and_leaves_no_process():
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if program is None:
-        pytest.skip("there is no Chromium")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
 def forty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ring of 40 agents with chords."""
     path = tmp_path_factory.mktemp("graphs") / "forty.csv"
@@ -299,8 +297,8 @@ def address(server: ExplorerServer) -> str:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
-def test_nothing_on_the_page_moves_while_values_change(chromium: Any, address: str, width: int):
-    page = Page(chromium, address, width, 844)
+def test_nothing_on_the_page_moves_while_values_change(browser: Any, address: str, width: int):
+    page = Page(browser, address, width, 844)
     for kind in ("nominal", "sliding-mode"):
         page.page.select_option("#kind", kind)
         page.settle()
@@ -323,12 +321,12 @@ def test_nothing_on_the_page_moves_while_values_change(chromium: Any, address: s
 
 @pytest.mark.browser
 def test_a_moved_slider_changes_image_and_text_within_a_second(
-    chromium: Any, forty: Path, capsys: pytest.CaptureFixture[str]
+    browser: Any, forty: Path, capsys: pytest.CaptureFixture[str]
 ):
     """On every packaged graph and on one of 40 nodes; the best of three moves, and longer on a machine that is busy."""
     allowed = 1.0
     with started(str(forty)) as (_, address):
-        page = Page(chromium, address, 1280, 900)
+        page = Page(browser, address, 1280, 900)
         for kind in ("nominal", "sliding-mode"):
             page.page.select_option("#kind", kind)
             for graph in (forty.name, *GRAPHS):
@@ -357,8 +355,8 @@ def test_a_moved_slider_changes_image_and_text_within_a_second(
 
 
 @pytest.mark.browser
-def test_of_two_sliders_moved_fast_the_last_state_wins_without_a_backlog(chromium: Any, address: str):
-    page = Page(chromium, address, 1280, 900)
+def test_of_two_sliders_moved_fast_the_last_state_wins_without_a_backlog(browser: Any, address: str):
+    page = Page(browser, address, 1280, 900)
     page.requests.clear()
     for k in range(40):
         page.move("T", str(0.5 + k / 20))
@@ -372,8 +370,8 @@ def test_of_two_sliders_moved_fast_the_last_state_wins_without_a_backlog(chromiu
 
 
 @pytest.mark.browser
-def test_nothing_is_asked_of_the_network_and_no_script_of_another_is_run(chromium: Any, server: ExplorerServer):
-    page = Page(chromium, server.address, 1280, 900)
+def test_nothing_is_asked_of_the_network_and_no_script_of_another_is_run(browser: Any, server: ExplorerServer):
+    page = Page(browser, server.address, 1280, 900)
     page.page.select_option("#kind", "sliding-mode")
     page.settle()
     assert len(page.requests) > 4
@@ -386,8 +384,8 @@ def test_nothing_is_asked_of_the_network_and_no_script_of_another_is_run(chromiu
 
 
 @pytest.mark.browser
-def test_the_page_works_by_keyboard_and_every_control_has_a_name(chromium: Any, address: str):
-    page = Page(chromium, address, 1280, 900)
+def test_the_page_works_by_keyboard_and_every_control_has_a_name(browser: Any, address: str):
+    page = Page(browser, address, 1280, 900)
     before = page.shown()
     page.page.focus('[data-of="rho2"]')
     page.page.keyboard.press("ArrowRight")
@@ -401,8 +399,8 @@ def test_the_page_works_by_keyboard_and_every_control_has_a_name(chromium: Any, 
 
 
 @pytest.mark.browser
-def test_the_address_keeps_the_settings(chromium: Any, address: str):
-    page = Page(chromium, address, 1280, 900)
+def test_the_address_keeps_the_settings(browser: Any, address: str):
+    page = Page(browser, address, 1280, 900)
     page.page.fill("#T", "0.35")
     page.page.wait_for_timeout(50)
     page.settle()
@@ -414,9 +412,9 @@ def test_the_address_keeps_the_settings(chromium: Any, address: str):
 
 @pytest.mark.browser
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_words_stand_out_from_their_ground(chromium: Any, address: str, scheme: str):
+def test_words_stand_out_from_their_ground(browser: Any, address: str, scheme: str):
     """WCAG AA: 4.5 to 1."""
-    page = Page(chromium, address, 1280, 900)
+    page = Page(browser, address, 1280, 900)
     page.page.emulate_media(color_scheme=scheme)
     colours = page.page.evaluate(
         """() => ["#verdict", "#verdict span", ".slider span", ".note", "figcaption", "dt", "dd", "pre", "button",

@@ -259,10 +259,8 @@ def test_every_agent_is_in_its_part(name: str, tmp_path: Path):
     assert [p == "follower" for p in parts] == [v in made.structure.followers for v in range(made.graph.n_nodes)]
     for component in made.structure.closed_components:
         own = [parts[v] for v in component.nodes]
-        camps = {1: "camp 1", -1: "camp 2"}
-        assert [p.partition(", ")[2] for p in own] == (
-            ["unbalanced"] * len(own) if component.gauge is None else [camps[g] for g in component.gauge]
-        )
+        camps = {1: "camp 1" if len(own) > 1 else "alone", -1: "camp 2", 0: "unbalanced"}
+        assert [p.partition(", ")[2] for p in own] == [camps[g] for g in component.gauge or [0] * len(own)]
         assert len({p.partition(",")[0] for p in own}) == 1
 
 

@@ -16,6 +16,7 @@ from rich.cells import cell_len
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import ExitCode
+from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -23,6 +24,7 @@ from ptcc_certify.report.screen import certificate_lines, structure_summary, sum
 from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines
 
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.1", rho2="0.6", kappa=1)
+STRONG = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=2)
 SLIDING = ptcc.SlidingModeProtocol(T_r="0.5", T_s=1, rho1="0.1", rho2="0.3", kappa=2, mu1="1.2", mu2=1, mu3=1, delta=1)
 PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
 LABELS = (str, lambda k: f"agent number {k} of a rather long list of agents", lambda k: f"日本語の節点{k}" * 5)
@@ -85,6 +87,19 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
     ),
     (NOMINAL, {"noise": "0.1"}, 4, "left open: noise"),
     (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "zero-order hold 0.1: at T ||E||"),
+    (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "; under a sample period no number is proved"),
+    (
+        NOMINAL,
+        {"limits": [GainLimits(gain_cap=30)], "initial_set": 3},
+        0,
+        "these limits; |u_k| <= 6.601 for all |x_k(0)",
+    ),
+    (
+        NOMINAL,
+        {"limits": [GainLimits(gain_cap=30, sample_period="0.001")], "noise": "0.1", "delta": "0.1"},
+        4,
+        "the rest is certified without noise and disturbances",
+    ),
     (
         ptcc.NominalProtocol(T=1, rho1=9, rho2=9, kappa=1),
         {"limits": [GainLimits(sample_period="0.9")]},
@@ -95,6 +110,12 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
     (NOMINAL, {"at": "0.3"}, 0, "at t = 0.3: ||E|| <="),
     (NOMINAL, {"time_limit": 1e-9}, 4, "1e-09 s ended"),
     (ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), {}, 0, "NOT BOUNDED"),
+    (
+        ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1),
+        {},
+        0,
+        "little by T; the input is not bounded; --rho2 0.501 leaves 1 % and bounds the input",
+    ),
     (ptcc.NominalProtocol(T="1/7", rho1="1/30011", rho2="1/40009", kappa="100003/7"), {}, 0, "kappa="),
 ]
 
@@ -118,6 +139,7 @@ def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
         lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, delta=1, limits=limits))
         (line,) = [line for line in lines if line.startswith("disturbed  |d_k| <= 1 adds at most ")]
         assert ("x_k(T)" in line) == (not limits), "where they move the agents is proved without limits alone"
+        assert ("; of x(T) nothing is proved" in " ".join(map(str.strip, lines))) == bool(limits)
         assert lines[-1].startswith("verdict    certified without disturbances")
 
 
@@ -143,10 +165,23 @@ def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends
         return " ".join(lines).partition("x(T)")[2].partition("error")[0]
 
     assert "a=1/6, b=-1/6 (exact)" in line(["1/3", 0])
-    assert "a=0.11728, b=-0.11728 (exact, rounded)" in line(["0.234567", "0.0"])
+    assert "a=0.11728, b=-0.11728 (rounded)" in line(["0.234567", "0.0"])
     labels = [f"n{k}" for k in range(40)]
     loose = SignedDigraph.from_edges([("n0", "n1", 1)], labels)
     assert "least n0=0, largest n39=39," in line([*range(40)], loose).replace("every agent", "")
+
+
+def test_agents_that_end_at_the_same_state_are_told_together_where_one_line_is_enough():
+    graph, x0 = load_graph("fig1b"), ["7.013", "2.739", "0.223", "-4.604", "-3.844", "-9.181"]
+    lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, simulation=False))
+    assert len(lines) == 8 and lines[4] == "x(T)       1, 2, 5, 6 at 1.3001; 3, 4 at -1.3001 (rounded)"
+
+
+def test_a_long_label_keeps_the_end_that_tells_it_apart():
+    labels = [f"department of network science, room {k}" for k in range(2)]
+    graph = SignedDigraph.from_edges([(*labels, 1), (*labels[::-1], -1)])
+    (line,) = [x for x in assert_screen(ptcc.certify(graph, STRONG, [5, 1], simulation=False)) if x.startswith("input")]
+    assert line.endswith(("room 0", "room 1"))
 
 
 def test_of_many_groups_of_leaders_the_large_ones_are_told():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import up
@@ -29,7 +29,7 @@ class EnergyIntegral:
 
     value: Fraction
     p: Fraction
-    matrices: tuple[Rows, Rows]
+    matrices: tuple[Rows, Rows] = field(hash=False)
     least: tuple[Fraction, Fraction]
 
 

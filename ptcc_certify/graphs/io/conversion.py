@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph, labels_beside, refuse_unnamed
 from ptcc_certify.graphs.io.edge_list import header
-from ptcc_certify.graphs.io.graph_files import read_graph
+from ptcc_certify.graphs.io.files import name_and_ending
+from ptcc_certify.graphs.io.graph_files import MATRICES, read_graph
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.tables import first_five
 
 TAKEN = (
     "a SignedDigraph, a path, the name of a packaged graph, a networkx.DiGraph, an adjacency matrix with orientation=, "
@@ -31,8 +33,8 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
     graph : graph-like
         - a :class:`~ptcc_certify.graphs.digraph.SignedDigraph`, or what holds one as ``graph``: a structure, a
           certificate, a run;
-        - a path, a file object, or the name of a packaged graph, ``"fig1a"`` .. ``"fig5b"`` or ``"highland_tribes"``,
-          where no such file exists;
+        - a path, a file object (of a matrix with its orientation), or the name of a packaged graph, ``"fig1a"`` ..
+          ``"fig5b"`` or ``"highland_tribes"``, where no such file exists;
         - a ``networkx.DiGraph`` with the edge attribute ``weight``;
         - an adjacency matrix, whose orientation must be said: a NumPy array, a SciPy sparse matrix or array, a list of
           rows, or a DataFrame with the same labels on rows and columns; ``"-0.3"`` is exact, ``-0.3`` a nearby float;
@@ -70,6 +72,9 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"
         raise FormatError(f"{shorten(graph)}: no such file, and no packaged graph {names}")
     if isinstance(graph, str | os.PathLike) or hasattr(graph, "read"):
+        name, ending = name_and_ending(graph)  # type: ignore[arg-type]
+        if orientation is None and ending in MATRICES:
+            raise GraphError(f"{name}: a matrix {WAY}")
         return read_graph(file_or_packaged(graph) if isinstance(graph, str) else graph, orientation=orientation)  # type: ignore[arg-type]
     if hasattr(graph, "is_multigraph"):
         return SignedDigraph.from_networkx(graph, orientation=way)
@@ -97,16 +102,14 @@ def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, 
     if set(labels_beside(table) or ()) == set(names):
         return None  # an adjacency matrix
     if (columns := header(names, "the DataFrame")) is None:
-        titles = ", ".join(map(shorten, names[:5])) + (", ..." if len(names) > 5 else "")
         raise GraphError(
-            f"a DataFrame with the columns {titles} is no graph; name them source, target, weight, or give an "
-            "adjacency matrix with the same labels on rows and columns"
+            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, or "
+            "give an adjacency matrix with the same labels on rows and columns"
         )
     parts = [list(table[table.columns[i]]) for i in columns]
     for what, column in zip(("source", "target"), parts, strict=False):
         for row, label in enumerate(column, 1):
-            if label is None or label != label:
-                raise GraphError(f"row {row} of the DataFrame has no {what}; drop the row or name the node")
+            refuse_unnamed(label, f"row {row}, {what} of the DataFrame")
     ignored = [f'"{shorten(name)}"' for i, name in enumerate(names) if i not in columns]
     notes = ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
     return list(zip(*parts, strict=True)), notes

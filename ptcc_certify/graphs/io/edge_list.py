@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import HEADER_MEND, Numbers, Rows
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
@@ -114,11 +114,11 @@ def read_edge_list(data: bytes, name: str) -> Rows:
     nodes, weights = Numbers(), Numbers()
     first, second, codes, numbers = [], [], [], []
     ignored: dict[str, None] = {}
-    started = named = False
+    started, named = 0, False
     width, (s, t, w) = 3, (0, 1, 2)
     for number, row in records(data, name):
         if not started and len(row) > 1:
-            started = True
+            started = number
             if columns := header([field.strip() for field in row], f"{name}, line {number}"):
                 named, width, (s, t, w) = True, len(row), columns
                 ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
@@ -132,7 +132,8 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         try:
             source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
         except LookupError:
-            if label := _declared([field.strip() for field in row], (s, t, w), f"{name}, line {number}"):
+            mend = HEADER_MEND if number == started else ""
+            if label := _declared([field.strip() for field in row], (s, t, w), f"{name}, line {number}", mend):
                 _ = nodes[label]
             continue
         first.append(source)
@@ -157,14 +158,14 @@ def _refuse_matrix(data: bytes, n: int, name: str) -> None:
             raise FormatError(f"{name}: looks like a {n} x {n} matrix, not like a table of edges; {mend}")
 
 
-def _declared(row: list[str], columns: tuple[int, int, int], place: str) -> str:
+def _declared(row: list[str], columns: tuple[int, int, int], place: str, mend: str) -> str:
     """Return the node that a row without an edge declares, "" if the row is empty; refuse any other."""
     if len(row) < 2 or not any(row):
         return "".join(row)
     source, target, weight = (row[i] if i < len(row) else "" for i in columns)
     if source and target:
         edge = f"{shorten(source)} -> {shorten(target)}"
-        raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column")
+        raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column{mend}")
     if target or weight or not source:
         raise FormatError(f"{place}: the {'target' if source else 'source'} is empty; name a node or remove the row")
     return source

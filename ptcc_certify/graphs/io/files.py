@@ -8,17 +8,20 @@ import re
 import secrets
 import shutil
 import sys
+import tomllib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from ptcc_certify.errors import FormatError, PTCCError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import MAX_BYTES, MAX_LINE
 
+#: A key or a header of 32 parts, for which tomllib takes the square of their number.
+_DEEP = re.compile(r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 Source = str | os.PathLike[str] | IO[str] | IO[bytes]
 
 
@@ -45,6 +48,8 @@ def refuse_no_path(path: object) -> None:
 
 def read_bytes(path: Source, name: str) -> bytes:
     """Read a path, standard input (``-``) or a file object, and undo gzip; text becomes UTF-8."""
+    if not isinstance(path, str | os.PathLike) and not callable(getattr(path, "read", None)):
+        raise FormatError(f"{shorten(repr(path))} is no file; ptcc_certify.as_graph takes other data")
     file = getattr(sys.stdin, "buffer", sys.stdin) if isinstance(path, str) and path == "-" else path
     try:
         if isinstance(file, str | os.PathLike):
@@ -80,6 +85,8 @@ def decoded(data: bytes, name: str) -> str:
             return data.decode("utf-8").removeprefix("\ufeff")
         except UnicodeDecodeError as error:
             at = error.start
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise FormatError(f"{name}: is UTF-16 text; save the file as UTF-8 (a spreadsheet: CSV UTF-8)")
     line = data.count(b"\n", 0, at) + 1
     raise FormatError(f"{name}, line {line}: byte 0x{data[at]:02x} is not UTF-8 text; save the file as UTF-8")
 
@@ -99,6 +106,29 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     return shorten(" ".join(str(error).split()), 160) or type(error).__name__
+
+
+def parse_toml(data: bytes, name: str, number: Callable[[str], Any]) -> dict[str, Any]:
+    """Read TOML whose decimals become ``number(text)``, exactly, as in every other input.
+
+    Raises
+    ------
+    FormatError
+        It is none, nests too deep, or has a name of more than 32 parts.
+
+    Examples
+    --------
+    >>> parse_toml(b"T = 1_000.5", "a.toml", str)
+    {'T': '1000.5'}
+    """
+    try:
+        text = data.decode("utf-8").removeprefix("\ufeff")
+        if _DEEP.search(text):
+            raise ValueError("a name of more than 32 parts")
+        return tomllib.loads(text, parse_float=lambda digits: number(digits.replace("_", "")))
+    except (ValueError, RecursionError) as error:  # of the text, of TOML, or of a number
+        reason = shorten(" ".join(str(error).split()), 160)
+        raise FormatError(f"{name}: no TOML that can be read ({reason})") from None
 
 
 @contextmanager
@@ -142,10 +172,10 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
     name = shorten(os.fspath(path), 200)
     try:
         content = data.encode("utf-8") if isinstance(data, str) else data
-        target = Path(os.path.realpath(path))
-        if target.exists() and not target.is_file():
-            target.write_bytes(content)
+        if os.path.exists(path) and not os.path.isfile(path):  # noqa: PTH110, PTH113 - of a pipe the real path is none
+            Path(path).write_bytes(content)
             return
+        target = Path(os.path.realpath(path))
         temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
         try:
             with temporary.open("xb") as file:

@@ -16,9 +16,9 @@ from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, re
 from ptcc_certify.graphs.io.networkx_formats import read_gml, read_graphml, read_pajek
 from ptcc_certify.graphs.rationals import shorten
 
-_MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
+MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
 _GRAPHS = {"graphml": read_graphml, "gml": read_gml, "net": read_pajek, "pajek": read_pajek}
-_READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | _MATRICES
+_READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | MATRICES
 
 
 def read_graph(
@@ -91,7 +91,7 @@ def read_graph(
     _refuse_unknown("duplicates", duplicates, ("refuse", "sum", "last"))
     _refuse_unknown("format", ending if format else "csv", _READERS)
     rows = _READERS.get(ending, read_edge_list)(read_bytes(path, name), name)
-    way = "matrix" if ending in _MATRICES and orientation != "information" else orientation or "information"
+    way = "matrix" if ending in MATRICES and orientation != "information" else orientation or "information"
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
 
 
@@ -132,7 +132,7 @@ def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> Sign
     >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
     True
     """
-    turned = "information" if name_and_ending(path)[1] in _MATRICES else "listens"  # each kind has its own default
+    turned = "information" if name_and_ending(path)[1] in MATRICES else "listens"  # each kind has its own default
     as_read = {
         "orientation": turned if read["orientation"] == turned else None,
         "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),

@@ -14,6 +14,9 @@ from ptcc_certify.errors import FormatError, GraphError, NumberError
 from ptcc_certify.graphs.digraph import LARGEST_WEIGHT, SMALLEST_WEIGHT, SignedDigraph, Weights, ordered_labels
 from ptcc_certify.graphs.rationals import MINUS, nearest_float, parse_exact, shorten
 
+#: What the first row of a table without a header may be.
+HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
+
 
 @dataclass
 class Rows:
@@ -124,7 +127,7 @@ class _Draft:
             elif MINUS in text:
                 mend = f"write {text.replace(MINUS, '-')[:40]}"
             elif code == 0 and self.rows.headerless and "finite" not in message:
-                mend += "; if this row is a header, name its columns source, target, weight"
+                mend += HEADER_MEND
         edge = int(np.argmax(self.codes == code))
         return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
 

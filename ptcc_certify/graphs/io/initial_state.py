@@ -17,6 +17,7 @@ from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import column, records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
+from ptcc_certify.graphs.tables import first_five
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")
@@ -94,9 +95,11 @@ def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]
         except PTCCError as error:
             raise type(error)(f"{name}: {error}") from None
         return [[_checked(x, label, name)] for label, x in zip(graph.labels, state, strict=True)]
-    what, mend = f"the initial state {name}", f"give one number for each of {_some(graph.labels)}"
+    what, mend = f"the initial state {name}", f"give one number for each of {first_five(graph.labels)}"
     if isinstance(values, set | frozenset | bytes | bytearray):
         raise ParameterError(f"{what} is {shorten(repr(values))}, which has no order; {mend}")
+    if np.ma.is_masked(values):
+        raise ParameterError(f"{what} has masked entries; {mend}")
     values = in_node_order(values.toarray() if hasattr(values, "tocoo") else values, graph, name)
     if not isinstance(values, Iterable) or not getattr(values, "ndim", True):
         raise ParameterError(f"{what} is {'missing' if values is None else shorten(repr(values))}; {mend}")
@@ -178,7 +181,7 @@ def read_state(
         pairs = list(zip(graph.labels, items, strict=True))
     else:
         size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
-        raise ParameterError(f"{place}: no such file, and {size}; give one for each of {_some(graph.labels)}")
+        raise ParameterError(f"{place}: no such file, and {size}; give one for each of {first_five(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
 
 
@@ -217,8 +220,8 @@ def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
     missing = [label for label in graph.labels if label not in entries]
     unknown = [label for label in entries if label not in graph.index]
     if missing or unknown:
-        wrong = [f"no value for {_some(missing)}"] * bool(missing)
-        wrong += [f"{_some(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
+        wrong = [f"no value for {first_five(missing)}"] * bool(missing)
+        wrong += [f"{first_five(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
         mend = "give each node one value, or values without labels in node order"
         raise ParameterError(f"the initial state {name}: {', and '.join(wrong)}; {mend}")
     return [entries[label] for label in graph.labels]
@@ -306,7 +309,7 @@ def _in_node_order(
     state: dict[str, Fraction] = {}
     for label, text, place in pairs:
         if label not in graph.index:
-            hint = did_you_mean(label, graph.labels) or f"; its nodes are {_some(graph.labels)}"
+            hint = did_you_mean(label, graph.labels) or f"; its nodes are {first_five(graph.labels)}"
             raise refusal(f'{place}: node "{shorten(label)}" is not in the graph{hint}')
         if label in state:
             raise refusal(f"{place}: node {shorten(label)} has two values; keep one")
@@ -317,9 +320,5 @@ def _in_node_order(
             raise refusal(f"{place}: value of node {shorten(label)}: {error}; {mend}") from None
     if missing := [label for label in graph.labels if label not in state]:
         count = f"{len(missing)} of {graph.n_nodes} nodes have no value"
-        raise refusal(f"{name}: {count}: {_some(missing)}; give one to each node")
+        raise refusal(f"{name}: {count}: {first_five(missing)}; give one to each node")
     return [state[label] for label in graph.labels]
-
-
-def _some(labels: Sequence[str]) -> str:
-    return ", ".join(map(shorten, labels[:5])) + (", ..." if len(labels) > 5 else "")

@@ -54,9 +54,9 @@ def without_flags(verdict: str) -> str:
     Examples
     --------
     >>> without_flags("it says little by T; --rho2 1.38 (rho2 kappa 2.76) leaves 1 %")
-    'it says little by T; rho2 = 1.38 would bring the bound to 1 %'
+    'it says little by T; rho2 = 1.38 leaves 1 %'
     """
-    verdict = re.sub(r"--rho2 (\S+) \([^)]*\) leaves 1 %", r"rho2 = \1 would bring the bound to 1 %", verdict)
+    verdict = re.sub(r"--(rho2|mu3) (\S+)(?: \(rho2 kappa [^)]*\))?", r"\1 = \2", verdict)
     return verdict.replace("--method ", "bounds = ")
 
 

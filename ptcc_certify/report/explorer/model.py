@@ -218,9 +218,8 @@ class Explorer:
         source, sigma0, disturbance = self._sources.get(settings.graph), None, None
         if (sliding := protocol.reaching) is not None:
             sigma0 = random if settings.reaching else [0] * graph.n_nodes
-            sine = f"{settings.own['delta']}*sin(2*k*t)"
-            word = sine if settings.disturbance == "sin" else settings.disturbance
-            disturbance = as_disturbance(word, graph.n_nodes, sliding.delta, 2 * float(protocol.T), settings.seed)
+            until = 2 * float(protocol.T)
+            disturbance = as_disturbance(settings.disturbance_text, graph.n_nodes, sliding.delta, until, settings.seed)
         return Question(settings, source, graph, protocol, x0, sigma0, disturbance)
 
     def _view(self, settings: Settings, certificate: Callable[[Question], Certificate], *, checked: bool) -> View:

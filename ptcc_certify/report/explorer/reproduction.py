@@ -48,7 +48,7 @@ def command_of(question: Question) -> str:
     words.append(f"--x0={','.join(map(str, question.x0))}")
     if question.sigma0 is not None:
         words += [f"--sigma0={','.join(map(str, question.sigma0))}"] if any(question.sigma0) else []
-        words += ["--disturbance", _command_disturbance(question)]
+        words += ["--disturbance", settings.disturbance_text]
         words += ["--seed", str(settings.seed)] if settings.disturbance == "telegraph" else []
     words += [] if settings.method == "best" else ["--method", settings.method]
     return shlex.join(words)
@@ -64,15 +64,10 @@ def _texts(question: Question) -> dict[str, str]:
     return {name: str(value) for name, value in question.settings.own.items()}
 
 
-def _command_disturbance(question: Question) -> str:
-    settings = question.settings
-    return f"{settings.own['delta']}*sin(2*k*t)" if settings.disturbance == "sin" else settings.disturbance
-
-
 def _disturbance(question: Question) -> str:
     settings, protocol = question.settings, question.protocol
     if settings.disturbance != "telegraph" or not isinstance(protocol, SlidingModeProtocol):
-        return repr(_command_disturbance(question))
+        return repr(settings.disturbance_text)
     until = 2 * float(protocol.T)
     return (
         f"ptcc.telegraph_noise({float(protocol.delta)}, rate={20 / until!r}, n={len(question.x0)}, "

@@ -13,11 +13,12 @@ import secrets
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from concurrent.futures import Future
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from pathlib import PurePosixPath
+from queue import SimpleQueue
 from socketserver import TCPServer
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
@@ -84,14 +85,20 @@ class ExplorerServer(ThreadingHTTPServer):
     def __init__(self, explorer: Explorer, settings: Settings, port: int):
         refuse_unknown("graph", settings.graph, explorer.graphs)
         self.explorer, self.settings, self._moves = explorer, settings, 0
-        self._drawing = threading.Lock()
         self._token = secrets.token_urlsafe(16)
+        self._work: SimpleQueue[tuple[Future[Any], Callable[[], View]] | None] = SimpleQueue()
         super().__init__((HOSTS[0], port), _Handler)
+        threading.Thread(target=self._draw, daemon=True).start()
 
     def server_bind(self) -> None:
         """Bind without asking the network for a name of this machine."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = self.server_address[:2]  # type: ignore[assignment]
+
+    def server_close(self) -> None:
+        """Close, and end the thread that draws."""
+        super().server_close()
+        self._work.put(None)
 
     @property
     def root(self) -> str:
@@ -111,12 +118,7 @@ class ExplorerServer(ThreadingHTTPServer):
 
     def warm_up(self) -> None:
         """Compute what the page begins with, before the browser asks: libraries are loaded by then."""
-
-        def work() -> None:
-            with suppress(Exception):  # the page will ask again, and tell
-                self.preview(self.settings)
-
-        threading.Thread(target=work, daemon=True).start()
+        self._shown(lambda: self.explorer.preview(self.settings))  # where it fails, the page will ask again and tell
 
     def page(self) -> str:
         """Return the page."""
@@ -142,8 +144,7 @@ class ExplorerServer(ThreadingHTTPServer):
     def preview(self, settings: Settings) -> dict[str, Any]:
         """Return what is shown at once; a certificate that is being made gives way."""
         self._moves += 1
-        with self._drawing:
-            return self._shown(self.explorer.preview(settings))
+        return self._shown(lambda: self.explorer.preview(settings)).result()
 
     def view(self, settings: Settings) -> dict[str, Any]:
         """Return what ``certify`` certifies.
@@ -159,11 +160,30 @@ class ExplorerServer(ThreadingHTTPServer):
             if self._moves != moves:
                 raise Superseded
 
-        with self._drawing:
+        def certified() -> View:
             give_way("waiting")
-            return self._shown(self.explorer.view(settings, give_way))
+            return self.explorer.view(settings, give_way)
 
-    def _shown(self, view: View) -> dict[str, Any]:
+        return self._shown(certified).result()
+
+    def _shown(self, work: Callable[[], View]) -> Future[dict[str, Any]]:
+        """Return what is shown of the view that some work makes, when its turn has come."""
+        shown: Future[dict[str, Any]] = Future()
+        self._work.put((shown, work))
+        return shown
+
+    def _draw(self) -> None:
+        """Do the work, in one thread: Matplotlib keeps files of fonts open for every thread that draws.
+
+        The thread is a daemon, unlike those of an executor: Ctrl-C does not wait for a certificate.
+        """
+        for shown, work in iter(self._work.get, None):
+            try:
+                shown.set_result(self._told(work()))
+            except Exception as error:
+                shown.set_exception(error)
+
+    def _told(self, view: View) -> dict[str, Any]:
         if view.refusal:
             return {"refusal": view.refusal}
         return {

@@ -158,6 +158,11 @@ class Settings:
         """The parameters of the kind of protocol at hand."""
         return {name: value for name, value in self.parameters.items() if SLIDERS[name].kind in ("", self.kind)}
 
+    @property
+    def disturbance_text(self) -> str:
+        """The disturbance as the command line takes it."""
+        return f"{self.own['delta']}*sin(2*k*t)" if self.disturbance == "sin" else self.disturbance
+
     def protocol(self) -> Protocol:
         """Return the protocol.
 

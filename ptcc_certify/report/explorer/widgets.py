@@ -8,9 +8,10 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.io.packaged import GRAPHS
-from ptcc_certify.graphs.rationals import as_fraction
+from ptcc_certify.graphs.rationals import as_fraction, shorten
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.report.explorer.model import Explorer, View
 from ptcc_certify.report.explorer.settings import (
@@ -65,6 +66,8 @@ def explore(graph: Any = None, settings: Settings | None = None, *, orientation:
     >>> print(view.text.splitlines()[-1])
     verdict    certified; ||E|| <= 1.8e-30 ||E(0)|| at 0.99 T
     """
+    if settings is not None and not isinstance(settings, Settings):
+        raise ParameterError(f"settings = {shorten(repr(settings))} is none; give ptcc.report.explorer.Settings()")
     packaged = isinstance(graph, str) and graph in GRAPHS
     explorer = Explorer(None if graph is None or packaged else as_graph(graph, orientation))
     if settings is None:

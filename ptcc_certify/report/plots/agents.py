@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import isotonic_regression
 
-from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
+from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -20,11 +20,12 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
     "first camp": (RUN, "-"),
     "second camp": (BOUND, (0, (7, 1.5))),
     "unbalanced leaders": ("#CC79A7", "-."),
+    "single leaders": ("#332288", (0, (1, 0.6))),
     "followers": (BEHIND, (0, (3, 1.5))),
 }
 #: Agents, and agents of one part of a graph, of which each has a line.
 NAMED_AGENTS, NAMED_OF_PART = 8, 3
-#: Size in points of the names of lines, and characters of a name.
+#: Size in points of names, and columns of a name.
 NAME_SIZE, NAME_LENGTH = 7, 16
 
 
@@ -32,9 +33,16 @@ def camp_groups(structure: Structure) -> np.ndarray:
     """Return which of ``CAMP_STYLES`` every node belongs to."""
     group = np.full(structure.graph.n_nodes, "followers", dtype=object)
     for component in structure.closed_components:
+        alone = len(component.nodes) == 1
         for v, sign in zip(component.nodes, component.gauge or [0] * len(component.nodes), strict=True):
-            group[v] = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
+            camp = {1: "first camp", -1: "second camp", 0: "unbalanced leaders"}[sign]
+            group[v] = "single leaders" if alone else camp
     return group
+
+
+def text_width(text: str) -> float:
+    """Return the width in points that a name has room for; letters of some scripts take two columns."""
+    return 0.62 * NAME_SIZE * columns(text)
 
 
 def draw_agents(
@@ -93,21 +101,22 @@ def name_agents(
     if not lines or not run.t.size:
         return
     agents, colours = np.array(list(lines)), list(lines.values())
-    names = [shorten(run.labels[v], NAME_LENGTH - 4) for v in agents]
-    columns = (0, -1) if ends and agents.size > 1 else (0,)
-    texts = [_spread(ax, values[agents, k], names, colours) for k in columns]
+    names = [shorten_text(printable(run.labels[v]), NAME_LENGTH - 4) for v in agents]
+    texts = [_spread(ax, values[agents, k], names, colours) for k in ((0, -1) if ends else (0,))]
+    if ends and len(texts[1]) < 2:
+        del texts[1]  # all end at the same place
     first, last = float(run.t[0]), float(run.t[-1]) if until is None else until
-    point = (last - first) / (0.7 * ax.get_window_extent().width / ax.figure.dpi * 72)  # of the axes, without names
     for side, column in zip((-1, 1), texts, strict=False):
-        if side == 1 and len({place for place, *_ in column}) < 2:
-            break  # all end at the same place
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
             looks: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
             looks |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
-    left = (10 + 0.62 * NAME_SIZE * max(len(name) for _, _, name, _ in texts[0])) * point
+    rooms = [10 + max(text_width(name) for _, _, name, _ in column) for column in texts]
+    width = ax.get_window_extent().width / ax.figure.dpi * 72
+    width = min([0.8 * width, *(width - room for room in rooms[1:])])  # without names at the end, in any panel
+    left = (last - first) * rooms[0] / max(width - rooms[0], width / 3)
     ticks = MaxNLocator(tick_count(ax.xaxis, 5), steps=STEPS).tick_values(first, last)
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
@@ -145,6 +154,6 @@ def _joined(names: Sequence[str]) -> str:
     """Join names, and count those for which there is no room."""
     for shown in range(len(names), 0, -1):
         more = [f"+{len(names) - shown}"] if shown < len(names) else []
-        if len(text := ", ".join([*names[:shown], *more])) <= NAME_LENGTH:
+        if columns(text := ", ".join([*names[:shown], *more])) <= NAME_LENGTH:
             return text
     return text

@@ -14,7 +14,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import require_same, trajectory_of
+from ptcc_certify.report.plots.subject import limits_text, require_same, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels; that of time has a unit.
@@ -109,7 +109,8 @@ def plot_decay(
     ax.set_xlim(place[0], place[max(last, 1)])
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
     label = time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
-    return finished(ax, label, rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$")
+    title = "" if run is None else limits_text(run, proved)
+    return finished(ax, label, rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
 def error_norm(subject: Certificate | Trajectory, certificate: Certificate | None) -> tuple[np.ndarray, float, float]:

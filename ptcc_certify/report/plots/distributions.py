@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, SINGLE_COLUMN, axes_of, finished, styled
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 
 #: Bars of a histogram.
 BARS = 40
@@ -45,11 +45,11 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
         raise ParameterError("the certificate has no final state; certify the graph with x0")
     values, followers = certificate.final_state.values, certificate.structure.followers
     leaders = np.delete(np.arange(values.size), followers)
-    ax = axes_of(ax, SINGLE_COLUMN)
+    ax = axes_of(ax)
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}
     there = {name: part for name, part in parts.items() if part[0].size}
     samples, colours = zip(*there.values(), strict=True)
-    ax.hist(samples, BARS, color=colours, label=list(there), stacked=True)
+    ax.hist(samples, BARS, color=list(colours), label=list(there), stacked=True)
     return finished(ax, "final state", "agents")
 
 
@@ -72,7 +72,7 @@ def plot_degrees(graph: SignedDigraph, *, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['listens to', 'is heard by']
     """
-    ax = axes_of(ax, SINGLE_COLUMN)
+    ax = axes_of(ax)
     for ends, name, colour, line in (
         (graph.target, "listens to", RUN, "-"),
         (graph.source, "is heard by", BOUND, "--"),

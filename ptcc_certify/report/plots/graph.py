@@ -12,23 +12,25 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from scipy.spatial import Delaunay, QhullError
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
+from ptcc_certify.report.text_layout import columns, printable, shorten_text
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
-#: Size in points of what is written, and characters of a label that fit into a node.
-TEXT_SIZE, INSIDE = 7, 3
+#: Columns of a label that fit into a node, and that are written beside one.
+INSIDE, BESIDE = 3, 15
 #: Arrows of which each has its weight written at it.
 WEIGHED_ARROWS = 24
 #: Where a weight may stand, as shares of its arrow; the first is best.
 WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
+#: Boxes along an arrow of three points each; its own weight keeps off so many at either end.
+BOX, NEAR_ENDS = 3, 5
 #: Height of the drawing in inches.
 _HEIGHT = 3.4
 
@@ -66,7 +68,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    inside = max(map(len, graph.labels)) <= INSIDE and graph.n_nodes <= FREE_NODES
+    inside = max(map(columns, graph.labels)) <= INSIDE and graph.n_nodes <= FREE_NODES
     radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5, 10)) if inside else 4.5
     part = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
@@ -138,17 +140,17 @@ def _draw_labels(
     ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
 ) -> list[np.ndarray]:
     """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
-    looks: dict[str, Any] = {"fontsize": TEXT_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
+    looks: dict[str, Any] = {"fontsize": NAME_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
     nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
     if lines is None:
         for label, p in zip(labels, place, strict=True):
-            ax.annotate(shorten(label), p, color="white", va="center_baseline", **looks)
+            ax.annotate(printable(label), p, color="white", va="center_baseline", **looks)
         return nodes
     taken = nodes + lines
     halo = [patheffects.withStroke(linewidth=2, foreground="white")]
     for label, p in zip(labels, place, strict=True):
-        text = shorten(label, 12)
-        half = np.array([0.31 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE])
+        text = shorten_text(printable(label), BESIDE)
+        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE])
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
@@ -171,19 +173,25 @@ def _draw_weights(
     ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
     for k, (arrow, bend) in enumerate(zip(arrows, bends, strict=True)):
         text = f"{arrow.size:.3g}"
-        half = np.array([0.33 * TEXT_SIZE * len(text), 0.6 * TEXT_SIZE]) + 2
+        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE]) + 2
         spots = list(arc(place[arrow.source], place[arrow.target], bend, WEIGHT_SHARES))
-        foreign = [box for line in lines[:k] + lines[k + 1 :] for box in line]
-        box = _least_covered(spots, half, taken + foreign)
+        along = place[arrow.target] - place[arrow.source]
+        beside = along[::-1] * [1, -1] / np.linalg.norm(along) * (np.linalg.norm(half) + 1)
+        spots += [spots[0] + beside, spots[0] - beside]
+        others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
+        box = _least_covered(spots, half, [*taken, *(box for line in others for box in line)])
         taken.append(box)
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
-        ax.text(x, y, text, fontsize=TEXT_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
+        ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
 def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[list[np.ndarray]]:
-    """Return small boxes along each arrow."""
-    curves = [arc(place[a.source], place[a.target], bend) for a, bend in zip(arrows, bends, strict=True)]
-    return [[np.array([*(p - 1.5), *(p + 1.5)]) for p in curve] for curve in curves]
+    """Return small boxes along each arrow, which leave no gaps."""
+    boxes = []
+    for (a, b, *_), bend in zip(arrows, bends, strict=True):
+        along = np.linspace(0.06, 0.94, 2 + int(np.linalg.norm(place[b] - place[a]) / BOX))
+        boxes.append([np.array([*(p - BOX / 2), *(p + BOX / 2)]) for p in arc(place[a], place[b], bend, along)])
+    return boxes
 
 
 def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:

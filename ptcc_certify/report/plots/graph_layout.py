@@ -100,7 +100,7 @@ def _layouts(arrows: Sequence[Arrow], part: np.ndarray) -> Iterator[np.ndarray]:
     plain = nx.Graph((a.source, a.target) for a in arrows)
     plain.add_nodes_from(range(n))
     hops = dict(nx.all_pairs_shortest_path_length(plain))
-    gap = 2 + max(max(row.values()) for row in hops.values())  # between components
+    gap = 1 + max(max(row.values()) for row in hops.values())  # between components
     lengths = {u: {v: hops[u].get(v, gap) for v in plain} for u in plain}
     by_distance = nx.kamada_kawai_layout(plain, lengths)
     points = np.array([by_distance[v] for v in range(n)])

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.font_manager import FontProperties
 
-from lmi.exact.decimal_rounding import near, up
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
@@ -16,7 +15,7 @@ from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.input_lines import initial_states_text
 from ptcc_certify.report.plots.agents import NAME_SIZE, draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import require_same, structure_of, trajectory_of
+from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
@@ -90,11 +89,7 @@ def plot_input(
         _draw_peak(ax, peak, shown, _set_text(run, certificate))
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
-    finished(ax, time_label("time $t$", time_unit), "input $|u_k|$")
-    limits, legend = _limits_text(run, certificate), ax.get_legend()
-    if limits and legend is not None:
-        legend.set_title(limits, FontProperties(size=NAME_SIZE))
-    return ax
+    return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$", limits_text(run, certificate))
 
 
 def _run_under_limits(subject: Any) -> Trajectory:
@@ -112,19 +107,6 @@ def _every_period_sampled(run: Trajectory) -> bool:
         return False
     longest = np.diff(run.t[run.t <= float(run.protocol.T)]).max(initial=0)
     return bool(longest <= (1 + 1e-9) * float(run.actuator.sample_period))
-
-
-def _limits_text(run: Trajectory, certificate: Certificate | None) -> str:
-    """Name what limits the gain of a run, or say that a certificate's limits do not."""
-    limits = run.actuator
-    if limits is None:
-        return "without the limits of the gain" if certificate is not None and certificate.limits else ""
-    names = {
-        "gain at most ": limits.gain_cap,
-        "off from $T$ - ": limits.stop_before,
-        "held over ": limits.sample_period,
-    }
-    return ", ".join(f"{name}{near(number)}" for name, number in names.items() if number is not None)
 
 
 def _set_text(run: Trajectory, certificate: Certificate) -> str:
@@ -200,7 +182,8 @@ def plot_effort(
         ax.axhline(bound, color="black", linewidth=0.9, linestyle="--", label="certified bound")
     ax.set_ylim(0, 1.1 * max(bound or 0.0, float(energy.max(initial=0))) or 1)
     draw_deadlines(ax, run)
-    return finished(ax, time_label("time $t$", time_unit), r"energy spent, $\int \|u\|^2\, dt$")
+    label = r"energy spent, $\int \|u\|^2\, dt$"
+    return finished(ax, time_label("time $t$", time_unit), label, limits_text(run, certificate))
 
 
 def _resolved_input(trajectory: Trajectory) -> np.ndarray:
@@ -224,20 +207,22 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
     Raises
     ------
     ParameterError
-        It is beyond the range of floats, or with every second sample it would differ by more than a hundredth.
+        It is beyond the range of floats, with every second sample it would differ by more than a hundredth, or its
+        trend before the deadline adds more than a fiftieth after the last sample.
     """
     T, t, remaining = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
-        power = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0)
+        power, unsettled = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0), False
         if trajectory.held_input is not None:
             every = np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(t))])
             some = every[::2]
         else:
             full = (trajectory.input**2).sum(axis=0)
             every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
+            unsettled = _energy_after(power, remaining, T) > every[-1] / 50
     if not np.isfinite(every).all():
         raise ParameterError("the energy is beyond the range of floats; scale the initial state down")
-    if t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100:
+    if unsettled or (t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100):
         raise ParameterError("these samples do not settle the energy: simulate with more, unless it is infinite")
     return every
 
@@ -256,6 +241,19 @@ def _integrated(power: np.ndarray, full: np.ndarray, t: np.ndarray, remaining: n
     early = _logarithmic_mean(power[:-1] * remaining[:-1], power[1:] * remaining[1:]) * T * tau
     pieces = np.where(late, np.minimum(power[:-1], power[1:]) * np.diff(t), early)
     return np.concatenate([[0.0], np.cumsum(pieces)])
+
+
+def _energy_after(power: np.ndarray, remaining: np.ndarray, T: float) -> float:
+    """Return the energy between the last sample before ``T`` and ``T``, if what is spent per ``tau`` goes on as before.
+
+    It is an exponential through the last such sample and that of half its ``tau``, cut after as much ``tau`` again.
+    """
+    tau = -np.log(remaining[remaining > 0])
+    half = int(np.abs(tau - tau[-1] / 2).argmin())
+    spent = power[: tau.size] * remaining[: tau.size] * T
+    before, now = spent[half], spent[-1]
+    fall = np.log(before / now) / (tau[-1] - tau[half]) if before > now > 0 else 0.0
+    return float(now / max(fall, 1 / tau[-1])) if now else 0.0
 
 
 def _logarithmic_mean(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
-from ptcc_certify.report.plots.subject import certificate_of, structure_of
+from ptcc_certify.report.plots.subject import structure_of
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
@@ -54,17 +54,8 @@ def plot_spectrum(subject: Any, *, ax: Axes | None = None, protocol: Protocol | 
     if protocol is None and isinstance(subject, Certificate | Trajectory):
         protocol = subject.protocol
     if spectrum.nonzero.size:
-        values = spectrum.nonzero
-        ax.plot(
-            values.real,
-            values.imag,
-            "o",
-            color=RUN,
-            markersize=5,
-            alpha=0.7,
-            clip_on=False,
-            label="nonzero eigenvalues",
-        )
+        dots: dict[str, Any] = {"color": RUN, "markersize": 5, "alpha": 0.7, "clip_on": False}
+        ax.plot(spectrum.nonzero.real, spectrum.nonzero.imag, "o", label="nonzero eigenvalues", **dots)
     if spectrum.kernel_dimension:
         many = "" if spectrum.kernel_dimension == 1 else f" ({spectrum.kernel_dimension})"
         ax.plot([0.0], [0.0], "x", color=BEHIND, markersize=7, label=f"zero eigenvalues{many}")
@@ -106,8 +97,10 @@ def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['paper', 'perron', 'upper bound (proved)', 'spectral rate (numerical)']
     """
-    certificate = certificate_of(subject)
-    functions = certificate.envelope.functions
+    if not isinstance(subject, Certificate):
+        kind = type(subject).__name__
+        raise ParameterError(f"this figure is drawn from a certificate, not from {kind}; certify the graph first")
+    functions = subject.envelope.functions
     if not functions:
         raise ParameterError("the certificate holds no proved Lyapunov function")
     ax = axes_of(ax)
@@ -117,13 +110,16 @@ def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
         if own:
             points = [m.overshoot_above for m in own], [m.rate_below for m in own]
             ax.plot(*points, marker, color=colour, markersize=5, alpha=0.8, label=kind)
+    constants = [m.overshoot_above for m in functions]
+    low, high = ax.get_xlim()
+    ax.set_xlim(min(low, min(constants) / 1.5), max(high, max(constants) * 1.5))  # room for ticks that differ
     rates = [m.rate_below for m in functions]
-    if certificate.upper_bound is not None:
-        limit = float_up(certificate.upper_bound)
+    if subject.upper_bound is not None:
+        limit = float_up(subject.upper_bound)
         ax.axhline(limit, color=BEHIND, linewidth=2.2, alpha=0.6, label="upper bound (proved)")
         rates.append(limit)
-    if certificate.spectral_rate is not None:
-        rates.append(certificate.spectral_rate)
+    if subject.spectral_rate is not None:
+        rates.append(subject.spectral_rate)
         ax.axhline(rates[-1], color="black", linewidth=0.9, linestyle=":", label="spectral rate (numerical)")
     low, high = min(0.0, *rates), max(0.0, *rates)
     ax.set_ylim(low - 0.08 * (high - low) * (low < 0), high + 0.08 * (high - low))

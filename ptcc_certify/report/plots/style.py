@@ -14,10 +14,11 @@ from matplotlib import rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure, FigureBase
-from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.io.files import refuse_no_path
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
@@ -39,6 +40,8 @@ def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(plot)
     def drawn(subject: Any, *, ax: Axes | None = None, **keywords: Any) -> Any:
         if ax is not None:
+            if not isinstance(ax, Axes):
+                raise ParameterError(f"ax = {ax!r} is none; give axes of Matplotlib, or leave it out")
             return plot(subject, ax=ax, **keywords)
         with style.context(STYLE):
             return shown(plot(subject, **keywords))
@@ -88,6 +91,9 @@ def save_figure(drawn: Figure | Axes, path: str | Path) -> None:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: graph.jpg: figures are written to .png, .pdf, .svg; choose one of these
     """
+    refuse_no_path(path)
+    if not isinstance(drawn, FigureBase | Axes):
+        raise ParameterError(f"a {type(drawn).__name__} is no figure; give what a plot_ function returned")
     suffix = Path(path).suffix.lower()
     if suffix not in FIGURES:
         raise ParameterError(f"{path}: figures are written to {', '.join(FIGURES)}; choose one of these")
@@ -158,16 +164,30 @@ def place_ticks(axis: Axis) -> None:
     axis.set_major_formatter("{x:g}")
 
 
-def finished(ax: Axes, x: str, y: str) -> Axes:
+def factor_out(axis: Axis, label: str) -> str:
+    """Return the label of an axis with the power of ten that its ticks leave out, which would lie on the legend."""
+    formatter = axis.get_major_formatter()
+    if not isinstance(formatter, ScalarFormatter):
+        return label
+    formatter.set_useOffset(False)
+    formatter.set_useMathText(False)
+    formatter.set_locs(axis.get_majorticklocs())  # type: ignore[arg-type]
+    axis.get_offset_text().set_visible(False)
+    power = formatter.get_offset().removeprefix("1e")
+    return f"{label} / $10^{{{power}}}$" if power else label
+
+
+def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
     """Name the axes, and put the legend above them, where it covers no data, in as many columns as its width takes."""
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    for axis in (ax.xaxis, ax.yaxis):
+    for axis, label in ((ax.xaxis, x), (ax.yaxis, y)):
         place_ticks(axis)
+        axis.set_label_text(factor_out(axis, label) if label else "")
     if ax.get_legend_handles_labels()[0]:
         width = ax.get_window_extent().width / ax.figure.dpi
         columns = 1 if width < 2.2 else 2 if width < 4 else 3
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2)
+        ax.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, title=title
+        )
     return ax
 
 

@@ -6,33 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
-
-
-def certificate_of(subject: Any) -> Certificate:
-    """Return a certificate as it is, and refuse anything else.
-
-    Raises
-    ------
-    ParameterError
-        The subject is no certificate.
-
-    Examples
-    --------
-    >>> from ptcc_certify.report.plots.subject import certificate_of
-    >>> certificate_of("fig1b")
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; certify the graph first
-    """
-    if isinstance(subject, Certificate):
-        return subject
-    raise ParameterError(
-        f"this figure is drawn from a certificate, not from {type(subject).__name__}; certify the graph first"
-    )
 
 
 def trajectory_of(subject: Any) -> Trajectory:
@@ -41,7 +20,7 @@ def trajectory_of(subject: Any) -> Trajectory:
     Raises
     ------
     ParameterError
-        The subject is neither, the certificate has no initial state, or the run has several.
+        The subject is neither, the certificate has no initial state, or the run has several or one that is not finite.
 
     Examples
     --------
@@ -61,6 +40,8 @@ def trajectory_of(subject: Any) -> Trajectory:
         )
     if run.states.ndim != 2:
         raise ParameterError(f"the trajectory holds {run.states.shape[1]} initial states; draw a run of one")
+    if not np.isfinite(run.states).all():
+        raise ParameterError("the trajectory holds states that are not finite; draw a run that ends well")
     return run
 
 
@@ -76,6 +57,16 @@ def structure_of(subject: Any) -> Structure:
     if isinstance(subject, Structure):
         return subject
     return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
+
+
+def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
+    """Name what limits the gain of a run, or say that a certificate's limits do not."""
+    limits = run.actuator
+    if limits is None:
+        return "without the limits of the gain" if certificate is not None and certificate.limits else ""
+    numbers = (limits.gain_cap, limits.stop_before, limits.sample_period)
+    named = zip(("gain at most", "off from $T$ -", "held over"), numbers, strict=True)
+    return ", ".join(f"{name} {near(number)}" for name, number in named if number is not None)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.gain_design import Design
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 
@@ -26,6 +27,11 @@ def plot_trade_off(subject: Design, *, ax: Axes | None = None, time_unit: str = 
     -------
     Axes
 
+    Raises
+    ------
+    ParameterError
+        The subject is no design.
+
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
@@ -33,7 +39,8 @@ def plot_trade_off(subject: Design, *, ax: Axes | None = None, time_unit: str = 
     >>> [line.get_label() for line in ax.lines]
     ['certified with these gains', 'no gains stay below', 'asked for', 'this design']
     """
-    found = subject
+    if not isinstance(found := subject, Design):
+        raise ParameterError(f"this figure is drawn from a design, not from {type(subject).__name__}; ask design first")
     ax, curve = axes_of(ax), found.trade_off(found.deadlines())
     ax.set(xscale="log", yscale="log")
     if np.isfinite(curve.certified).any():

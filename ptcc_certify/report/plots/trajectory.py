@@ -24,7 +24,7 @@ from ptcc_certify.report.plots.style import (
     styled,
     time_label,
 )
-from ptcc_certify.report.plots.subject import structure_of, trajectory_of
+from ptcc_certify.report.plots.subject import limits_text, structure_of, trajectory_of
 
 
 @styled
@@ -63,7 +63,8 @@ def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = ""
     named = draw_agents(ax, run, run.states, structure)
     draw_deadlines(ax, run)
     name_agents(ax, run, run.states, named, ends=True)
-    return finished(ax, time_label("time $t$", time_unit), "state $x_k$")
+    title = limits_text(run, subject if isinstance(subject, Certificate) else None)
+    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
 
 
 @styled
@@ -98,7 +99,7 @@ def plot_run(
     run = trajectory_of(subject)
     if run.sliding is None or not run.sliding.sigma0.any():
         figure = Figure((width, height), layout="constrained")
-        plot_trajectory(run, ax=new_axes(figure), time_unit=time_unit)
+        plot_trajectory(subject, ax=new_axes(figure), time_unit=time_unit)
         return figure
     figure = Figure((width, 1.8 * height), layout="constrained")
     upper = new_axes(figure, (2, 1, 1))

@@ -1,0 +1,420 @@
+"""One Lyapunov matrix for several uncertain matrices: the search, by Clarabel; proofs are elsewhere.
+
+Let ``A_i + sum_e delta_e f_e h_e'``, ``|delta_e| <= r_e``, be the members of mode ``i``: each parameter multiplies a
+matrix of rank one. With multipliers ``tau_e > 0``
+
+    [[P A_i + A_i' P - b P - H diag(tau) H',   P F diag(r)],
+     [diag(r) F' P,                            diag(tau)  ]]  >=  0            F = [f_e], H = [h_e]
+
+implies ``P A + A' P >= b P`` for all of them at once, by ``tau a^2 + r^2 c^2 / tau >= 2 r |a c|``. One ``P`` and one
+such inequality for each mode bound every solution of ``x' = -A(s) x``, whatever the signal that chooses.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lmi import child_process
+from lmi.diagonal import run_solver
+from lmi.errors import MatrixError, NoCertificate
+from lmi.matrix_classes import square
+from lmi.search_time import checkpoint, seconds_left, uncounted
+
+#: Steps at most, and the relative gain that is worth another one.
+_STEPS, _GAIN = 12, 1e-4
+#: How much smaller than the last ``P`` the next one may be in some direction, and the largest condition of ``P``.
+_LEAST, _LARGEST_CONDITION = 1e-7, 1e12
+#: Rows up to which Clarabel takes a matrix as it is.
+_WHOLE_ROWS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class UncertainMatrix:
+    """The matrices ``A + sum_e delta_e f_e h_e'`` with ``|delta_e| <= radii_e``.
+
+    Attributes
+    ----------
+    A : (n, n) array
+    F, H : (n, q) arrays
+        Columns ``f_e``, ``h_e``, none of them 0.
+    radii : (q,) array
+        Positive.
+
+    Examples
+    --------
+    >>> UncertainMatrix.known([[1.0, 2.0], [0.0, 1.0]]).radii
+    array([], dtype=float64)
+    """
+
+    A: np.ndarray
+    F: np.ndarray
+    H: np.ndarray
+    radii: np.ndarray
+
+    @classmethod
+    def known(cls, A: Any) -> UncertainMatrix:
+        """Return a matrix without uncertainty."""
+        A = square(A)
+        return cls(A, np.zeros((len(A), 0)), np.zeros((len(A), 0)), np.zeros(0))
+
+    def __post_init__(self) -> None:
+        n, q = len(self.A), len(self.radii)
+        arrays = (self.A, self.F, self.H, self.radii)
+        if self.A.shape != (n, n) or not self.F.shape == self.H.shape == (n, q) or self.radii.shape != (q,):
+            raise MatrixError("A is (n, n), F and H are (n, q), radii (q,)")
+        if not all(np.isfinite(x).all() for x in arrays) or not (self.radii > 0).all():
+            raise MatrixError("an entry is not a finite number, or a radius is not positive")
+
+    def transformed(self, R: np.ndarray) -> tuple[UncertainMatrix, np.ndarray]:
+        """Return the matrices of ``y = R x`` with ``|f| = |h|`` and radii 1, and by what to divide multipliers."""
+        A = np.linalg.solve(R.T, (R @ self.A).T).T
+        F, H = R @ (self.F * self.radii), np.linalg.solve(R.T, self.H)
+        scale = np.sqrt(np.linalg.norm(H, axis=0) / np.linalg.norm(F, axis=0))
+        return UncertainMatrix(A, F * scale, H / scale, np.ones(len(scale))), scale**2
+
+
+@dataclass(frozen=True, eq=False)
+class CommonCertificate:
+    """One matrix ``P`` with a rate for each mode, as far as floating point tells.
+
+    Attributes
+    ----------
+    matrix : (n, n) array
+        Symmetric; its largest eigenvalue 1.
+    rates : tuple of float
+        ``b_i`` of each mode, per unit of the clock; may be negative.
+    multipliers : tuple of (q_i,) arrays
+        ``tau`` of each mode.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, chapter 5.
+    """
+
+    matrix: np.ndarray
+    rates: tuple[float, ...]
+    multipliers: tuple[np.ndarray, ...]
+
+    @property
+    def rate(self) -> float:
+        """The smallest of the rates."""
+        return min(self.rates)
+
+    @property
+    def condition(self) -> float:
+        """``lmax(P) / lmin(P)``, the overshoot constant of the squared norm."""
+        sizes = np.linalg.eigvalsh(self.matrix)
+        return float(sizes[-1] / sizes[0]) if sizes[0] > 0 else math.inf
+
+
+def common_lyapunov(
+    modes: Sequence[UncertainMatrix], *, shape: str = "full", tolerance: float = 1e-7, start: Any = None
+) -> CommonCertificate:
+    """Find one ``P > 0`` of the largest common rate: the smallest ``b_i`` of all modes.
+
+    With ``b`` from the last ``P_0``, in coordinates in which ``P_0 = I``, the program ``maximise t`` subject to the
+    inequalities above with ``b P + t I`` instead of ``b P``, ``0 <= P <= I``, gives a rate of ``b + t`` at least; it is
+    repeated until it gains less than a ten-thousandth.
+
+    Parameters
+    ----------
+    modes : sequence of UncertainMatrix
+        All with the same n >= 1.
+    shape : {"full", "diagonal"}
+        Of ``P``.
+    tolerance : float
+        Relative gap asked of the solver.
+    start : (n, n) array, optional
+        A positive definite ``P`` from which to climb; diagonal if ``shape`` is.
+
+    Returns
+    -------
+    CommonCertificate
+        The rate may be negative: no better one was found.
+
+    Raises
+    ------
+    MatrixError
+        There is no mode or no row, or the sizes differ.
+    NoCertificate
+        The solver found nothing at all, or this is a forked process, in which Clarabel may wait for ever.
+    OutOfTime
+        The time limit is reached (:func:`lmi.time_limit`) before the first step; later the best so far is returned.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron, Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, chapter 5.
+
+    Examples
+    --------
+    >>> modes = [UncertainMatrix.known([[1.0, 1.0], [0.0, 1.0]]), UncertainMatrix.known([[1.0, 0.0], [-1.0, 1.0]])]
+    >>> round(common_lyapunov(modes).rate, 3)
+    1.0
+    """
+    if shape not in ("full", "diagonal"):
+        raise MatrixError(f'shape "{shape}" is unknown; use "full" or "diagonal"')
+    sizes = {len(mode.A) for mode in modes}
+    if len(sizes) != 1 or 0 in sizes:
+        raise MatrixError("all modes have the same number of rows, at least one")
+    if child_process.forked:
+        raise NoCertificate("Clarabel is not run in a forked process")
+    search = _Search(tuple(modes), shape == "diagonal", tolerance)
+    return search.climb(start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    modes: tuple[UncertainMatrix, ...]
+    diagonal: bool
+    tolerance: float
+
+    def climb(self, start: Any = None) -> CommonCertificate:
+        """Climb from the best of a few matrices until nothing is gained."""
+        starts = [*self._starts(), *([] if start is None else [np.asarray(start, dtype=float)])]
+        P = max(starts, key=self._nominal_rate)
+        P, b, best = P / np.linalg.eigvalsh(P)[-1], self._nominal_rate(P), None
+        for _ in range(_STEPS):
+            try:
+                found = self._step(P, b)
+            except (NoCertificate, np.linalg.LinAlgError):
+                break
+            except Exception:
+                if best is None:
+                    raise
+                break
+            if best is not None and not found.rate > best.rate:
+                break
+            gain = math.inf if best is None else found.rate - best.rate
+            best, P, b = found, found.matrix, found.rate
+            if gain <= _GAIN * abs(best.rate) or best.condition > _LARGEST_CONDITION:
+                break
+        if best is None:
+            raise NoCertificate("no common Lyapunov matrix was found in floating point")
+        return best
+
+    def _starts(self) -> Iterator[np.ndarray]:
+        """Yield the identity, and the solution of a Lyapunov equation of the mean mode (its diagonal)."""
+        n = len(self.modes[0].A)
+        yield np.eye(n)
+        mean = np.sum([mode.A / max(float(np.abs(mode.A).max()), 1e-300) for mode in self.modes], axis=0)
+        with contextlib.suppress(np.linalg.LinAlgError, ValueError):
+            from scipy.linalg import solve_continuous_lyapunov
+
+            P = solve_continuous_lyapunov(mean.T, np.eye(n))
+            P = np.diag(np.diag(P)) if self.diagonal else (P + P.T) / 2
+            if np.isfinite(P).all() and np.linalg.eigvalsh(P)[0] > 1e-9 * np.abs(P).max():
+                yield P
+
+    def _nominal_rate(self, P: np.ndarray) -> float:
+        """Return the least rate of the matrices without their uncertainty."""
+        R = np.linalg.cholesky(P).T
+        transformed = (np.linalg.solve(R.T, (R @ mode.A).T).T for mode in self.modes)
+        return min(float(np.linalg.eigvalsh(B + B.T)[0]) for B in transformed)
+
+    def _step(self, P: np.ndarray, b: float) -> CommonCertificate:
+        """Solve the program of :func:`common_lyapunov`, and compute the rates of its ``P``."""
+        R = np.diag(np.sqrt(np.diag(P))) if self.diagonal else np.linalg.cholesky(P).T
+        pairs = [mode.transformed(R) for mode in self.modes]
+        Q, multipliers = self._solve([mode for mode, _ in pairs], b)
+        if self.diagonal:
+            Q = np.diag(np.diag(Q))
+        sizes = np.linalg.eigvalsh(Q)
+        if not sizes[0] > _LEAST / 10 * sizes[-1]:
+            Q = Q + (_LEAST * sizes[-1] - min(sizes[0], 0.0)) * np.eye(len(Q))
+        P = R.T @ Q @ R
+        P, top = (P + P.T) / 2, float(np.linalg.eigvalsh(P)[-1])
+        taus = [np.maximum(t, 1e-12) / scale / top for t, (_, scale) in zip(multipliers, pairs, strict=True)]
+        return evaluate(P / top, self.modes, taus)
+
+    def _solve(self, modes: Sequence[UncertainMatrix], b: float) -> tuple[np.ndarray, list[np.ndarray]]:
+        with uncounted():
+            import cvxpy as cp
+        checkpoint()
+        n = len(modes[0].A)
+        unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in modes) or 1.0
+        p = cp.Variable(n) if self.diagonal else cp.Variable((n, n), symmetric=True)
+        P = cp.diag(p) if self.diagonal else p
+        t = cp.Variable()
+        constraints = [p >= _LEAST, p <= 1] if self.diagonal else [P >> _LEAST * np.eye(n), P << np.eye(n)]
+        taus = []
+        for mode in modes:
+            tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
+            constraints.append(_inequality(P, mode, tau, b, t, unit) >> 0)
+            taus.append(tau)
+        problem = cp.Problem(cp.Maximize(t), constraints)
+        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance)
+        if p.value is None or not np.isfinite(p.value).all():
+            raise NoCertificate(f"the solver answered {problem.status}")
+        value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
+        return value, [np.zeros(0) if tau is None else tau.value for tau in taus]
+
+
+def _inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
+    """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
+    import cvxpy as cp
+
+    n = len(mode.A)
+    product = P @ (mode.A / unit)
+    form = product + product.T - (b / unit) * P - t * np.eye(n)
+    if tau is None:
+        return form
+    H, F = mode.H / math.sqrt(unit), mode.F / math.sqrt(unit)
+    coupling = P @ F
+    return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
+
+
+def _run(problem: Any, rows: int, tolerance: float) -> None:
+    import warnings
+
+    options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
+    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS
+    options["chordal_decomposition_merge_method"] = "parent_child"
+    options["time_limit"] = seconds_left()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
+        run_solver(problem, "clarabel", options)
+    checkpoint()
+
+
+def least_condition(
+    modes: Sequence[UncertainMatrix], rates: Sequence[float], *, shape: str = "full", tolerance: float = 1e-7
+) -> CommonCertificate:
+    """Find one ``P`` of least condition that has given rates: ``minimise c`` subject to ``I <= P <= c I``.
+
+    Parameters
+    ----------
+    modes : sequence of UncertainMatrix
+    rates : sequence of float
+        One of each mode, less than what some ``P`` has.
+    shape : {"full", "diagonal"}
+    tolerance : float
+        Relative gap asked of the solver.
+
+    Returns
+    -------
+    CommonCertificate
+        Its rates may lie below the wanted ones by what the solver leaves.
+
+    Raises
+    ------
+    NoCertificate
+        The solver found none, or this is a forked process.
+    numpy.linalg.LinAlgError
+        What it returned is not positive definite.
+    OutOfTime
+        The time limit is reached.
+
+    Examples
+    --------
+    >>> fast = UncertainMatrix.known([[1.0, 9.0], [0.0, 2.0]])
+    >>> least_condition([fast], [1.9]).condition < common_lyapunov([fast]).condition
+    True
+    """
+    if child_process.forked:
+        raise NoCertificate("Clarabel is not run in a forked process")
+    with uncounted():
+        import cvxpy as cp
+    n = len(modes[0].A)
+    pairs = [mode.transformed(np.eye(n)) for mode in modes]
+    p = cp.Variable(n) if shape == "diagonal" else cp.Variable((n, n), symmetric=True)
+    P, c = cp.diag(p) if shape == "diagonal" else p, cp.Variable()
+    constraints = [p >= 1, p <= c] if shape == "diagonal" else [P >> np.eye(n), P << c * np.eye(n)]
+    taus = []
+    for (mode, _), rate in zip(pairs, rates, strict=True):
+        taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
+        unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
+        constraints.append(_inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
+    problem = cp.Problem(cp.Minimize(c), constraints)
+    _run(problem, n + max(mode.radii.size for mode in modes), tolerance)
+    if p.value is None or not np.isfinite(p.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
+    top = float(np.linalg.eigvalsh(value)[-1])
+    multipliers = [
+        np.zeros(0) if tau is None else np.maximum(tau.value, 1e-12) / scale / top
+        for tau, (_, scale) in zip(taus, pairs, strict=True)
+    ]
+    return evaluate(value / top, modes, multipliers)
+
+
+def evaluate(P: np.ndarray, modes: Sequence[UncertainMatrix], multipliers: Sequence[np.ndarray]) -> CommonCertificate:
+    """Return the rates that ``P`` has with given multipliers, from eigenvalues of Schur complements.
+
+    Parameters
+    ----------
+    P : (n, n) array
+        Positive definite.
+    modes : sequence of UncertainMatrix
+    multipliers : sequence of (q_i,) arrays
+        Positive.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        ``P`` is not positive definite in floats.
+
+    Examples
+    --------
+    >>> one = UncertainMatrix(np.array([[3.0]]), np.ones((1, 1)), np.ones((1, 1)), np.array([1.0]))
+    >>> round(evaluate(np.eye(1), [one], [np.ones(1)]).rate, 9)  # the matrices [2] to [4]
+    4.0
+    """
+    inverse = np.linalg.inv(np.linalg.cholesky(P))  # of R'
+    rates = []
+    for mode, tau in zip(modes, multipliers, strict=True):
+        S = P @ mode.A
+        S = S + S.T
+        if len(tau):
+            spread = P @ (mode.F * mode.radii)
+            S = S - (mode.H * tau) @ mode.H.T - (spread / tau) @ spread.T
+        rates.append(float(np.linalg.eigvalsh(inverse @ S @ inverse.T)[0]))
+    return CommonCertificate(P, tuple(rates), tuple(multipliers))
+
+
+def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMatrix]) -> CommonCertificate:
+    """Return the same ``P`` with the multipliers of the largest rate of each mode by itself.
+
+    Parameters
+    ----------
+    certificate : CommonCertificate
+    modes : sequence of UncertainMatrix
+
+    Examples
+    --------
+    >>> one = UncertainMatrix(np.array([[3.0]]), np.ones((1, 1)), np.ones((1, 1)), np.array([1.0]))
+    >>> poor = evaluate(np.eye(1), [one], [np.array([0.1])])
+    >>> round(best_multipliers(poor, [one]).rate, 4)
+    4.0
+    """
+    P, taus, rates = certificate.matrix, list(certificate.multipliers), list(certificate.rates)
+    R = np.linalg.cholesky(P).T
+    for i, mode in enumerate(modes):
+        # The slowest mode decided the search, and has its best already.
+        if not len(taus[i]) or (len(modes) > 1 and rates[i] == certificate.rate):
+            continue
+        own, scale = mode.transformed(R)
+        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+            tau = np.maximum(_multipliers(own), 1e-12) / scale
+            rate = evaluate(P, [mode], [tau]).rate
+            if rate > rates[i]:
+                taus[i], rates[i] = tau, rate
+    return replace(certificate, rates=tuple(rates), multipliers=tuple(taus))
+
+
+def _multipliers(mode: UncertainMatrix) -> np.ndarray:
+    with uncounted():
+        import cvxpy as cp
+    checkpoint()
+    unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
+    tau, t = cp.Variable(len(mode.radii)), cp.Variable()
+    problem = cp.Problem(cp.Maximize(t), [_inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
+    _run(problem, len(mode.A) + len(mode.radii), 1e-7)
+    if tau.value is None or not np.isfinite(tau.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    return tau.value

@@ -1,0 +1,355 @@
+"""Certificates of families: what every signal does, proved, written, and checked.
+
+A family of one mode with known weights is a graph, and :func:`ptcc_certify.certify` certifies it as one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lmi import search_time as deadline
+from lmi.exact.decimal_rounding import down
+from ptcc_certify.certificate.checking import check
+from ptcc_certify.certificate.format_family import family_document
+from ptcc_certify.certificate.request import Expectations, read_initial_state
+from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse, behaviour_name
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
+from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_groups import FamilyGroups
+
+STEPS = ("the decision", "Lyapunov functions", "upper bound on the decay rate", "independent check")
+
+
+@dataclass(frozen=True, eq=False)
+class ComponentProof:
+    """What is proved of one component beside its behaviour.
+
+    Attributes
+    ----------
+    component : FamilyComponent
+    functions : tuple of FamilyFunction
+        Proved, the largest rate first; nodes are numbered within the component.
+    upper_bound : FamilyRateBound or None
+        No rate for every signal is larger.
+    """
+
+    component: FamilyComponent
+    functions: tuple[FamilyFunction, ...] = ()
+    upper_bound: FamilyRateBound | None = None
+
+    @property
+    def rate(self) -> Fraction | None:
+        """The largest proved rate for every signal; None if there is none."""
+        return max((V.rate for V in self.functions if V.rate > 0), default=None)
+
+
+@dataclass(frozen=True)
+class BoundFunction:
+    """A function of a component as the formulas of the bounds take it: by nodes of the component."""
+
+    quotient: Quotient
+    function: FamilyFunction
+
+    @property
+    def rate(self) -> Fraction:
+        """The rate for every signal."""
+        return self.function.rate
+
+    @property
+    def inputs(self) -> Mapping[int, Fraction]:
+        """``|(L X)_k|^2 <= inputs[k] V``."""
+        return dict(enumerate(self.function.input_constants))
+
+    @property
+    def coordinates(self) -> Mapping[int, Fraction]:
+        """``xi_k^2 <= coordinates[k] V``."""
+        return dict(zip(self.function.nodes, self.function.coordinate_constants, strict=True))
+
+    def value(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``V`` of a state of the component."""
+        return self.function.value(self.quotient.coordinates(x))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FamilyCertificate(Shown):
+    """What a protocol does on a family of graphs, whatever the signal, with its proof.
+
+    Attributes
+    ----------
+    family : Family
+    protocol : NominalProtocol
+    parts : tuple of ComponentProof
+        One for each weakly connected component of all edges of all modes.
+    initial_state : tuple of N Fraction, or None
+    expectations : Expectations
+    notes : tuple of str
+
+    References
+    ----------
+    docs/theory/families.md.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+    >>> certify_family(Family.switching({"day": day, "night": night}), protocol, [1, 2, 3])
+    FamilyCertificate(bipartite consensus for every signal, rate 0.957998, certified)
+    """
+
+    family: Family
+    protocol: Protocol
+    parts: tuple[ComponentProof, ...]
+    initial_state: tuple[Fraction, ...] | None = None
+    expectations: Expectations = field(default_factory=Expectations)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def behaviours(self) -> tuple[str, ...]:
+        """What every component does for every signal."""
+        return tuple(str(part.component.behaviour) for part in self.parts)
+
+    @property
+    def rate(self) -> Fraction | None:
+        """The rate that every component has for every signal; None if some has none that is proved."""
+        rates = [part.rate for part in self.parts if part.component.nodes.size > 1]
+        return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def upper_bound(self) -> Fraction | None:
+        """No rate for every signal is larger; None if none is proved."""
+        return min((part.upper_bound.value for part in self.parts if part.upper_bound is not None), default=None)
+
+    # ------------------------------------------------------------------ bounds
+
+    def _bound_functions(self, part: ComponentProof) -> list[BoundFunction]:
+        if not part.functions:
+            return []
+        quotient = Quotient.of(part.component)
+        return [BoundFunction(quotient, V) for V in part.functions]
+
+    @cached_property
+    def final_states(self) -> tuple[Interval | None, ...] | None:
+        """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed."""
+        if self.initial_state is None:
+            return None
+        result: list[Interval | None] = [None] * self.family.n_nodes
+        for part in self.parts:
+            nodes = part.component.nodes.tolist()
+            x = [self.initial_state[v] for v in nodes]
+            for k, ends in self._final(part, x).items():
+                result[nodes[k]] = ends
+        return tuple(result)
+
+    def _final(self, part: ComponentProof, x: list[Fraction]) -> Mapping[int, Interval | None]:
+        component, n = part.component, len(x)
+        if component.behaviour == STABILITY:
+            return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
+        if component.behaviour == DEPENDS:
+            return dict.fromkeys(range(n))
+        moves = deviations(self._bound_functions(part), False, x)
+        if component.behaviour == BIPARTITE_CONSENSUS:
+            assert component.gauge is not None
+            camps = dict(enumerate(component.gauge.tolist()))
+            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
+        largest = max(map(abs, x))
+        return {
+            k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
+            for k in range(n)
+        }
+
+    @property
+    def bounded(self) -> bool | None:
+        """Whether the input is proved bounded for every signal and initial state; None if it is not."""
+        pole = self.protocol.gain.pole
+        held = (
+            part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts
+        )
+        return True if all(held) else None
+
+    @cached_property
+    def input_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``|u_k|`` for every signal; None if none are proved."""
+        if self.initial_state is None or not self.bounded:
+            return None
+        result = [Fraction(0)] * self.family.n_nodes
+        gains = self.protocol.parameters
+        for part in self.parts:
+            nodes = part.component.nodes.tolist()
+            x = [self.initial_state[v] for v in nodes]
+            for k, bound in peaks(self._bound_functions(part), gains, x).items():
+                result[nodes[k]] = bound
+        return tuple(result)
+
+    def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in [0, 1].
+
+        Returns
+        -------
+        (N, M) array
+            Infinite where nothing is proved.
+
+        Raises
+        ------
+        ParameterError
+            There is no initial state.
+        """
+        if self.initial_state is None:
+            raise ParameterError("the certificate has no initial state; certify the family with x0")
+        clock = np.asarray(self.protocol.gain.clock_at_remaining(remaining))
+        bounds = np.full((self.family.n_nodes, clock.size), np.inf)
+        for part in self.parts:
+            nodes = part.component.nodes
+            if nodes.size == 1:
+                bounds[nodes] = 0
+            x = [self.initial_state[v] for v in nodes.tolist()]
+            for V in self._bound_functions(part):
+                moves = deviations([V], part.component.behaviour == STABILITY, x)
+                if moves:
+                    size = np.array([float(moves[k]) for k in range(nodes.size)]) * (1 + 1e-12)
+                    decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
+                    bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
+        return bounds
+
+    # ------------------------------------------------------------------ the file
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        return family_document(self)
+
+    @cached_property
+    def checked(self) -> CheckReport | None:
+        """What the independent check says; None where a behaviour is not decided."""
+        if any(part.component.behaviour is None for part in self.parts):
+            return None
+        return check(self._document)
+
+    @property
+    def verdict(self) -> str:
+        """``certified`` if the independent check accepts it, else ``undecided``."""
+        return "certified" if self.checked is not None and self.checked.accepted else "undecided"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the certificate as JSON-ready data."""
+        return json.loads(json.dumps(self._document))
+
+    def save(self, path: str | Path) -> None:
+        """Write the certificate; the file appears whole or not at all.
+
+        Raises
+        ------
+        FormatError
+            The file cannot be written.
+        ParameterError
+            The certificate is undecided: there is nothing to check.
+        """
+        if self.verdict != "certified":
+            raise ParameterError("nothing is certified of this family, so that no certificate is written")
+        write_atomically(path, (json.dumps(self._document, indent=1, ensure_ascii=False) + "\n").encode("utf-8"))
+
+    def __repr__(self) -> str:
+        behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"
+        behaviour += " for every signal" if behaviour != DEPENDS else ""
+        rate = "none" if self.rate is None else down(self.rate)
+        return f"FamilyCertificate({behaviour}, rate {rate}, {self.verdict})"
+
+
+def certify_family(
+    family: Family,
+    protocol: Protocol,
+    x0: Any = None,
+    *,
+    time_limit: float = 60,
+    expectations: Expectations | str | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> FamilyCertificate:
+    """Certify what the nominal protocol does on a family of graphs, whatever the signal.
+
+    Parameters
+    ----------
+    family : Family
+    protocol : NominalProtocol
+        With ``rho2 > 0``.
+    x0 : state-like, optional
+        The initial state; without it no final states and no peaks.
+    time_limit : float
+        Seconds of wall time for the searches.
+    expectations : Expectations or str, optional
+    progress : callable
+        Is told each step as it begins.
+
+    Returns
+    -------
+    FamilyCertificate
+
+    Raises
+    ------
+    ParameterError
+        No protocol, another than the nominal one, or an initial state that does not fit.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
+    >>> cert = certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
+    >>> cert.behaviours, cert.verdict, cert.bounded
+    (('stability',), 'certified', True)
+    """
+    refuse_no_protocol(protocol)
+    if protocol.reaching is not None:
+        raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
+    if not protocol.prescribed:
+        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    if isinstance(expectations, str):
+        expectations = Expectations(behaviour_name(expectations))
+    progress(STEPS[0])
+    components = decide(family)
+    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
+    parts, notes = [], list(family.notes)
+    with deadline.time_limit(time_limit):
+        for component in components:
+            parts.append(_prove(component, notes, progress))
+    return FamilyCertificate(
+        family, protocol, tuple(parts), initial_state, expectations or Expectations(), tuple(dict.fromkeys(notes))
+    )
+
+
+def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
+    if component.kernel is None or component.nodes.size == 1:
+        return ComponentProof(component)
+    quotient = Quotient.of(component)
+    progress(STEPS[1])
+    search = search_family(quotient)
+    notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
+    progress(STEPS[2])
+    bound = None
+    with suppress(deadline.OutOfTime):
+        bound = prove_family_rate_bound(quotient, search.functions)
+    return ComponentProof(component, search.functions, bound)

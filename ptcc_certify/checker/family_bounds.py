@@ -1,0 +1,173 @@
+"""Bounds of a family for every signal: where each agent ends, and how large its input gets; proved and verified here.
+
+With ``V <= e^(-r s) V(0)`` and ``|(L X)_k|^2 <= c_k V`` for every member, for every signal
+
+    |u_k| <= gain sqrt(c_k V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) sqrt(c_k V(0)) e^(-r s / 2)
+
+and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Protocol
+
+from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
+from ptcc_certify.checker.family_function import FamilyFunction
+from ptcc_certify.checker.graph import ordered
+from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import Interval, exact, fields, interval, need
+
+Gains = Mapping[str, Fraction]
+
+
+class Function(Protocol):
+    """What a Lyapunov function says, by node: see :class:`~ptcc_certify.checker.family_function.FamilyFunction`."""
+
+    @property
+    def rate(self) -> Fraction:
+        """The proved rate."""
+
+    @property
+    def inputs(self) -> Mapping[int, Fraction]:
+        """Constants of inputs."""
+
+    @property
+    def coordinates(self) -> Mapping[int, Fraction]:
+        """Constants of coordinates."""
+
+    def value(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``V`` of a state."""
+
+
+def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction]) -> dict[int, Fraction]:
+    """Bound ``|x_k(0) - x_k(T)|`` by functions of one component; empty if none decays."""
+    least: dict[int, Fraction] = {}
+    for V in functions:
+        if V.rate <= 0:
+            continue
+        value = V.value(x)
+        bounds = {k: 2 * root_above(c * value) / V.rate for k, c in V.inputs.items()}
+        for k, c in V.coordinates.items() if stable else ():
+            bounds[k] = min(bounds[k], root_above(c * value))
+        least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
+    return least
+
+
+def final_interval(
+    nodes: Sequence[int],
+    camps: Mapping[int, int],
+    deciding: Iterable[int],
+    moves: Mapping[int, Fraction],
+    x: Sequence[Fraction],
+) -> dict[int, Interval]:
+    """Return ends of ``x_k(T)`` of a component that comes to consensus, from the deciding nodes and all deviations."""
+    values = [camps[k] * x[k] for k in deciding]
+    low, high = min(values), max(values)
+    for k, d in moves.items():
+        low, high = max(low, camps[k] * x[k] - d), min(high, camps[k] * x[k] + d)
+    return {k: (low, high) if camps[k] > 0 else (-high, -low) for k in nodes}
+
+
+def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> dict[int, Fraction]:
+    """Bound ``|u_k|`` for all times by functions of one component with ``rate rho2 kappa >= 2``; empty if none has."""
+    pole = gains["rho2"] * gains["kappa"]
+    first, least = gains["rho1"] + pole / gains["T"], dict[int, Fraction]()
+    for V in functions:
+        if V.rate * pole >= 2:
+            value = V.value(x)
+            bounds = {k: first * root_above(c * value) for k, c in V.inputs.items()}
+            least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
+    return least
+
+
+def deciding_nodes(family: Family, component: Component) -> list[int]:
+    """Return the nodes that may have a say in the consensus: what reaches a closed component through any edges."""
+    inside = set(component.nodes)
+    heard: dict[int, set[int]] = {v: set() for v in inside}
+    found = [v for mode in family.modes for group in mode.structure.closed if group[0] in inside for v in group]
+    for mode in family.modes:
+        for s, t, _, _, _ in mode.edges:
+            if t in inside:
+                heard[t].add(s)
+    seen = set(found)
+    for v in found:
+        new = heard[v] - seen
+        seen |= new
+        found.extend(new)
+    return sorted(seen)
+
+
+def final_states(
+    family: Family, component: Component, functions: Sequence[Function], x: Sequence[Fraction]
+) -> dict[int, Interval | None]:
+    """Return the ends between which every agent of a component is at the deadline; None: no limit is claimed."""
+    zero = Fraction(0)
+    if component.behaviour == STABILITY:
+        return dict.fromkeys(component.nodes, (zero, zero))
+    if component.depends:
+        return dict.fromkeys(component.nodes)
+    moves = deviations(functions, False, x)
+    if component.behaviour == CONSENSUS:
+        camps = component.camps or {}
+        return dict(final_interval(component.nodes, camps, deciding_nodes(family, component), moves, x))
+    largest = max(abs(x[v]) for v in component.nodes)
+    result: dict[int, Interval | None] = {}
+    for k in component.nodes:
+        d = moves.get(k, 2 * largest)
+        result[k] = max(-largest, x[k] - d), min(largest, x[k] + d)
+    return result
+
+
+# ---------------------------------------------------------------------- the check
+
+
+def check_family_bounds(
+    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+) -> None:
+    """Verify final states and inputs."""
+    labels = family.labels
+    final = doc.section("final_state")
+    need((final is None) == (x is None), "final states are claimed iff there is an initial state")
+    if x is not None:
+        doc.open("family-final-state", "final_state")
+        known: dict[int, Interval | None] = {}
+        for component in family.components:
+            known |= final_states(family, component, [V for V in functions if V.component is component], x)
+        for v, entry in enumerate(ordered(labels, final, "final_state").values()):
+            need((known[v] is None) == (entry is None), "a final state that is not claimed, or one that is")
+            if (ends := known[v]) is not None:
+                middle, radius = interval(entry)
+                need(middle - radius <= ends[0] and ends[1] <= middle + radius, "a final state is not enclosed")
+        doc.done(f"{sum(ends is not None for ends in known.values())} agents")
+    _check_input(doc, family, functions, gains, x)
+
+
+def _check_input(
+    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+) -> None:
+    section = fields(doc.section("input"), ("bounded", "peaks"), "input")
+    if section["bounded"] is None:
+        need(section["peaks"] is None, "peaks of an input that is not proved bounded")
+        return
+    doc.open("family-input", "input")
+    need(section["bounded"] is True, "an input that is proved not bounded has no place here")
+    pole = gains["rho2"] * gains["kappa"]
+    for component in family.components:
+        own = [V for V in functions if V.component is component]
+        need(
+            component.rests(family) or any(V.rate * pole >= 2 for V in own), "no rate proves that the input is bounded"
+        )
+    if (entry := section["peaks"]) is None:
+        need(x is None, "no peaks")
+        doc.done("bounded")
+        return
+    need(x is not None, "peaks without an initial state")
+    least = dict.fromkeys(range(len(family.labels)), Fraction(0))
+    for component in family.components:
+        least |= peaks([V for V in functions if V.component is component], gains, x or ())
+    for v, text in enumerate(ordered(family.labels, entry, "peaks").values()):
+        need(exact(text) >= least[v], "a peak is not proved")
+    doc.done(f"peaks of {len(least)} agents")

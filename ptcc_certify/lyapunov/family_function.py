@@ -1,0 +1,257 @@
+"""Lyapunov functions of families: one matrix for every signal, its rates, and the constants of inputs, all proved.
+
+References
+----------
+docs/theory/families.md, "Common quadratic functions" and "Uncertain weights".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import isqrt
+
+import numpy as np
+
+from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.exact import arithmetic
+from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
+from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
+
+#: Significant bits of constants, which are rounded up.
+_CONSTANT_BITS = 53
+#: Against the entries of a mode: bounds of growth that are tried where a rate is about 0.
+_NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyFunction:
+    """``V = xi' P xi`` of a family in its quotient coordinates; for every signal ``V <= e^(-rate s) V(0)``.
+
+    More closely ``V(s) <= V(0) e^(-sum_i rates_i s_i)``, where the signal spends the part ``s_i`` of the clock in mode
+    ``i``: modes in which not everything decays have rates of 0 or below.
+
+    Attributes
+    ----------
+    kind : {"full", "diagonal", "undirected"}
+        ``undirected``: ``P`` is the square of the distance to the states at rest, weighted by ``left_vector``.
+    pivots, nodes : tuple of int
+        See :class:`~ptcc_certify.lyapunov.quotient.Quotient`.
+    matrix : n rows of n Fraction
+        ``P``, positive definite.
+    rates : tuple of Fraction
+        One of each mode.
+    multipliers : tuple of tuples of Fraction
+        Of each mode: ``tau_e > 0`` of the parts of :class:`~ptcc_certify.lyapunov.quotient.QuotientMode`, in their
+        order; empty for the kind ``undirected``, of which the least weights are the worst.
+    lowest, highest : Fraction
+        ``lowest I <= P <= highest I``.
+    left_vector : tuple of N Fraction
+        Of the kind ``undirected``: ``p > 0`` with ``p' M(L) = 0`` for every member, ``M(L)`` with ``-|w|`` off the
+        diagonal.
+    optimal : bool
+        Whether no rate of any kind is larger: ``diag(p) L`` is symmetric in the slowest mode in which something moves.
+    input_constants : tuple of N Fraction
+        ``|(L X)_k|^2 <= input_constants[k] V`` for every member ``L``.
+    coordinate_constants : tuple of n Fraction
+        ``xi_k^2 <= coordinate_constants[k] V``.
+    numerical_rate : float or None
+        Of the search, before the matrix was rounded.
+    """
+
+    kind: str
+    pivots: tuple[int, ...]
+    nodes: tuple[int, ...]
+    matrix: Matrix
+    rates: tuple[Fraction, ...]
+    multipliers: tuple[tuple[Fraction, ...], ...]
+    lowest: Fraction
+    highest: Fraction
+    left_vector: tuple[Fraction, ...] = ()
+    optimal: bool = False
+    input_constants: tuple[Fraction, ...] = ()
+    coordinate_constants: tuple[Fraction, ...] = ()
+    numerical_rate: float | None = None
+
+    @property
+    def rate(self) -> Fraction:
+        """The least of the rates: that of every signal."""
+        return min(self.rates)
+
+    @property
+    def overshoot(self) -> Fraction:
+        """``highest / lowest``, which multiplies the squared norm of ``xi``."""
+        return self.highest / self.lowest
+
+    @property
+    def deviation_constants(self) -> tuple[Fraction, ...] | None:
+        """``(x_k - x_k(T))^2 <= deviation_constants[k] V``, from the integral of ``|x_k'|``; None if nothing decays."""
+        if self.rate <= 0:
+            return None
+        return tuple(4 * c / self.rate**2 for c in self.input_constants)
+
+    def value(self, xi: Sequence[Fraction]) -> Fraction:
+        """Return ``V`` of quotient coordinates."""
+        products = (
+            x * sum(map(Fraction.__mul__, row, xi), Fraction(0)) for x, row in zip(xi, self.matrix, strict=True)
+        )
+        return sum(products, Fraction(0))
+
+
+def decay_matrices(mode: QuotientMode, P: Matrix, multipliers: Sequence[Fraction]) -> tuple[Matrix, Matrix]:
+    """Return ``S``, ``Z`` for which ``S - b Z > 0`` proves the rate ``b`` of all members of a mode.
+
+    ``S = [[P A_0 + A_0' P - H diag(tau) H', P F diag(r)], [diag(r) F' P, diag(tau)]]``, ``Z = diag(P, 0)``.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> pair = Quotient(Family.from_intervals([("a", "b", 1, 3)])).modes[0]
+    >>> S, Z = decay_matrices(pair, [[Fraction(1)]], [Fraction(1)])
+    >>> [[str(x) for x in row] for row in S]
+    [['3', '1'], ['1', '1']]
+    """
+    n, q, zero = len(P), len(mode.parts), Fraction(0)
+    (form, p), (A, a) = integer_matrix(P), integer_matrix(mode.center)
+    product = integer_rows(form * A)
+    S = [[Fraction(product[i][j] + product[j][i], p * a) for j in range(n)] + [zero] * q for i in range(n)]
+    S += [[zero] * n + [tau if i == j else zero for j in range(q)] for i, tau in enumerate(multipliers)]
+    for e, (part, tau) in enumerate(zip(mode.parts, multipliers, strict=True)):
+        heard = [(i, x) for i, x in enumerate(part.h) if x]
+        for i, x in heard:
+            for j, y in heard:
+                S[i][j] -= tau * x * y
+        pushed = [(j, x * part.radius) for j, x in enumerate(part.f) if x]
+        for i, row in enumerate(P):
+            S[i][n + e] = S[n + e][i] = sum((row[j] * x for j, x in pushed), zero)
+    Z = [[*row, *[zero] * q] for row in P] + [[zero] * (n + q) for _ in range(q)]
+    return S, Z
+
+
+def prove_mode(mode: QuotientMode, P: Matrix, multipliers: Sequence[Fraction], guess: float) -> Fraction | None:
+    """Prove a rate of all members of a mode, as near to the guess as proves; None if none was.
+
+    That ``P`` is positive definite is proved by the caller. A mode in which nothing moves has the rate 0.
+    """
+    if mode.at_rest:
+        return Fraction(0)
+    S, Z = decay_matrices(mode, P, multipliers)
+    return prove_margin_about(S, Z, guess, max(float(abs(x)) for row in mode.center for x in row))
+
+
+def prove_margin_about(S: Matrix, Z: Matrix, guess: float, unit: float) -> Fraction | None:
+    """Prove ``S > b Z`` for ``b`` near to the guess, or, of a guess that is small against ``unit``, a small ``b < 0``.
+
+    Examples
+    --------
+    >>> one = [[Fraction(1)]]
+    >>> -1e-6 < prove_margin_about([[Fraction(0)]], one, 0.0, 1.0) < 0 < prove_margin_about(one, one, 1.0, 1.0) < 1
+    True
+    """
+    guesses = [guess, *(-size * unit for size in _NEARLY_ZERO if abs(guess) <= size * unit)]
+    return next((b for one in guesses if (b := prove_generalized_margin(S, Z, one)) is not None), None)
+
+
+def prove_ends(P: Matrix) -> tuple[Fraction, Fraction] | None:
+    """Prove ``0 < lowest I < P < highest I``; None if it fails.
+
+    Examples
+    --------
+    >>> prove_ends([[Fraction(2), Fraction(0)], [Fraction(0), Fraction(1)]])
+    (Fraction(1, 1), Fraction(2, 1))
+    """
+    if not any(x for i, row in enumerate(P) for j, x in enumerate(row) if i != j):
+        diagonal = [row[i] for i, row in enumerate(P)]
+        return (min(diagonal), max(diagonal)) if min(diagonal) > 0 else None
+    whole, scale = integer_matrix(P)
+    rows, identity = integer_rows(whole), np.eye(len(P), dtype=int).tolist()
+    size = np.linalg.eigvalsh(np.array(rows, dtype=float))
+    lowest = prove_generalized_margin(rows, identity, float(size[0])) if size[0] > 0 else None
+    minus_highest = prove_generalized_margin([[-x for x in row] for row in rows], identity, -float(size[-1]))
+    if lowest is None or lowest <= 0 or minus_highest is None:
+        return None
+    return lowest / scale, -minus_highest / scale
+
+
+# ---------------------------------------------------------------------- constants
+
+
+def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFunction:
+    """Add the constants of inputs and coordinates; see :class:`FamilyFunction`.
+
+    With ``y`` the row ``k`` of ``L_0 C^r`` and ``|z| = sqrt(z' P^-1 z)``, every member has
+    ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``.
+
+    References
+    ----------
+    docs/theory/families.md, "Inputs".
+    """
+    n = len(function.nodes)
+    vectors: dict[tuple[Fraction, ...], int] = {}
+    for mode in quotient.modes:
+        for row in (*mode.rows, *(part.h for part in mode.parts)):
+            vectors.setdefault(tuple(row), len(vectors))
+    units = [tuple(Fraction(int(i == j)) for j in range(n)) for i in range(n)]
+    for unit in units:
+        vectors.setdefault(unit, len(vectors))
+    squares = inverse_forms(function.matrix, list(vectors))
+    if squares is None:
+        return function
+    norms = [root_above(x) for x in squares]
+    largest = [Fraction(0)] * len(quotient.basis)
+    for mode in quotient.modes:
+        sizes = [norms[vectors[tuple(row)]] for row in mode.rows]
+        for part in mode.parts:
+            for k, sign in part.effect.items():
+                sizes[k] += part.radius * abs(sign) * norms[vectors[part.h]]
+        largest = [max(pair) for pair in zip(largest, sizes, strict=True)]
+    return replace(
+        function,
+        input_constants=tuple(rounded_up(x * x) for x in largest),
+        coordinate_constants=tuple(rounded_up(squares[vectors[unit]]) for unit in units),
+    )
+
+
+def inverse_forms(P: Matrix, vectors: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
+    """Bound ``z' P^-1 z`` from above for every vector ``z``; None if ``P > 0`` is not proved.
+
+    Examples
+    --------
+    >>> [float(x) for x in inverse_forms([[Fraction(4)]], [[Fraction(3)], [Fraction(0)]])]
+    [2.25, 0.0]
+    """
+    (whole, scale), (rows, unit) = integer_matrix(P), integer_matrix(vectors)
+    bounds = arithmetic().above(integer_rows(whole), integer_rows(rows))
+    return None if bounds is None else [x * scale / unit**2 for x in bounds]
+
+
+def root_above(x: Fraction) -> Fraction:
+    """Return a rational not below the square root of ``x >= 0``, to about 60 bits.
+
+    Examples
+    --------
+    >>> root_above(Fraction(0)), 0 <= root_above(Fraction(2)) ** 2 - 2 < 1e-15
+    (Fraction(0, 1), True)
+    """
+    if not x:
+        return Fraction(0)
+    shift = 60 - (x.numerator.bit_length() - x.denominator.bit_length()) // 2
+    scaled = x * Fraction(4) ** shift
+    ceiling = -(-scaled.numerator // scaled.denominator)
+    return (isqrt(ceiling - 1) + 1) / Fraction(2) ** shift
+
+
+def rounded_up(x: Fraction) -> Fraction:
+    """Return a number of 53 bits or so that is not below ``x``.
+
+    Examples
+    --------
+    >>> third = Fraction(1, 3)
+    >>> rounded_up(third) > third, rounded_up(-third) > -third, rounded_up(Fraction(3))
+    (True, True, Fraction(3, 1))
+    """
+    if not x:
+        return x
+    unit = Fraction(2) ** (abs(x.numerator).bit_length() - x.denominator.bit_length() - _CONSTANT_BITS)
+    return -(-x // unit) * unit

@@ -1,0 +1,182 @@
+"""The search for Lyapunov functions of families, and their proof.
+
+A search proposes a matrix ``P`` and multipliers in floats; they are rounded to short dyadic numbers, and the rate of
+each mode is lowered until the kernel accepts one definite integer matrix of size n + q for it. Nothing enumerates the
+``2^q`` vertices of a box.
+
+References
+----------
+docs/theory/families.md, "Common quadratic functions", "Uncertain weights" and "Undirected graphs".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
+from lmi.dyadic import round_to_bits
+from lmi.errors import LMIError
+from lmi.search_time import checkpoint, seconds_left, share_of_time
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.lyapunov.error_system import rounded_matrix
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.undirected_family import undirected_function
+
+#: Rows up to which a full matrix, and a diagonal one, is searched.
+FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
+#: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
+_DIAGONAL_SHARE = 0.3
+#: Losses of the rate for which a smaller overshoot constant is looked for, unless it is as good as this; and by what
+#: factor it has to be smaller.
+_LOSSES, _GOOD_CONDITION, _WORTH = (1e-3, 0.03, 0.2), 4.0, 0.7
+_MATRIX_BITS, _MULTIPLIER_BITS = 60, 40
+
+
+@dataclass(frozen=True)
+class FamilySearch:
+    """What the searches gave.
+
+    Attributes
+    ----------
+    functions : tuple of FamilyFunction
+        Proved; the largest rate first, that of the slowest mode in which something moves.
+    notes : tuple of str
+        What failed, and why.
+    cut_off : tuple of str
+        What the time limit cut short.
+    """
+
+    functions: tuple[FamilyFunction, ...] = ()
+    notes: tuple[str, ...] = ()
+    cut_off: tuple[str, ...] = ()
+
+
+def search_family(
+    quotient: Quotient, kinds: Sequence[str] = ("undirected", "diagonal", "full"), enough: Fraction | None = None
+) -> FamilySearch:
+    """Search and prove Lyapunov functions of a family for every signal.
+
+    Parameters
+    ----------
+    quotient : Quotient
+        :meth:`Quotient.of` a component whose behaviour is decided; or of a family some of whose modes have more states
+        at rest, which then have rates of 0 or below.
+    kinds : sequence of {"undirected", "diagonal", "full"}
+        What to search. ``undirected`` costs one eigenvalue and where it is optimal ends the search.
+    enough : Fraction, optional
+        A rate that ends the search, such as 0.99 of a proved upper bound.
+
+    Returns
+    -------
+    FamilySearch
+        Without functions if everything is at rest in every member.
+
+    References
+    ----------
+    docs/theory/families.md, "Common quadratic functions".
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    >>> best = search_family(Quotient.of(decide(Family.switching([day, night]))[0])).functions[0]
+    >>> round(float(best.rate), 2), len(best.rates), float(best.rates[1]) >= float(best.rate)
+    (0.96, 2, True)
+    """
+    if not quotient.nodes or all(mode.at_rest for mode in quotient.modes):
+        return FamilySearch()
+    functions: list[FamilyFunction] = []
+    notes: list[str] = []
+    cut_off: list[str] = []
+    if "undirected" in kinds:
+        with share_of_time(1.0, "undirected", cut_off):
+            functions += filter(None, [undirected_function(quotient)])
+    if not any(V.optimal for V in functions):
+        limited = np.isfinite(seconds_left())
+        for kind, rows, share in (("diagonal", DIAGONAL_ROWS, _DIAGONAL_SHARE), ("full", FULL_ROWS, 1.0)):
+            if kind not in kinds or (
+                enough is not None and any(_moving_rate(quotient, V) >= enough for V in functions)
+            ):
+                continue
+            if len(quotient.nodes) > rows:
+                notes.append(f"class {kind} is searched up to {rows} rows; these are {len(quotient.nodes)}")
+                continue
+            with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
+                try:
+                    for function in _common_functions(quotient, kind, notes):
+                        functions.append(function)
+                except (LMIError, np.linalg.LinAlgError) as error:
+                    if type(error).__name__ == "OutOfTime":
+                        raise
+                    notes.append(f"class {kind}: {error}")
+    functions.sort(key=lambda V: (-_moving_rate(quotient, V), V.overshoot))
+    return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
+
+
+def _moving_rate(quotient: Quotient, V: FamilyFunction) -> Fraction:
+    """Return the least rate of the modes in which something moves."""
+    return min(rate for rate, mode in zip(V.rates, quotient.modes, strict=True) if not mode.at_rest)
+
+
+def _common_functions(quotient: Quotient, kind: str, notes: list[str]) -> Iterator[FamilyFunction]:
+    """Yield the function of the largest rate, then slower ones whose overshoot constants are much smaller."""
+    moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
+    arrays = [quotient.modes[number].array for number in moving]
+    with np.errstate(all="ignore"):
+        best = common_lyapunov(arrays, shape=kind)
+        condition = math.inf
+        for loss in (0.0, *_LOSSES):
+            if condition <= _GOOD_CONDITION or (loss and not best.rate > 0):
+                return
+            certificate = (
+                best if not loss else least_condition(arrays, [best.rate * (1 - loss)] * len(arrays), shape=kind)
+            )
+            if not certificate.condition < _WORTH * condition:
+                continue
+            certificate = best_multipliers(certificate, arrays)
+            function = prove_certificate(quotient, kind, certificate, moving)
+            if function is None:
+                notes.append(f"class {kind}: the rate {certificate.rate:.6g} is not proved")
+            else:
+                condition = certificate.condition
+                yield function
+
+
+def prove_certificate(
+    quotient: Quotient, kind: str, certificate: CommonCertificate, moving: Sequence[int]
+) -> FamilyFunction | None:
+    """Round a matrix and multipliers of the modes ``moving``, and prove their rates; None if a step fails."""
+    P, top = certificate.matrix, float(np.abs(certificate.matrix).max())
+    matrix = rounded_matrix(np.diag(np.diag(P)) if kind == "diagonal" else P, _MATRIX_BITS)
+    unit = 2.0 ** (_MATRIX_BITS - np.ceil(np.log2(top)))
+    ends = prove_ends(matrix)
+    if ends is None:
+        return None
+    rates: list[Fraction] = [Fraction(0)] * len(quotient.modes)
+    multipliers: list[tuple[Fraction, ...]] = [()] * len(quotient.modes)
+    for number, tau, guess in zip(moving, certificate.multipliers, certificate.rates, strict=True):
+        checkpoint()
+        multipliers[number] = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        rate = prove_mode(quotient.modes[number], matrix, multipliers[number], guess)
+        if rate is None:
+            return None
+        rates[number] = rate
+    function = FamilyFunction(
+        kind,
+        quotient.pivots,
+        quotient.nodes,
+        matrix,
+        tuple(rates),
+        tuple(multipliers),
+        *ends,
+        numerical_rate=certificate.rate,
+    )
+    return with_constants(function, quotient)

@@ -1,0 +1,313 @@
+"""Lyapunov functions and upper bounds of rates for families of graphs, compared with members drawn at random."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from common_kernel_families import KINDS, random_family
+from scipy.linalg import expm
+
+import lmi
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.family_function import FamilyFunction, decay_matrices, prove_mode
+from ptcc_certify.lyapunov.family_rate_upper_bound import (
+    FamilyRateBound,
+    prove_candidate,
+    prove_family_rate_bound,
+    prove_word,
+    rate_bounds,
+)
+from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.undirected_family import undirected_function
+from ptcc_certify.theorems.family_behaviour import decide
+
+TENTH = Fraction(1, 10)
+
+
+def members(rng, quotient, count):
+    """Yield mode, Laplacian (exact) and levels of random members."""
+    for _ in range(count):
+        number = int(rng.integers(len(quotient.family.modes)))
+        mode = quotient.family.modes[number]
+        largest = np.zeros(mode.n_edges, dtype=bool)
+        for e in mode.parameters.tolist():
+            ends = (mode.source == mode.source[e]) & (mode.target == mode.target[e])
+            back = (mode.source == mode.target[e]) & (mode.target == mode.source[e]) & (mode.sign == mode.sign[e])
+            if rng.random() < 0.5 and not (largest & ends).any():
+                largest[e] = True
+                largest[back] |= mode.tied
+        largest[mode.known] = False
+        levels = [Fraction(int(largest[part.edge])) for part in quotient.modes[number].parts]
+        yield number, mode.member(largest).exact_laplacian(), levels
+
+
+def floats(rows):
+    return np.array([[float(x) for x in row] for row in rows])
+
+
+def unsure_pair():
+    """A stable family with a weight of unknown sign."""
+    return Family.from_intervals([(1, 2, 1, 2), (2, 1, -3, -2), (2, 3, 1, 1), (3, 4, 2, 3), (1, 4, -1, "1/2")])
+
+
+@pytest.fixture(scope="module", params=[*KINDS, "unknown sign"])
+def certified(request):
+    """A quotient, its functions and its bound."""
+    if request.param == "unknown sign":
+        family = unsure_pair()
+    else:
+        rng = np.random.default_rng(KINDS.index(request.param))
+        family = random_family(rng, request.param, 5, 2, TENTH, 0.3)
+    quotient = Quotient.of(decide(family)[0])
+    functions = search_family(quotient).functions
+    return quotient, functions, prove_family_rate_bound(quotient, functions)
+
+
+# ---------------------------------------------------------------------- the quotient
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("n", [1, 2, 3, 6, 8])
+def test_the_quotient_of_every_member_is_that_of_its_laplacian(kind, n):
+    if kind == "stability" and n == 1:
+        return  # an agent that hears nobody is never stable
+    rng = np.random.default_rng(n)
+    quotient = Quotient(random_family(rng, kind, n, int(rng.integers(1, 5)), Fraction(3, 10), 0.4))
+    for number, L, levels in members(rng, quotient, 8):
+        x = [Fraction(int(v)) for v in rng.integers(-9, 10, n)]
+        change = [sum((w * y for w, y in zip(row, x, strict=True)), Fraction(0)) for row in L]
+        xi = quotient.coordinates(x)
+        A = quotient.modes[number].member(levels)
+        assert quotient.coordinates(change) == [
+            sum((a * y for a, y in zip(r, xi, strict=True)), Fraction(0)) for r in A
+        ]
+
+
+def test_a_state_at_rest_that_moves_elsewhere_has_no_quotient():
+    day, night = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("a", "b", -1)])
+    family = Family.switching([day, night])
+    with pytest.raises(HypothesisError, match="moves"):
+        Quotient(family)
+    with pytest.raises(HypothesisError, match="no common kernel"):
+        Quotient.of(decide(family)[0])
+
+
+# ---------------------------------------------------------------------- proved rates
+
+
+def test_the_proved_rate_holds_exactly_at_every_member_drawn(certified):
+    quotient, functions, _ = certified
+    rng, n = np.random.default_rng(1), len(quotient.nodes)
+    for V in functions:
+        assert lmi.prove_positive_definite(V.matrix)
+        for number, _, levels in members(rng, quotient, 6):
+            A, P = quotient.modes[number].member(levels), V.matrix
+            product = [[sum(P[i][k] * A[k][j] for k in range(n)) for j in range(n)] for i in range(n)]
+            rate = V.rates[number]
+            S = [[product[i][j] + product[j][i] - rate * P[i][j] for j in range(n)] for i in range(n)]
+            assert lmi.prove_positive_definite(S)
+
+
+def test_no_proved_rate_exceeds_the_proved_upper_bound_and_the_best_comes_near(certified):
+    _, functions, bound = certified
+    assert [V.rate for V in functions] == sorted((V.rate for V in functions), reverse=True)
+    assert 0.85 * float(bound.value) < float(functions[0].rate) <= float(bound.value)
+
+
+def test_inputs_and_coordinates_stay_below_their_constants_for_every_member(certified):
+    quotient, functions, _ = certified
+    rng = np.random.default_rng(2)
+    V, largest = functions[0], 0.0
+    for _, L, _ in members(rng, quotient, 40):
+        x = [Fraction(int(v)) for v in rng.integers(-9, 10, len(L))]
+        xi = quotient.coordinates(x)
+        value = V.value(xi)
+        assert all(y * y <= c * value for y, c in zip(xi, V.coordinate_constants, strict=True))
+        for row, c in zip(L, V.input_constants, strict=True):
+            own = sum((w * y for w, y in zip(row, x, strict=True)), Fraction(0)) ** 2
+            assert own <= c * value
+            largest = max(largest, float(own / (c * value)) if c * value else 0.0)
+    assert largest > 0.2  # the constants are not idle
+    assert V.deviation_constants[0] == 4 * V.input_constants[0] / V.rate**2
+
+
+def test_random_signals_never_beat_the_certificate(certified):
+    quotient, functions, _ = certified
+    rng = np.random.default_rng(3)
+    V, P = functions[0], floats(functions[0].matrix)
+    xi = rng.standard_normal(len(P))
+    first, clock = xi @ P @ xi, 0.0
+    for number, _, levels in members(rng, quotient, 30):
+        h = float(rng.exponential(0.2))
+        xi, clock = expm(-h * floats(quotient.modes[number].member(levels))) @ xi, clock + h
+        assert xi @ P @ xi <= np.exp(-float(V.rate) * clock) * first * (1 + 1e-9)
+
+
+def test_one_uncertain_follower_decays_at_its_least_weight():
+    mode = Quotient(Family.from_intervals([("a", "b", 1, 3)])).modes[0]
+    one = [[Fraction(1)]]
+    rate = prove_mode(mode, one, [Fraction(1)], 2.0)
+    assert 2 - 1e-8 < rate < 2
+    S, Z = decay_matrices(mode, one, [Fraction(1)])
+    faster = [[s - Fraction("2.000001") * z for s, z in zip(*rows, strict=True)] for rows in zip(S, Z, strict=True)]
+    assert not lmi.prove_positive_definite(faster)
+
+
+def test_an_outage_keeps_v_and_the_other_modes_let_it_fall():
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -2)])
+    nothing = SignedDigraph.from_edges([], nodes="ab")
+    best = search_family(Quotient(Family.switching({"on": pair, "off": nothing}))).functions[0]
+    assert best.rates[1] == 0 and best.rates[0] > 2.9  # both eigenvalues have the real part 3/2
+    assert best.rate == 0 and best.deviation_constants is None
+
+
+def test_where_all_is_at_rest_there_is_nothing_to_prove():
+    quotient = Quotient(Family.from_intervals([], nodes=["a"]))
+    assert search_family(quotient).functions == () and prove_family_rate_bound(quotient) is None
+
+
+def test_scaling_all_weights_scales_rates_and_changing_camps_changes_none():
+    edges = [("a", "b", 1, 2), ("b", "c", 2, 3), ("c", "a", 1, 1), ("a", "c", 1, 2)]
+    flipped = [(s, t, -high, -low) if "b" in (s, t) else (s, t, low, high) for s, t, low, high in edges]
+    scaled = [(s, t, 7 * low, 7 * high) for s, t, low, high in edges]
+    rates = [
+        float(search_family(Quotient(Family.from_intervals(e))).functions[0].rate) for e in (edges, flipped, scaled)
+    ]
+    assert rates[1] == pytest.approx(rates[0], rel=1e-3) and rates[2] == pytest.approx(7 * rates[0], rel=1e-3)
+
+
+def test_a_time_limit_leaves_what_was_proved_before():
+    quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 8, 3, TENTH))
+    with lmi.time_limit(0):
+        search = search_family(quotient)
+    assert search.functions == () and search.cut_off == ("class diagonal", "class full")
+
+
+def test_enough_ends_the_search():
+    quotient = Quotient(random_family(np.random.default_rng(6), "consensus", 4, 1))
+    assert {V.kind for V in search_family(quotient, enough=Fraction(0)).functions} == {"diagonal"}
+
+
+# ---------------------------------------------------------------------- undirected graphs
+
+
+def test_undirected_families_are_as_fast_as_their_least_weights_and_no_faster():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        family = random_family(rng, "undirected", int(rng.integers(2, 9)), int(rng.integers(1, 4)), TENTH, 0.3)
+        V = undirected_function(Quotient.of(decide(family)[0]))
+        spectra = [np.sort(np.linalg.eigvalsh(mode.mandatory.dense_laplacian())) for mode in family.modes]
+        slowest = 2 * min(values[len(V.pivots)] for values in spectra)
+        assert V.optimal and float(V.rate) == pytest.approx(slowest, rel=1e-6)
+
+
+def test_the_closed_form_is_refused_where_directions_change_alone():
+    # The least weights of the path would promise 0.586; a member has half the rate 0.156.
+    ends = [(1, 2), (2, 3), (3, 4)]
+    alone = Family.from_intervals([(s, t, 1, 10) for a in ends for s, t in (a, a[::-1])])
+    together = Family.from_intervals([(s, t, 1, 10) for s, t in ends], undirected=True)
+    assert undirected_function(Quotient(alone)) is None
+    assert float(undirected_function(Quotient(together)).rate) == pytest.approx(2 * 0.585786, rel=1e-5)
+    assert float(prove_family_rate_bound(Quotient(alone)).value) < 2 * 0.157
+
+
+def test_directed_graphs_that_share_a_left_vector_have_the_closed_form():
+    cycle = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 1, 1)])
+    back = SignedDigraph.from_edges([(2, 1, 3), (3, 2, 3), (1, 3, 3)])
+    V = undirected_function(Quotient(Family.switching([cycle, back])))
+    assert V.left_vector == (1, 1, 1) and not V.optimal
+    assert [round(float(rate), 6) for rate in V.rates] == [
+        3,
+        9,
+    ]  # eigenvalues 3/2 +- i sqrt(3)/2, and three times these
+    heavy = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1), (3, 2, 1)])
+    assert undirected_function(Quotient(Family.switching([cycle, replace_weight(heavy)]))) is None
+
+
+def replace_weight(graph):
+    return SignedDigraph.from_edges([(s, t, 5 if (s, t) == ("1", "2") else w) for s, t, w in graph.edges])
+
+
+# ---------------------------------------------------------------------- upper bounds
+
+
+def test_every_proved_bound_is_that_of_its_own_witness(certified):
+    quotient, _, bound = certified
+    matrices = [floats(quotient.modes[m.mode].member(m.levels)) for m in bound.members]
+    durations = [float(h) for h in bound.durations]
+    if bound.kind == "word":
+        Phi = np.eye(len(quotient.nodes))
+        for A, h in zip(matrices, durations, strict=True):
+            Phi = expm(-A * h) @ Phi
+        own = -2 * np.log(np.abs(np.linalg.eigvals(Phi)).max()) / sum(durations)
+    else:
+        assert sum(bound.durations) == 1
+        own = 2 * np.linalg.eigvals(sum(h * A for h, A in zip(durations, matrices, strict=True))).real.min()
+    assert own * (1 - 1e-9) <= float(bound.value) <= own * (1 + 1e-3)
+
+
+def test_members_of_bounds_have_one_sign_of_a_pair_on():
+    quotient = Quotient(unsure_pair())
+    edges = {part.edge: k for k, part in enumerate(quotient.modes[0].parts)}
+    mode = quotient.family.modes[0]
+    pair = [edges[e] for e in mode.parameters.tolist() if (mode.source[e], mode.target[e]) == (0, 3)]
+    assert len(pair) == 2
+    for candidate in rate_bounds(quotient):
+        assert all(sum(member.levels[k] for k in pair) <= 1 for member in candidate.members)
+
+
+def test_switching_may_be_slower_than_every_member_and_every_mixture():
+    day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    quotient = Quotient(Family.switching([day, night]))
+    functions = search_family(quotient).functions
+    bound = prove_family_rate_bound(quotient, functions)
+    constant = min(c.value for c in rate_bounds(quotient) if c.kind != "word")
+    assert bound.kind == "word" and functions[0].rate < bound.value < 0.8 * constant
+
+
+def test_a_mixture_may_be_slower_than_its_modes():
+    # Each mode turns in its own direction fast; together they hardly turn, and their real parts part.
+    turns = [SignedDigraph.from_edges([("a", "b", s), ("b", "a", -s), ("a", "b2", 1), ("b2", "a", 1)]) for s in (3, -3)]
+    quotient = Quotient(Family.switching(turns))
+    mixture = next(c for c in rate_bounds(quotient) if c.kind == "mixture")
+    proved = prove_candidate(quotient, mixture)
+    assert isinstance(proved, FamilyRateBound) and proved.kind == "mixture"
+    assert float(proved.value) == pytest.approx(mixture.value, rel=1e-3)
+
+
+def test_words_are_bounded_on_the_safe_side():
+    rng = np.random.default_rng(7)
+    for n in (1, 2, 4):
+        whole = [rng.integers(-3, 4, (n, n)) + 4 * np.eye(n, dtype=int) for _ in range(2)]
+        exact = [[[Fraction(int(x)) for x in row] for row in A] for A in whole]
+        value = prove_word(exact, [Fraction(1, 4), Fraction(1, 8)])
+        Phi = expm(-whole[1] / 8) @ expm(-whole[0] / 4)
+        own = -2 * np.log(np.abs(np.linalg.eigvals(Phi)).max()) / 0.375
+        assert own - 1e-9 <= float(value) <= own + 1e-6
+
+
+# ---------------------------------------------------------------------- campaign
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(60))
+def test_families_of_every_kind_have_rates_below_their_bounds(seed):
+    rng = np.random.default_rng(1000 + seed)
+    share = Fraction(int(rng.choice([0, 1, 3])), 10)
+    kind = KINDS[seed % len(KINDS)]
+    family = random_family(rng, kind, int(rng.integers(2, 9)), int(rng.integers(1, 5)), share, 0.2)
+    quotient = Quotient.of(decide(family)[0])
+    functions = search_family(quotient).functions
+    bound = prove_family_rate_bound(quotient, functions)
+    if quotient.nodes:
+        best: FamilyFunction = functions[0]
+        assert best.rate <= bound.value
+        assert lmi.prove_positive_definite(best.matrix)
+        assert replace(best, rates=(bound.value,)).rate == bound.value
