@@ -27,6 +27,7 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, Kernel, TooLarge
+from ptcc_certify.theorems.family_kernel import first_motion
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
 
 Vector = tuple[Fraction, ...]
@@ -166,9 +167,7 @@ class Quotient:
 
     def _verify_rest(self) -> None:
         for mode in self.family.modes:
-            uncertain = ~mode.known
-            ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
-            if self.kernel.first_moved(mode.mandatory) is not None or any(True for _ in self.kernel.disagreeing(*ends)):
+            if first_motion(self.kernel, mode):
                 raise HypothesisError(f"a state at rest in one mode moves in mode {mode.name or 1}")
 
     def _mode(self, mode: Mode) -> QuotientMode:

@@ -34,7 +34,7 @@ from ptcc_certify.graphs.structure import (
     find_camps,
     weak_components,
 )
-from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
+from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_motion
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]
 
@@ -296,13 +296,8 @@ def _moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
     """
     unknown = False
     for number, mode in enumerate(family.modes):
-        uncertain = np.flatnonzero(~mode.known)
-        ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
-        rows = ((None, question) for question in kernel.row_questions(mode.mandatory)) if number else ()
-        edges = ((int(uncertain[edge]), question) for edge, question in kernel.edge_questions(*ends))
         try:
-            # An edge tells only where the mandatory graph of its mode leaves the state at rest.
-            if answer := first_answer(kernel, rows) or first_answer(kernel, edges):
+            if answer := first_motion(kernel, mode):
                 edge, column, question = answer
                 state = None if column is None else kernel.column(column)
                 enclosure = kernel.enclosure if state is None and kernel.moves_enclosed(question) else None
