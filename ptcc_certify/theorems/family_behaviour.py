@@ -279,26 +279,33 @@ def _under_any_signal(
         return DEPENDS, None, Counterexample(DIFFERENT, most, least)
     common = Kernel(structures[0])
     try:
-        if counterexample := _moving_rest_state(family, common):
+        if counterexample := moving_rest_state(family, common):
             return DEPENDS, None, counterexample
     except TooLarge:
         return None, None, None
     return INTERVAL_BIPARTITE_CONSENSUS if one_component else BIPARTITE_CONTAINMENT, common, None
 
 
-def _moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
-    """Return a state that is at rest in the first mandatory graph and moves in another member; None if there is none.
+def moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
+    """Return a state of a mandatory graph's kernel that moves in some member of the family; None if there is none.
 
     Raises
     ------
     TooLarge
         None is found, and there may be one.
+
+    Examples
+    --------
+    >>> pair = Family.from_intervals([("a", "b", 1, 1), ("b", "a", -1, 0)])
+    >>> moving_rest_state(pair, Kernel(analyse(pair.modes[0].mandatory))).edge
+    0
     """
     unknown = False
     for number, mode in enumerate(family.modes):
         uncertain = np.flatnonzero(~mode.known)
         ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
-        rows = ((None, question) for question in kernel.row_questions(mode.mandatory)) if number else ()
+        own = mode.mandatory is kernel.structure.graph
+        rows = ((None, question) for question in kernel.row_questions(mode.mandatory)) if not own else ()
         edges = ((int(uncertain[edge]), question) for edge, question in kernel.edge_questions(*ends))
         try:
             # An edge tells only where the mandatory graph of its mode leaves the state at rest.
