@@ -116,7 +116,7 @@ class FamilyCertificate(Shown):
     >>> night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
     >>> certify_family(Family.switching({"day": day, "night": night}), protocol, [1, 2, 3])
-    FamilyCertificate(bipartite consensus for every signal, rate 0.957998, certified)
+    FamilyCertificate(bipartite consensus for every signal, rate 0.955184, certified)
     """
 
     family: Family

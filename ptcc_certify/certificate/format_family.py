@@ -148,6 +148,7 @@ def read_family(section: Mapping[str, Any]) -> Family:
 
     Examples
     --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
     >>> read_family(family_sections(family, decide(family))["graph"]) == family
     True

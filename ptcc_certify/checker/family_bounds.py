@@ -158,7 +158,8 @@ def _check_input(
     for component in family.components:
         own = [V for V in functions if V.component is component]
         need(
-            component.rests(family) or any(V.rate * pole >= 2 for V in own), "no rate proves that the input is bounded"
+            len(component.nodes) == 1 or any(V.rate * pole >= 2 for V in own),
+            "no rate proves that the input is bounded",
         )
     if (entry := section["peaks"]) is None:
         need(x is None, "no peaks")

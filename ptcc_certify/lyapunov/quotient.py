@@ -26,8 +26,8 @@ from lmi.common import UncertainMatrix
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.theorems.family_behaviour import FamilyComponent, Kernel, TooLarge
-from ptcc_certify.theorems.family_kernel import first_motion
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, moving_rest_state
+from ptcc_certify.theorems.family_kernel import Kernel, TooLarge
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
 
 Vector = tuple[Fraction, ...]
@@ -166,9 +166,9 @@ class Quotient:
         return [x[v] - sum(b * x[p] for b, p in zip(self.basis[v], self.pivots, strict=True)) for v in self.nodes]
 
     def _verify_rest(self) -> None:
-        for mode in self.family.modes:
-            if first_motion(self.kernel, mode):
-                raise HypothesisError(f"a state at rest in one mode moves in mode {mode.name or 1}")
+        if (moved := moving_rest_state(self.family, self.kernel)) is not None:
+            name = self.family.modes[moved.other].name or moved.other + 1
+            raise HypothesisError(f"a state at rest in one mode moves in mode {name}")
 
     def _mode(self, mode: Mode) -> QuotientMode:
         place = {v: i for i, v in enumerate(self.nodes)}

@@ -33,9 +33,7 @@ Vector = tuple[Fraction, ...]
 
 
 def undirected_function(quotient: Quotient) -> FamilyFunction | None:
-    """Return the function of the module, proved.
-
-    None if no common left vector is found, there are too many nodes, or all rest.
+    """Return the function of the module, proved; None without a common left vector, with too many nodes, or at rest.
 
     Examples
     --------

@@ -34,7 +34,7 @@ from ptcc_certify.graphs.structure import (
     find_camps,
     weak_components,
 )
-from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_motion
+from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]
 
@@ -279,25 +279,37 @@ def _under_any_signal(
         return DEPENDS, None, Counterexample(DIFFERENT, most, least)
     common = Kernel(structures[0])
     try:
-        if counterexample := _moving_rest_state(family, common):
+        if counterexample := moving_rest_state(family, common):
             return DEPENDS, None, counterexample
     except TooLarge:
         return None, None, None
     return INTERVAL_BIPARTITE_CONSENSUS if one_component else BIPARTITE_CONTAINMENT, common, None
 
 
-def _moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
-    """Return a state that is at rest in the first mandatory graph and moves in another member; None if there is none.
+def moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
+    """Return a state of a mandatory graph's kernel that moves in some member of the family; None if there is none.
 
     Raises
     ------
     TooLarge
         None is found, and there may be one.
+
+    Examples
+    --------
+    >>> pair = Family.from_intervals([("a", "b", 1, 1), ("b", "a", -1, 0)])
+    >>> moving_rest_state(pair, Kernel(analyse(pair.modes[0].mandatory))).edge
+    0
     """
     unknown = False
     for number, mode in enumerate(family.modes):
+        uncertain = np.flatnonzero(~mode.known)
+        ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
+        own = mode.mandatory is kernel.structure.graph
+        rows = ((None, question) for question in kernel.row_questions(mode.mandatory)) if not own else ()
+        edges = ((int(uncertain[edge]), question) for edge, question in kernel.edge_questions(*ends))
         try:
-            if answer := first_motion(kernel, mode):
+            # An edge tells only where the mandatory graph of its mode leaves the state at rest.
+            if answer := first_answer(kernel, rows) or first_answer(kernel, edges):
                 edge, column, question = answer
                 state = None if column is None else kernel.column(column)
                 enclosure = kernel.enclosure if state is None and kernel.moves_enclosed(question) else None

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DENSE_NODES, EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.lemmas import solve_exact
@@ -468,22 +467,3 @@ def first_answer(
                 return name, None, question
         raise
     return None
-
-
-def first_motion(kernel: Kernel, mode: Mode) -> tuple[int | None, int | None, Combination] | None:
-    """Return how a state of the kernel moves in a member of a mode: edge, column and combination; None if none does.
-
-    The edge is None if it moves in the mandatory graph; otherwise it is at ``w+``. See :func:`first_answer`.
-
-    Raises
-    ------
-    TooLarge
-        None is found, and there may be one.
-    """
-    graph = mode.mandatory
-    rows = () if graph is kernel.structure.graph else ((None, question) for question in kernel.row_questions(graph))
-    uncertain = np.flatnonzero(~mode.known)
-    ends = (end[uncertain] for end in (mode.source, mode.target, mode.sign))
-    edges = ((int(uncertain[edge]), question) for edge, question in kernel.edge_questions(*ends))
-    # An edge tells only where the mandatory graph of its mode leaves the state at rest.
-    return first_answer(kernel, rows) or first_answer(kernel, edges)
