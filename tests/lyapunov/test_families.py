@@ -167,6 +167,16 @@ def test_an_outage_keeps_v_and_the_other_modes_let_it_fall():
     assert best.rate == 0 and best.deviation_constants is None
 
 
+def test_a_mode_without_decay_may_be_given_a_share_of_the_clock():
+    full = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "a", 1), ("c", "d", 2)])
+    part = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)], nodes="abcd")
+    quotient = Quotient(Family.switching([full, part]))
+    equal, shared = (search_family(quotient, ["full"], shares=s).functions for s in (None, [0.5, 0.5]))
+    assert all(V.rates[1] <= 0 for V in (*equal, *shared))
+    # The spectral rate of the full mode is 3; the other costs little.
+    assert sum(shared[0].rates) > Fraction(29, 10) > sum(equal[0].rates)
+
+
 def test_where_all_is_at_rest_there_is_nothing_to_prove():
     quotient = Quotient(Family.from_intervals([], nodes=["a"]))
     assert search_family(quotient).functions == () and prove_family_rate_bound(quotient) is None
@@ -187,6 +197,13 @@ def test_a_time_limit_leaves_what_was_proved_before():
     with lmi.time_limit(0):
         search = search_family(quotient)
     assert search.functions == () and search.cut_off == ("class diagonal", "class full")
+
+
+def test_large_families_are_left_to_others():
+    path = Family.from_intervals([(k, k + 1, 1, 2) for k in range(300)])
+    search = search_family(Quotient(path))
+    assert search.functions == () and "300 agents" in search.notes[0]
+    assert prove_family_rate_bound(Quotient(path)) is None
 
 
 def test_enough_ends_the_search():
