@@ -32,8 +32,8 @@ _STEPS, _GAIN = 12, 1e-4
 _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 #: The same of steps that weigh modes by their shares: large ones, then smaller ones.
 _TRUST = (0.3, 0.8)
-#: Rows up to which Clarabel takes a matrix as it is.
-_WHOLE_ROWS = 60
+#: Rows up to which Clarabel takes a matrix as it is; with a diagonal ``P`` those of sparse matrices have zeros.
+_WHOLE_ROWS = {False: 60, True: 24}
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +272,7 @@ class _Search:
             constraints.append(_inequality(P, mode, tau, own, rise, unit) >> 0)
             taus.append(tau)
         problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
-        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance)
+        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
         if p.value is None or not np.isfinite(p.value).all():
             raise NoCertificate(f"the solver answered {problem.status}")
         value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
@@ -282,22 +282,23 @@ class _Search:
 def _inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
     """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
     import cvxpy as cp
+    from scipy import sparse
 
     n = len(mode.A)
-    product = P @ (mode.A / unit)
+    product = P @ sparse.csr_array(mode.A / unit)  # keeps the zeros, of which chordal decomposition makes use
     form = product + product.T - (b / unit) * P - t * np.eye(n)
     if tau is None:
         return form
-    H, F = mode.H / math.sqrt(unit), mode.F / math.sqrt(unit)
+    H, F = (sparse.csr_array(x / math.sqrt(unit)) for x in (mode.H, mode.F))
     coupling = P @ F
     return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
 
 
-def _run(problem: Any, rows: int, tolerance: float) -> None:
+def _run(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
     import warnings
 
     options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
-    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS
+    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
     options["chordal_decomposition_merge_method"] = "parent_child"
     options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
@@ -355,7 +356,7 @@ def least_condition(
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
         constraints.append(_inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
     problem = cp.Problem(cp.Minimize(c), constraints)
-    _run(problem, n + max(mode.radii.size for mode in modes), tolerance)
+    _run(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
     if p.value is None or not np.isfinite(p.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
     value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2

@@ -63,7 +63,7 @@ def certified(request):
         family = unsure_pair()
     else:
         rng = np.random.default_rng(KINDS.index(request.param))
-        family = random_family(rng, request.param, 5, 2, TENTH, 0.3)
+        family = random_family(rng, request.param, 4, 2, TENTH, 0.3)
     quotient = Quotient.of(decide(family)[0])
     functions = search_family(quotient).functions
     return quotient, functions, prove_family_rate_bound(quotient, functions)
