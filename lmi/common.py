@@ -403,7 +403,7 @@ def evaluate(P: np.ndarray, modes: Sequence[UncertainMatrix], multipliers: Seque
 
 
 def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMatrix]) -> CommonCertificate:
-    """Return the same ``P`` with the multipliers of the largest rate of each mode by itself.
+    """Return the same ``P`` with the multipliers of the largest rate of each mode by itself, as far as time allows.
 
     Parameters
     ----------
@@ -424,7 +424,7 @@ def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMa
         if not len(taus[i]) or (len(modes) > 1 and rates[i] == certificate.rate):
             continue
         own, scale = mode.transformed(R)
-        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+        with contextlib.suppress(NoCertificate, OutOfTime, np.linalg.LinAlgError):
             tau = np.maximum(_multipliers(own), 1e-12) / scale
             rate = evaluate(P, [mode], [tau]).rate
             if rate > rates[i]:

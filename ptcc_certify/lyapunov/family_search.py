@@ -21,7 +21,7 @@ import numpy as np
 from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError
-from lmi.search_time import checkpoint, seconds_left, share_of_time
+from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
@@ -34,6 +34,8 @@ KINDS = ("undirected", "diagonal", "full")
 FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
 #: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
 _DIAGONAL_SHARE = 0.3
+#: Share of the time of a class for the climb to the largest rate.
+_CLIMB_SHARE = 0.7
 #: Losses of the rate for which a smaller overshoot constant is looked for, unless it is as good as this; and by what
 #: factor it has to be smaller.
 _LOSSES, _GOOD_CONDITION, _WORTH = (1e-3, 0.03, 0.2), 4.0, 0.7
@@ -148,7 +150,8 @@ def _common_functions(
     arrays = [quotient.modes[number].array for number in moving]
     with np.errstate(all="ignore"):
         own = None if shares is None else [shares[number] for number in moving]
-        best = common_lyapunov(arrays, shape=kind, shares=own)
+        with time_limit(_CLIMB_SHARE * max(seconds_left(), 0.0)):  # what it has by then is proved in the rest
+            best = common_lyapunov(arrays, shape=kind, shares=own)
         goal = [best.rate] * len(arrays) if shares is None else best.rates
         condition, top = math.inf, max(goal)
         for loss in (0.0, *_LOSSES):

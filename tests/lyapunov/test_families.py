@@ -11,6 +11,7 @@ from common_kernel_families import KINDS, random_family
 from scipy.linalg import expm
 
 import lmi
+import lmi.common
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -197,6 +198,22 @@ def test_a_time_limit_leaves_what_was_proved_before():
     with lmi.time_limit(0):
         search = search_family(quotient)
     assert search.functions == () and search.cut_off == ("class diagonal", "class full")
+
+
+def test_what_was_climbed_to_before_a_time_limit_is_proved():
+    quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 5, 2, TENTH))
+    real, calls = lmi.common._Search._step, []
+
+    def slow_after_the_first(*step):
+        calls.append(1)
+        if len(calls) > 1:
+            raise lmi.OutOfTime("the time limit is reached")
+        return real(*step)
+
+    with pytest.MonkeyPatch.context() as patch, lmi.time_limit(300):
+        patch.setattr(lmi.common._Search, "_step", slow_after_the_first)
+        search = search_family(quotient, ["full"])
+    assert search.functions and len(calls) == 2
 
 
 def test_large_families_are_left_to_others():
