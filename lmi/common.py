@@ -28,6 +28,8 @@ from lmi.search_time import checkpoint, seconds_left, uncounted
 
 #: Steps at most, and the relative gain that is worth another one.
 _STEPS, _GAIN = 12, 1e-4
+#: Loss of the rate without uncertainty at which the search with it begins.
+_START_LOSS = 0.2
 #: How much smaller than the last ``P`` the next one may be in some direction, and the largest condition of ``P``.
 _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 #: The same of steps that weigh modes by their shares: large ones, then smaller ones.
@@ -177,6 +179,8 @@ def common_lyapunov(
     if shares is not None and (len(shares) != len(modes) or not min(shares) >= 0 or not max(shares) > 0):
         raise MatrixError("shares are one number for each mode, none negative, not all 0")
     search = _Search(tuple(modes), shape == "diagonal", tolerance, None if shares is None else np.array(shares, float))
+    if start is None and shares is None and any(mode.radii.size for mode in modes):
+        start = search.nominal_start()
     return search.climb(start)
 
 
@@ -193,7 +197,7 @@ class _Search:
 
     def climb(self, start: Any = None) -> CommonCertificate:
         """Climb from the best of a few matrices until nothing is gained."""
-        starts = [*self._starts(), *([] if start is None else [np.asarray(start, dtype=float)])]
+        starts = list(self._starts()) if start is None else [np.asarray(start, dtype=float)]
         P = max(starts, key=lambda P: self.worth(self._nominal_rates(P)))
         P, rates, best = P / np.linalg.eigvalsh(P)[-1], self._nominal_rates(P), None
         trust = _LEAST if self.shares is None else _TRUST[0]
@@ -218,6 +222,17 @@ class _Search:
         if best is None:
             raise NoCertificate("no common Lyapunov matrix was found in floating point")
         return best
+
+    def nominal_start(self) -> np.ndarray | None:
+        """Return a well-conditioned ``P`` for the matrices without their uncertainty, which cost little."""
+        known = tuple(UncertainMatrix.known(mode.A) for mode in self.modes)
+        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+            nominal = replace(self, modes=known, tolerance=1e-5).climb()
+            shape = "diagonal" if self.diagonal else "full"
+            return least_condition(
+                known, [nominal.rate - _START_LOSS * abs(nominal.rate)] * len(known), shape=shape
+            ).matrix
+        return None
 
     def _starts(self) -> Iterator[np.ndarray]:
         """Yield the identity, and the solution of a Lyapunov equation of the mean mode (its diagonal)."""

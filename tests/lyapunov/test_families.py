@@ -212,6 +212,7 @@ def test_what_was_climbed_to_before_a_time_limit_is_proved():
 
     with pytest.MonkeyPatch.context() as patch, lmi.time_limit(300):
         patch.setattr(lmi.common._Search, "_step", slow_after_the_first)
+        patch.setattr(lmi.common._Search, "nominal_start", lambda self: None)
         search = search_family(quotient, ["full"])
     assert search.functions and len(calls) == 2
 
