@@ -137,7 +137,7 @@ def prove_mode(mode: QuotientMode, P: Matrix, multipliers: Sequence[Fraction], g
     if mode.at_rest:
         return Fraction(0)
     S, Z = decay_matrices(mode, P, multipliers)
-    return prove_margin_about(S, Z, guess, max(float(abs(x)) for row in mode.center for x in row))
+    return prove_margin_about(S, Z, guess, mode.largest_entry)
 
 
 def prove_margin_about(S: Matrix, Z: Matrix, guess: float, unit: float) -> Fraction | None:
