@@ -726,7 +726,7 @@ BAD_FILES = [
     ("g.csv", "a,b,1\n" + "x" * 70_000 + ",b,1\n", ["line 2:", "65536 characters"]),
     ("g.csv", b"a,b,1\nb,c\0,1\n", ["line 2:", "0x00", "UTF-8"]),
     ("g.csv", b"a,b,1\n\xe9,c,1\n", ["line 2:", "0xe9", "UTF-8"]),
-    ("g.csv", "a,b,1\n".encode("utf-16"), ["is UTF-16 text", "UTF-8"]),
+    ("g.csv", "a,b,1\n".encode("utf-16"), ["line 1:", "UTF-16", "UTF-8"]),
     ("g.csv", mtx(), ["Matrix Market", ".mtx"]),
     ("g.csv", b"PK\3\4\0\0", ["line 1:", "0x00"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99, mtime=0)[:-12], ["gzip"]),
