@@ -54,6 +54,8 @@ SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
+#: Columns of a list of nodes on the long screen: twelve lines.
+_LONG_LIST = 12 * TEXT
 
 
 def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
@@ -182,7 +184,7 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
-    """Tell where the agents end, in two lines if all of them fit there, else the least and the largest state."""
+    """Tell where the agents end, in two lines if all fit there, else how many where, or the least and largest state."""
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
@@ -194,9 +196,12 @@ def _short_final_state(certificate: Certificate) -> Lines:
     listed = value_list(labels, result.states, 2 * TEXT)
     grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
     text = min(listed, grouped, key=columns)
+    cut = ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2
     if len(groups) == 1 < len(labels):
         text = f"every agent at {short_number(result.states[0])}"
-    elif ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2:
+    elif cut and len(groups) == 2:
+        text = " and ".join(f"{len(names):,} agents at {short_number(state)}" for state, names in groups.items())
+    elif cut:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
         text = f"least {least}, largest {most}, of {len(labels):,} agents"
@@ -299,9 +304,11 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
     labels = structure.graph.labels
     followers = [labels[v] for v in structure.followers.tolist()]
     claims = _claim_lines(structure, [component.claim for component in structure.components])
-    told = [("followers", shorten_list(followers))] if followers else []
+    told = [("followers", shorten_list(followers, _LONG_LIST))] if followers else []
     facts = [("nodes", shorten_list(labels)), ("structure", structure_text(structure))]
-    return format_lines([*_graph_lines(structure, name), *facts, *leader_lines(structure, 4), *told, *claims])
+    return format_lines(
+        [*_graph_lines(structure, name), *facts, *leader_lines(structure, 4, _LONG_LIST), *told, *claims]
+    )
 
 
 def certificate_lines(

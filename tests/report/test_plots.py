@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.text import Annotation, Text
+from matplotlib.transforms import Bbox
 from scipy.integrate import quad
 
 import ptcc_certify
@@ -397,6 +398,15 @@ def test_labels_are_drawn_as_they_are() -> None:
     edges = [("$x_1$", r"$\frac$", 1), (r"$\frac$", "lone \ud800", -1), ("lone \ud800", "a very long name", 1)]
     ax = drawn(plot_graph(edges))
     assert [text.get_text() for text in ax.texts] == ["$x_1$", r"$\frac$", "lone ?", "a very long ..."]
+
+
+def test_long_labels_around_a_circle_hardly_cover_another() -> None:
+    names = [f"a person {k}" for k in range(40)]
+    ax = drawn(plot_graph([(a, names[(k + j) % 40], 1) for k, a in enumerate(names) for j in (1, 9, 17)]))
+    boxes = [text.get_window_extent() for text in ax.texts]
+    shared = [Bbox.intersection(a, b) for k, a in enumerate(boxes) for b in boxes[:k]]
+    area = boxes[0].width * boxes[0].height
+    assert len(boxes) == 40 and max(box.width * box.height for box in shared if box is not None) < area / 8
 
 
 def test_the_ground_of_a_leader_group_has_no_hole() -> None:

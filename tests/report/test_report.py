@@ -29,7 +29,7 @@ from jinja2 import UndefinedError
 from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Certificate, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -592,6 +592,13 @@ def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(
     assert "0 & -1 & 0 \\\\\n2 & 0 & 0 \\\\\n0 & 1 & 0\n\\end{bmatrix}" in text and "(labelled ann, bob, eve)" in text
     assert "All this is without disturbances." in text and r"u_{k} + d_{k}" in text
     assert "without disturbances" in page and "All of this is for agents without disturbances" in page
+    assert "agents end where they would" in text and "agents end where they would" in page
+    certify(graph, protocol, [1, 2, 3], delta=1, simulation=False, limits=[GainLimits(gain_cap=30)]).save(
+        tmp_path / "l.json"
+    )
+    limited = read_certificate(tmp_path / "l.json")
+    for told in (report_latex(limited), sound(report_html(limited)).text):
+        assert "nothing is proved" in told and "where they would" not in told
 
 
 def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):

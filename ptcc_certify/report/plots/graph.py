@@ -153,8 +153,10 @@ def _draw_labels(
         half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE])
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
+        spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
         taken.append(box := _least_covered(spots, half, taken))
+        if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
+            ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
     return nodes + taken[len(nodes) + len(lines) :]
 
