@@ -338,7 +338,7 @@ def read_certificate(
             raise RejectedCertificate(file, report)
         return _accepted(file, document, sha256, report)
     refuse_no_path(path)
-    path = Path(path)
+    path = Path(path)  # type: ignore[arg-type]
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)
     if _file_hash(path) != sha256:

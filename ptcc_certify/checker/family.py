@@ -22,7 +22,7 @@ from ptcc_certify.checker.graph import EDGE_BYTES, NODE_BYTES, positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
-from ptcc_certify.checker.structure import Structure, check_structure
+from ptcc_certify.checker.structure import CONNECTIVITY, Structure, check_structure
 
 #: Modes that are read.
 MANY_MODES = 1000
@@ -120,8 +120,17 @@ def check_family(doc: Document) -> Family:
         source, target = ([edge[k] for edge in on] for k in (0, 1))
         need(keeps(NODE_BYTES * len(labels)), TOO_LARGE)
         graph = Digraph(labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
-        modes.append(Mode(edges, unit, tied, check_structure(doc, graph, section, f"graph.modes[{number}]")))
+        structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
+        need(section["connectivity"] == _connectivity(structure), "another connectivity of a mode")
+        modes.append(Mode(edges, unit, tied, structure))
     return Family(labels, modes, _check_claims(doc, labels, modes))
+
+
+def _connectivity(structure: Structure) -> str:
+    if len(set(structure.graph.pieces[0])) > 1:
+        return "disconnected"
+    single = len(structure.closed) == 1
+    return CONNECTIVITY[2 - single - (single and len(structure.closed[0]) == structure.graph.n)]
 
 
 # ---------------------------------------------------------------------- modes
