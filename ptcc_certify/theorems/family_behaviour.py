@@ -77,10 +77,10 @@ class Counterexample:
     column : int or None
         The balanced closed component of the first mode at the camps of which the state is, the others being at 0.
     state : tuple of N Fraction, or None
-        The state that moves; None where it takes a solve of too many rows: then edges alone tell that an agent ends in
-        a camp of that component in the first mode, whatever the weights, and does not stay there in the other; or
+        The state that moves; None where it takes a solve of too many rows.
     enclosure : StateEnclosure or None
-        an enclosed state does.
+        Then an enclosed state that moves. None also where floats find none: then edges alone tell, for one end of an
+        edge is in a camp of ``column`` for all weights of the first mode, and the other is not.
     off : tuple of int
         Optional edges of ``mode``.
 
@@ -310,9 +310,9 @@ def moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
         try:
             # An edge tells only where the mandatory graph of its mode leaves the state at rest.
             if answer := first_answer(kernel, rows) or first_answer(kernel, edges):
-                edge, column = answer
-                enclosure = kernel.enclosure if column is None else None
+                edge, column, question = answer
                 state = None if column is None else kernel.column(column)
+                enclosure = kernel.enclosure if state is None and kernel.moves_enclosed(question) else None
                 return Counterexample(MOVING, 0, number, edge=edge, column=column, state=state, enclosure=enclosure)
         except TooLarge:
             unknown = True
