@@ -19,9 +19,9 @@ docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processe
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -124,28 +124,39 @@ def follower_decay(family: Family, nodes: np.ndarray | None = None, loss: float 
     >>> round(float(decay.rate), 5), round(float(decay.upper_bound), 5)
     (0.55051, 0.55051)
     """
+    return next(follower_decays(family, nodes, [loss]), None)
+
+
+def follower_decays(family: Family, nodes: np.ndarray | None, losses: Iterable[float]) -> Iterator[FollowerDecay]:
+    """Yield the decay of followers for every loss, as :func:`follower_decay`, from one search; nothing if that fails.
+
+    Examples
+    --------
+    >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 2)])
+    >>> [(round(float(one.rate), 2), round(float(one.overshoot))) for one in follower_decays(chain, None, [0.01, 0.5])]
+    [(0.99, 101), (0.67, 3)]
+    """
     nodes = follower_nodes(family) if nodes is None else np.asarray(nodes, dtype=np.int64)
-    if not nodes.size:
-        return None
     source, target, _ = family.union
     if (np.isin(source, nodes) & ~np.isin(target, nodes)).any():
         raise ValueError("a node outside the followers hears one of them")
     rows = IntervalRows.of(family.modes, nodes)
     with np.errstate(all="ignore"):
-        found = _largest_rate(rows)
+        found = _largest_rate(rows) if nodes.size else None
         if found is None:
-            return None
+            return
         t, policies = found
-        d, _ = _vector(rows, t * (1 - loss), policies[0])
-    if d is None or (decay := prove_follower_decay(rows, nodes, d)) is None:
-        return None
-    if not _is_exact(family, rows, nodes):
-        return decay
+        bound = _least_bound(rows, policies) if _is_exact(family, rows, nodes) else {}
+    for loss in losses:
+        with np.errstate(all="ignore"):
+            d, _ = _vector(rows, t * (1 - loss), policies[0])
+        if d is not None and (decay := prove_follower_decay(rows, nodes, d)) is not None:
+            yield replace(decay, **bound)
+
+
+def _least_bound(rows: IntervalRows, policies: Iterable[Policy]) -> dict[str, Any]:
     bounds = [(bound, one) for one in policies if (bound := _rate_of_member(rows, one)) is not None]
-    if not bounds:
-        return decay
-    bound, slowest = min(bounds, key=itemgetter(0))
-    return replace(decay, upper_bound=bound, slowest=slowest)
+    return dict(zip(("upper_bound", "slowest"), min(bounds, key=lambda pair: pair[0]), strict=True)) if bounds else {}
 
 
 def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -> FollowerDecay | None:

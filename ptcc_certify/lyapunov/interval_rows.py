@@ -165,6 +165,25 @@ class IntervalRows:
         total = self._sums(np.where(on, weights * (values[self.target] - values[self.source]), 0))
         return total[policy.mode, np.arange(self.n)]
 
+    def largest_pushes(self, values: np.ndarray) -> np.ndarray:
+        """Return the largest ``sum_l |w_kl| y_l`` of every row, in every mode; ``y >= 0``, of floats or integers."""
+        if values.dtype.kind == "f":
+            return self._sums(self._floats[1] * values[self.source])
+        return self._sums(self.upper.astype(object) * values.astype(object)[self.source])
+
+    def largest_sums(self, values: np.ndarray) -> np.ndarray:
+        """Return the largest ``sum_l |w_kl| (y_k + y_l)`` of every row over all members; of integers ``y >= 0``, exact.
+
+        Examples
+        --------
+        >>> from ptcc_certify.graphs.family import Family
+        >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 1, 2)]).modes, np.array([1]))
+        >>> rows.largest_sums(np.array([3, 1])).tolist()
+        [8]
+        """
+        values = values.astype(object)
+        return self._sums(self.upper.astype(object) * (values[self.target] + values[self.source])).max(axis=0)
+
     def _sums(self, terms: np.ndarray) -> np.ndarray:
         total = np.zeros(self.modes * self.n, dtype=terms.dtype)
         row, first = self._starts
