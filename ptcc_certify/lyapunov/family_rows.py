@@ -155,8 +155,12 @@ def follower_decays(family: Family, nodes: np.ndarray | None, losses: Iterable[f
 
 
 def _least_bound(rows: IntervalRows, policies: Iterable[Policy]) -> dict[str, Any]:
-    bounds = [(bound, one) for one in policies if (bound := _rate_of_member(rows, one)) is not None]
-    return dict(zip(("upper_bound", "slowest"), min(bounds, key=lambda pair: pair[0]), strict=True)) if bounds else {}
+    best: dict[str, Any] = {}
+    for policy in policies:
+        bound = _rate_of_member(rows, policy)
+        if bound is not None and (not best or bound < best["upper_bound"]):
+            best = {"upper_bound": bound, "slowest": policy}
+    return best
 
 
 def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -> FollowerDecay | None:
