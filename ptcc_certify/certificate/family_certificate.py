@@ -18,8 +18,10 @@ import numpy as np
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
+from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.format_family import family_document
+from ptcc_certify.certificate.format_vectors import side_files
 from ptcc_certify.certificate.request import Expectations, read_initial_state
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
@@ -28,6 +30,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse, behaviour_name
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
@@ -39,6 +42,8 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, dec
 from ptcc_certify.theorems.family_groups import FamilyGroups
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
+#: GB that the check may take for families whose members have more nodes than are solved for exactly.
+LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
@@ -106,6 +111,8 @@ class FamilyCertificate(Shown):
     initial_state : tuple of N Fraction, or None
     expectations : Expectations
     notes : tuple of str
+    source : Source or None
+        The file that it was read from.
 
     References
     ----------
@@ -127,6 +134,7 @@ class FamilyCertificate(Shown):
     initial_state: tuple[Fraction, ...] | None = None
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
+    source: Source | None = None
 
     @property
     def behaviours(self) -> tuple[str, ...]:
@@ -243,15 +251,26 @@ class FamilyCertificate(Shown):
     # ------------------------------------------------------------------ the file
 
     @cached_property
-    def _document(self) -> dict[str, Any]:
-        return family_document(self)
+    def _document(self) -> tuple[dict[str, Any], Mapping[str, bytes]]:
+        """The JSON, and its side files by name."""
+        if self.source is not None:
+            return dict(self.source.document), side_files(self.source.document, self.source.path.parent)
+        document, out = family_document(self, files=True)
+        return document, out.files
 
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says; None where a behaviour is not decided."""
+        if self.source is not None:
+            return self.source.report
         if any(part.component.behaviour is None for part in self.parts):
             return None
-        return check(self._document)
+        document, files = self._document
+        return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+
+    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
+        """Return the JSON and the contents of its side files, as the independent check takes them."""
+        return self._document
 
     @property
     def verdict(self) -> str:
@@ -259,11 +278,14 @@ class FamilyCertificate(Shown):
         return "certified" if self.checked is not None and self.checked.accepted else "undecided"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data."""
-        return json.loads(json.dumps(self._document))
+        """Return the certificate as JSON-ready data, without side files: a copy."""
+        document, files = self._document
+        return json.loads(json.dumps(family_document(self)[0] if files and self.source is None else document))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
+
+        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
 
         Raises
         ------
@@ -274,7 +296,11 @@ class FamilyCertificate(Shown):
         """
         if self.verdict != "certified":
             raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        write_atomically(path, (json.dumps(self._document, indent=1, ensure_ascii=False) + "\n").encode("utf-8"))
+        document, files = self._document
+        for name, content in files.items():
+            write_atomically(Path(path).parent / name, content)
+        text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+        write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
 
     def __repr__(self) -> str:
         behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"

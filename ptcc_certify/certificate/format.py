@@ -84,7 +84,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
 def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
     graph = certificate_graph(document, path.parent)
-    structure, protocol, data = analyse(graph), _read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
+    structure, protocol, data = analyse(graph), read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
     proof = tuple(_read_obligation(step) for step in document["proof"])
     steps = {(step.kind, step.of): step for step in proof}
     paper, functions = document["paper"], document["lyapunov"]["functions"]
@@ -134,7 +134,8 @@ def _write_protocol(content: Content) -> dict[str, Any]:
     return {**section, "disturbance": None if run is None or run.sliding is None else run.sliding.source}
 
 
-def _read_protocol(section: Mapping[str, Any]) -> Protocol:
+def read_protocol(section: Mapping[str, Any]) -> Protocol:
+    """Return the protocol of an accepted certificate."""
     parameters = {key: value for key, value in section.items() if key != "disturbance"}
     return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in parameters.items()})
 
