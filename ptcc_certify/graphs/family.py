@@ -257,6 +257,9 @@ class Family(Shown):
         >>> Family.from_graph(SignedDigraph.from_edges([("a", "b", 3)])).graph.edges
         (('a', 'b', Fraction(3, 1)),)
         """
+        if not isinstance(graph, SignedDigraph):
+            mend = "ptcc_certify.as_graph and as_family take other forms"
+            raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; {mend}")
         share = read_share(uncertainty)
         tied = bool(graph.read.get("undirected"))
         off = np.zeros(graph.n_edges, dtype=bool)
