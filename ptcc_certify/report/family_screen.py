@@ -96,9 +96,9 @@ def decision_summary(components: Sequence[FamilyComponent], family: Family, name
     >>> print("\n".join(decision_summary(ptcc.decide(unsure), unsure, "pair")))
     family     pair: 2 nodes, 2 edges, 2 uncertain, 1 of them optional
     claim      depends on the signal
-    why        the state a=1, b=1 rests in pair at its least weights and moves in pair
-               with a -> b on
-    constant   depends on the signal if mode and weights never change
+    why        the state a=1, b=1 rests at the least weights and moves with a -> b
+               on
+    constant   where weights never change: it depends on the weights
     groups     no limit is claimed of a, b
     """
     return wrap_lines(format_lines([*_family_entries(family, name, {"read": read}), *_claim_entries(components)]))
@@ -248,10 +248,8 @@ def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
         yield "alone", _cut("; ".join(alone), every)
     elif component.signal == "any":
         (held, *_) = decide(family, "constant")
-        yield (
-            "constant",
-            f"{held.behaviour if held.behaviour != DEPENDS else 'depends on the weights'} {WHATEVER['constant']}",
-        )
+        behaviour = "it depends on the weights" if held.behaviour == DEPENDS else sharpest(held)
+        yield "constant", f"where weights never change: {behaviour}"
     if component.signal == "any":
         yield "groups", _cut(groups_text(component), every)
 

@@ -93,19 +93,18 @@ def _different(component: FamilyComponent, why: Counterexample) -> str:
 
 def _moving(family: Family, names: Sequence[str], why: Counterexample) -> str:
     """Tell which state is at rest in one member and moves in another."""
-    one, two = mode_name(family, why.mode), mode_name(family, why.other)
-    least = ""
+    one, two = (f"in {mode_name(family, number)} " * (len(family.modes) > 1) for number in (why.mode, why.other))
     if why.edge is not None:
         optional = family.modes[why.other].optional[why.edge]
-        two += f" with {_edge(family.modes[why.other], why.edge)} {'on' if optional else 'at its largest'}"
-        least = " at its least weights" * (why.mode == why.other)
+        two += f"with {_edge(family.modes[why.other], why.edge)} {'on' if optional else 'at its largest'}"
+        one += "at the least weights " * (why.mode == why.other)
     if why.state is not None:
         size = max(map(abs, why.state)) or Fraction(1)
         state = ", ".join(f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False))
         state += ", ..." * (len(names) > _LISTED)
-        return f"the state {state} rests in {one}{least} and moves in {two}"
+        return f"the state {state} rests {one}and moves {two}".rstrip()
     group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
-    return f"a state{group} rests in {one}{least} and moves in {two}"
+    return f"a state{group} rests {one}and moves {two}".rstrip()
 
 
 def _number(x: Fraction) -> str:
