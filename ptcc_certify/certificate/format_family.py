@@ -64,26 +64,26 @@ def _function(family: Family, component: FamilyComponent, number: int, V: Family
         "nodes": [labels[v] for v in V.nodes],
         "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
         "rate": format_exact(V.rate),
-        "inputs": dict(zip(labels, map(_up, V.input_constants), strict=True)),
-        "coordinates": dict(zip([labels[v] for v in V.nodes], map(_up, V.coordinate_constants), strict=True)),
+        "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
+        "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
     }
 
 
 def _up(x: Fraction) -> str:
-    """Write a bound, rounded up to 60 bits or so; the check forms it with other roundings."""
+    """Write a bound, rounded up to 60 bits or so."""
     if not x:
         return "0"
     unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
-    return format_exact((-(-x // unit) + 2**20) * unit)
+    return format_exact(-(-x // unit) * unit)
 
 
 def _enclosed(low: Fraction, high: Fraction) -> Any:
     """Write ends as a middle and a radius, rounded outwards."""
-    if low == high == 0:
-        return "0"
+    if low == high:
+        return format_exact(low)
     size = max(abs(low), abs(high))
     unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
-    below, above = low // unit - 2**20, -(-high // unit) + 2**20
+    below, above = low // unit, -(-high // unit)
     return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
 
 

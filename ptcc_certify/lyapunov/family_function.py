@@ -21,6 +21,8 @@ from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, inte
 
 #: Significant bits of constants, which are rounded up.
 _CONSTANT_BITS = 53
+#: Room for a check that forms the constants with other roundings.
+_MARGIN = 1 + Fraction(1, 2**40)
 #: Against the entries of a mode: bounds of growth that are tried where a rate is about 0.
 _NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
 
@@ -208,8 +210,8 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
         largest = [max(pair) for pair in zip(largest, sizes, strict=True)]
     return replace(
         function,
-        input_constants=tuple(rounded_up(x * x) for x in largest),
-        coordinate_constants=tuple(rounded_up(squares[vectors[unit]]) for unit in units),
+        input_constants=tuple(rounded_up(x * x * _MARGIN) for x in largest),
+        coordinate_constants=tuple(rounded_up(squares[vectors[unit]] * _MARGIN) for unit in units),
     )
 
 

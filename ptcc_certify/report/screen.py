@@ -352,13 +352,14 @@ def _final_state_lines(certificate: Certificate) -> Lines:
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
-def _accuracy(result: FinalState, rounded: str = "exact; here to 5 digits") -> str:
-    """Tell how exactly a final state is known, and of exact ones whether they are written with fewer digits."""
+def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and whether it is written with fewer digits."""
     if result.radius is None and not result.exact:
         return "floating point"
+    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
     if widest := max(result.radius or (0,)):
-        return f"to within {up(widest, 2)}, proved"
-    return rounded if any(Fraction(short_number(x)) != x for x in result.states[:100]) else "exact"
+        return f"to within {up(widest, 2)}, proved" + f"; {rounded}" * cut
+    return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:

@@ -637,7 +637,8 @@ def test_what_cannot_be_written_is_refused_before_the_work(output: str, tmp_path
 
 
 def test_a_page_does_not_replace_its_certificate(tmp_path: Path):
-    example("nominal").save(tmp_path / "c.html")
+    example("nominal").save(tmp_path / "c.json")
+    (tmp_path / "c.json").rename(tmp_path / "c.html")
     with pytest.raises(ParameterError, match="is the certificate itself"):
         write_report(tmp_path / "c.html", tmp_path / "c.html")
 

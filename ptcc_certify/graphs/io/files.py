@@ -86,7 +86,7 @@ def decoded(data: bytes, name: str) -> str:
         except UnicodeDecodeError as error:
             at = error.start
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise FormatError(f"{name}: is UTF-16 text; save the file as UTF-8 (a spreadsheet: CSV UTF-8)")
+        raise FormatError(f"{name}, line 1: UTF-16 text; save the file as UTF-8 (a spreadsheet: CSV UTF-8)")
     line = data.count(b"\n", 0, at) + 1
     raise FormatError(f"{name}, line {line}: byte 0x{data[at]:02x} is not UTF-8 text; save the file as UTF-8")
 
