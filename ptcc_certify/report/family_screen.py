@@ -62,15 +62,13 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     Examples
     --------
     >>> unsure = Family.from_intervals([("a", "b", "0.9", "1.1")], undirected=True)
-    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5])
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1))
     >>> print("\n".join(family_summary(cert, "pair")))
     family     pair: 2 nodes, 2 edges, 2 uncertain
-    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; x(0) given
+    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; no x(0)
     claim      consensus at T = 1 for every signal
     rate       3.59999, upper bound 3.6: both proved, ratio 0.999999
-    x(T)       a, b at 4
-    error      at 0.99 T: every agent within 9.1e-08 of its final state
-    input      bounded; |u_k| <= 6.601, the largest of agent a
+    input      bounded for every signal and every initial state
     verdict    certified; checked without a solver
     """
     components, T = [part.component for part in certificate.parts], certificate.protocol.T
