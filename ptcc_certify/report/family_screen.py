@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.format_family import read_family
+from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.structure_text import Lines, structure_text
@@ -124,6 +127,52 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
     entries += [("note", note) for note in certificate.notes]
     entries.append(("proof", _proof_text(certificate)))
     return format_lines([*entries, ("verdict", certificate.assessment.text)])
+
+
+def family_check_lines(document: Mapping[str, Any]) -> list[str]:
+    r"""Return what ``ptcc check`` tells of the accepted certificate of a family, from its file alone.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", "0.9", "1.1")], undirected=True)
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1))
+    >>> print("\n".join(family_check_lines(cert.to_dict())))
+    family     the graph: 2 nodes, 2 edges, 2 uncertain
+    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1
+    claim      bipartite consensus at T = 1 for every signal
+    rate       3.59999, proved
+    input      bounded for every signal and every initial state
+    """
+    family, gains = read_family(document["graph"]), document["protocol"]
+    parts = document.get("components") or [{"nodes": family.labels, "claim": document["claim"]}]
+    entries = [("family", family_text(family, mode_name(family, 0)))]
+    told = ", ".join(f"{key}={near(exact(value), 12)}" for key, value in gains.items() if key != "kind")
+    entries.append(("protocol", f"{gains['kind']}: {told}"))
+    counts = Counter(part["claim"]["behaviour"] for part in parts)
+    for behaviour, count in counts.items():
+        whatever = "" if behaviour == DEPENDS else f" at T = {near(exact(gains['T']))} {WHATEVER['any']}"
+        entries.append(
+            ("claim", f"{behaviour}{whatever}" + f" in {count} of {len(parts)} components" * (len(parts) > 1))
+        )
+    rates: dict[int, Fraction] = {}
+    for V in document["lyapunov"]["functions"]:
+        rates[V["component"]] = max(rates.get(V["component"], Fraction(0)), exact(V["rate"]))
+    moving = {k for k, part in enumerate(parts) if len(part["nodes"]) > 1}
+    if moving and moving <= set(rates) and min(rates.values()) > 0:
+        entries.append(("rate", f"{down(min(rates.values()))}, proved"))
+    if document["final_state"] is not None:
+        ends = {label: None if entry is None else _ends(entry) for label, entry in document["final_state"].items()}
+        entries += _interval_entries([*ends], [*ends.values()], 2 * TEXT - 20)
+    if document["input"]["bounded"]:
+        entries += _peak_entries(family.labels, [exact(x) for x in (document["input"]["peaks"] or {}).values()])
+    return format_lines(entries)
+
+
+def _ends(entry: Any) -> tuple[Fraction, Fraction]:
+    if isinstance(entry, str):
+        return exact(entry), exact(entry)
+    middle, radius = exact(entry["mid"]), exact(entry["radius"])
+    return middle - radius, middle + radius
 
 
 # ---------------------------------------------------------------------- the family
@@ -344,31 +393,33 @@ def _interval(ends: tuple[Fraction, Fraction] | None) -> str:
 
 def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
-    states = certificate.final_states
-    if states is None or not certificate.common:
-        return
+    if certificate.final_states is not None and certificate.common:
+        width = 12 * TEXT if long else 2 * TEXT - 20
+        yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+
+
+def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:
     groups: dict[str, list[str]] = {}
-    for label, ends in zip(certificate.family.labels, states, strict=True):
+    for label, ends in zip(labels, states, strict=True):
         groups.setdefault(_interval(ends), []).append(printable(shorten_label(label)))
     if len(groups) == 1 < len(states):
         yield "x(T)", f"every agent {next(iter(groups))}"
         return
-    width = 4 * TEXT if long else 24
-    texts = [f"{shorten_list(names, width)} {ends}" for ends, names in groups.items()]
-    yield "x(T)", shorten_list(texts, 12 * TEXT if long else 2 * TEXT - 20)
+    texts = [f"{shorten_list(names, 24 if width < 4 * TEXT else 4 * TEXT)} {ends}" for ends, names in groups.items()]
+    yield "x(T)", shorten_list(texts, width)
 
 
 def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell how near the agents are to their final states by when."""
     if not certificate.common or certificate.rate is None or certificate.initial_state is None:
         return
-    instants = _INSTANTS if long else [(0.01, "0.99 T")]
-    bounds = certificate.deviation_bound([remaining for remaining, _ in instants])
-    told = (
-        f"at {when}: every agent within {up(float(column.max()), 2)}"
-        for (_, when), column in zip(instants, bounds.T, strict=True)
-    )
-    yield "error", "; ".join(told) + " of its final state"
+    if not long:
+        bound = certificate.deviation_bound([0.01]).max()
+        yield "error", f"at 0.99 T: every agent within {up(float(bound), 2)} of its final state"
+        return
+    bounds = certificate.deviation_bound([remaining for remaining, _ in _INSTANTS]).max(axis=0)
+    told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(_INSTANTS, bounds, strict=True))
+    yield "error", f"every agent is within so much of its final state: {', '.join(told)}"
 
 
 def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
@@ -383,22 +434,19 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
             yield "input", "not proved bounded"
         return
     peaks, labels = certificate.input_peaks, certificate.family.labels
-    if peaks is None:
+    yield from _peak_entries(labels, peaks or ())
+    if long and peaks is not None:
+        told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
+        yield "", f"|u_k| <= {shorten_list(told, 4 * TEXT)}"
+
+
+def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction]) -> Lines:
+    if not peaks:
         yield "input", "bounded for every signal and every initial state"
         return
     largest = max(peaks)
-    yield (
-        "input",
-        f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {shorten_label(labels[peaks.index(largest)], 22)}",
-    )
-    if long:
-        yield (
-            "",
-            "|u_k| <= "
-            + shorten_list(
-                [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)], 4 * TEXT
-            ),
-        )
+    agent = shorten_label(labels[peaks.index(largest)], 22)
+    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}"
 
 
 def _proof_text(certificate: FamilyCertificate) -> str:
