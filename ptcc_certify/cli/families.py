@@ -14,6 +14,7 @@ from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.scenario import is_scenario, read_scenario
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
@@ -71,9 +72,9 @@ def read_family(graphs: tuple[str, ...], options: shared.Options) -> Family | No
     from ptcc_certify.graphs.io.family_files import is_family_file
 
     if len(graphs) > 1 and not options["switching"]:
-        raise ParameterError(
-            f"{len(graphs)} graphs: add --switching if any of them may act at any time; ptcc batch takes many"
-        )
+        named = shorten(", ".join(graphs), 200)
+        mend = "add --switching if any of them may act at any time; ptcc batch takes many, each by itself"
+        raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
     if graphs.count("-") > 1:
         raise ParameterError("- stands for standard input, which is one graph; name files for the others")
     files = [shared.graph_file(graph) for graph in graphs]

@@ -303,9 +303,10 @@ class Family(Shown):
         Examples
         --------
         >>> unsure = Family.from_intervals([("a", "b", -1, 2)])
-        >>> unsure, unsure.notes
-        (Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional), ('1 weight of unknown sign was read as two \
-edges that may fail, one of each sign',))
+        >>> unsure
+        Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional)
+        >>> print(unsure.notes[0])
+        1 weight of unknown sign was read as two edges that may fail, one of each sign
         """
         refuse_unknown_orientation(orientation)
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []

@@ -42,16 +42,18 @@ def read_family(
 
     Parameters
     ----------
-    paths : path, file object, or sequence of these
+    paths : str, Path, file object, or sequence of these
         Several files are modes, of which any may act at any instant; each is named by its file.
     uncertainty : number or str
         Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
     optional : iterable of (source, target)
         Edges that may fail, in every mode that has them.
-    orientation, undirected
+    orientation : {"information", "listens"}, optional
+        As in :func:`read_graph`.
+    undirected : bool
         As in :func:`read_graph`; an undirected edge is one parameter, both directions change together.
-    **options : keywords of :func:`read_graph`
-        Not for files with intervals.
+    **options : Any
+        Others of :func:`read_graph`, not for files with intervals.
 
     Returns
     -------
