@@ -17,6 +17,7 @@ from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.family_screen import family_check_lines
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -136,7 +137,9 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
-    if report.accepted and path:
+    if report.accepted and "modes" in document["graph"]:
+        lines = family_check_lines(document)
+    elif report.accepted and path:
         with suppress(PTCCError):
             certificate = Certificate(**read_document(Path(path), document, "", report))
             told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
