@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.text import Annotation, Text
 from scipy.integrate import quad
+from scipy.spatial import Delaunay
 
 import ptcc_certify
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
@@ -786,3 +787,19 @@ def test_the_start_of_a_certificate_is_known_again_whatever_its_decimals(start: 
     cert = certify(graph, PROTOCOL, start)
     assert cert.trajectory is not None
     assert peak_of(plot_input(cert)) is not None
+
+
+def test_followers_are_not_drawn_among_the_leaders_of_a_ring():
+    ring = [(f"r{k}", f"r{(k + 1) % 12}", 1) for k in range(12)] + [(f"r{k}", f"f{k}", 2) for k in range(3, 7)]
+    ax = plot_graph(ring)
+    leaders, followers = (np.column_stack(line.get_data()) for line in ax.lines if len(line.get_xdata()) > 1)
+    assert (len(leaders), len(followers)) == (12, 4)
+    assert (Delaunay(leaders).find_simplex(followers) < 0).all()
+
+
+def test_ticks_of_time_do_not_overlap_beside_long_names():
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    ax = plot_trajectory(certify([("a" * 40, "b" * 40, 1), ("b" * 40, "c" * 40, -1)], protocol, [1, 2, 3]))
+    FigureCanvasAgg(ax.figure).draw()
+    boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
+    assert len(boxes) > 1 and all(a.x1 < b.x0 for a, b in pairwise(boxes))
