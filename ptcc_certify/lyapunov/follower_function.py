@@ -33,7 +33,7 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
-from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above, rounded_up
+from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above
 from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.lyapunov.family_search import search_family
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
@@ -74,6 +74,11 @@ class LeadingPart:
         """``t sqrt(c_l)``, rounded up, of the agents that are no pivots, by their numbers in the component."""
         pairs = zip(self.function.nodes, self.function.coordinate_constants, strict=True)
         return {int(self.agents[v]): self.times * root_above(c) for v, c in pairs}
+
+    @property
+    def ends(self) -> dict[int, Fraction]:
+        """``e_l``: the bounds as the rows take them, integers."""
+        return {v: Fraction(-(-bound // 1)) for v, bound in self.bounds.items()}
 
     @property
     def speeds(self) -> dict[int, Fraction]:
@@ -133,10 +138,10 @@ class FollowerFunction:
         sums = rows.largest_sums(np.concatenate([self.vector, self.outside]))
         result = dict.fromkeys(range(self.family.n_nodes), Fraction(0))
         for k, total in zip(self.followers.tolist(), sums.tolist(), strict=True):
-            result[k] = rounded_up((total * rows.unit) ** 2)
+            result[k] = (total * rows.unit) ** 2
         for part in self.parts:
             for v, c in zip(part.agents.tolist(), part.function.input_constants, strict=True):
-                result[v] = rounded_up(c * part.times**2)
+                result[v] = c * part.times**2
         return result
 
     @cached_property
@@ -237,8 +242,8 @@ def _compose(
         d, times = d << up, times * 2**up
         parts = [LeadingPart(p.agents, p.quotient, p.function, times) for p in parts]
         for part in parts:
-            for v, bound in part.bounds.items():
-                outside[place[v]] = -(-bound // 1)
+            for v, end in part.ends.items():
+                outside[place[v]] = int(end)
     gamma = composite_rate(rows, d, outside, _drifts(component.kernel, decay.nodes, parts))
     rate = min([rounded(2 * gamma, 53), *(part.function.rate for part in parts)])
     if rate <= 0:
