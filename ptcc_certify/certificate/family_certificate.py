@@ -376,7 +376,7 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
     if component.nodes.size > EXACT_NODES:
         progress(STEPS[2])
         with share_of_time(1.0, STEPS[2], notes):
-            return ComponentProof(component, tuple(follower_functions(component)))
+            return ComponentProof(component, tuple(follower_functions(component, notes=notes)))
         return ComponentProof(component)
     quotient = Quotient.of(component)
     bound, search = None, FamilySearch()

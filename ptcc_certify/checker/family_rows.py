@@ -19,6 +19,7 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
+from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family
@@ -29,6 +30,8 @@ from ptcc_certify.checker.reading import entries, exact, fields, need
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
+#: Bits of constants and values, which are rounded up.
+BITS = 64
 KEYS = ("class", "component", "vector", "parts", "rate")
 
 
@@ -69,7 +72,7 @@ class FollowerFunction:
     coordinates: dict[int, Fraction]
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``W^2`` of a state."""
+        """Return ``W^2`` of a state, rounded up."""
         (kernel, unit), pivots = self.component.whole, self.component.pivots
         (whole,), scale = integers([[x[v] for v in self.component.nodes]])
         state = dict(zip(self.component.nodes, whole, strict=True))
@@ -80,7 +83,8 @@ class FollowerFunction:
             if xi * bottom > top * d:
                 top, bottom = xi, d
         squares = [Fraction(top * self.scale, bottom * unit * scale) ** 2]
-        return max(squares + [part.function.value(x) / part.times**2 for part in self.parts])
+        squares += [part.function.value(x) / part.times**2 for part in self.parts]
+        return rounded(max(squares), BITS, up=True)
 
 
 Function = FamilyFunction | FollowerFunction
@@ -134,7 +138,7 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     inputs = _rows(family, component, followers, sizes, speeds, (rate, scale * common))
     doc.done(f"b = {down(rate)}, {len(followers)} rows")
     for part in parts:
-        inputs |= {v: c * part.times**2 for v, c in part.function.inputs.items()}
+        inputs |= {v: rounded(c * part.times**2, BITS, up=True) for v, c in part.function.inputs.items()}
     inputs |= dict.fromkeys(resting, Fraction(0))
     coordinates = {v: Fraction(size, scale * common) ** 2 for v, size in sizes.items() if size}
     only = {v: sizes[v] for v in followers}
@@ -204,4 +208,4 @@ def _rows(
             need(2 * q * (unit * pull[v] - lost) >= p * mode.unit * unit * sizes[v], "a row does not decay fast enough")
         for v, total in push.items():
             most[v] = max(most[v], Fraction(total, mode.unit * scale))
-    return {v: x**2 for v, x in most.items()}
+    return {v: rounded(x**2, BITS, up=True) for v, x in most.items()}
