@@ -1,7 +1,7 @@
 """Verifies a family: its modes, the structure of every mandatory graph, and what it does under every signal.
 
 In a mode every edge has one sign, and its size lies in an interval; the mandatory graph has the edges whose interval
-does not reach 0, at the least size. Section 14 of the format tells the rules.
+does not reach 0, at the least size. Section 18 of the format tells the rules.
 """
 
 from __future__ import annotations

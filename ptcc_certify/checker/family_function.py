@@ -1,6 +1,6 @@
 """Verifies the Lyapunov functions of a family: one quadratic form for every signal, and what it says of agents.
 
-Section 15 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
+Section 19 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
 make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``,
 ``|delta_e| <= radius_e``.
 """
