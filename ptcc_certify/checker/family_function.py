@@ -145,9 +145,9 @@ def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunct
 
 def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
-    mode, place, inside = family.modes[number], {v: i for i, v in enumerate(nodes)}, set(component.nodes)
+    mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
     kernel, scale = component.whole
-    edges = [edge for edge in mode.edges if edge[1] in inside]
+    spend(len(edges) + len(component.nodes), mode.unit.bit_length(), what="a quotient")
     rows: dict[int, Whole] = {v: {} for v in component.nodes}
     for s, t, sign, low, high in edges:
         for v, weight in ((t, low + high), (s, -sign * (low + high))):

@@ -323,6 +323,112 @@ def test_an_undirected_family_is_not_the_directed_one_of_the_same_bounds():
     assert check(resealed(forged)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
 
 
+def forged(name: str, *changes: tuple[tuple[Any, ...], Any]) -> Any:
+    data = next(data for own, data in cases() if own == name)
+    for path, new in changes:
+        data = changed(data, path, new)
+    return check(resealed(data))
+
+
+def steps(name: str, kind: str) -> list[int]:
+    data = next(data for own, data in cases() if own == name)
+    return [k for k, step in enumerate(data["proof"]) if step["kind"] == kind]
+
+
+def test_a_function_is_of_its_own_component():
+    data = next(data for name, data in cases() if name == "two components")
+    numbers = [V["component"] for V in data["lyapunov"]["functions"]]
+    assert set(numbers) == {0, 1}
+    for k, number in enumerate(numbers):
+        path = ("lyapunov", "functions", k, "component")
+        assert forged("two components", (path, 1 - number)).rejected == f"lyapunov.functions[{k}]"
+        assert not forged("two components", (path, 2)).accepted
+
+
+def test_functions_of_one_component_bound_no_input_of_another():
+    data = next(data for name, data in cases() if name == "two components")
+    for number in (0, 1):
+        kept = [k for k, V in enumerate(data["lyapunov"]["functions"]) if V["component"] == number]
+        proof = [x for x in data["proof"] if not x["of"].startswith("lyapunov")]
+        middle = next(k for k, x in enumerate(proof) if x["kind"] == "family-claim") + 1
+        renamed = []
+        for place, k in enumerate(kept):
+            for x in data["proof"]:
+                if x["of"].startswith(f"lyapunov.functions[{k}]"):
+                    renamed.append({**x, "of": x["of"].replace(f"functions[{k}]", f"functions[{place}]")})
+        functions = [data["lyapunov"]["functions"][k] for k in kept]
+        report = forged(
+            "two components",
+            (("lyapunov", "functions"), functions),
+            (("proof",), proof[:middle] + renamed + proof[middle:]),
+        )
+        assert not report.accepted and report.rejected in ("family-final-state of final_state", "family-input of input")
+
+
+def test_a_multiplier_is_positive_and_none_is_left_out():
+    (first, *_) = steps("uncertain consensus", "family-rate")
+    path = ("proof", first, "witness", "multipliers")
+    data = next(data for name, data in cases() if name == "uncertain consensus")
+    own = at(data, path)
+    assert own and forged("uncertain consensus", (path, own)).accepted
+    for new in ([], own[:-1], [*own, "1"], ["0", *own[1:]], ["-1", *own[1:]]):
+        assert forged("uncertain consensus", (path, new)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
+    where = ("proof", first, "witness")
+    assert forged("uncertain consensus", (where, None)).reason == "the least weights are not the worst"
+
+
+def test_a_peak_takes_a_rate_of_at_least_two_over_the_exponent():
+    name, data = next(
+        (name, data) for name, data in cases() if data["input"]["peaks"] and data["lyapunov"]["functions"]
+    )
+    rate = max(Fraction(V["rate"]) for V in data["lyapunov"]["functions"])
+    exponent = Fraction(data["protocol"]["kappa"]) * Fraction(data["protocol"]["rho2"])
+    assert rate * exponent >= 2
+    slower = str(Fraction(199, 100) / rate / Fraction(data["protocol"]["rho2"]))
+    assert forged(name, (("protocol", "kappa"), slower)).rejected == "family-input of input"
+
+
+def test_a_rate_that_is_not_positive_moves_nothing():
+    """Then the agents end between the extremes at the beginning, and nothing narrower is taken."""
+    name = "uncertain consensus"
+    data = next(data for own, data in cases() if own == name)
+    proof = [x for x in data["proof"] if x["kind"] != "family-input"]
+    proof = [{**x, "numbers": {"b": "-1"}} if x["kind"] == "family-rate" else x for x in proof]
+    functions = [{**V, "rate": "-1"} for V in data["lyapunov"]["functions"]]
+    size = max(abs(Fraction(x)) for x in data["initial_state"].values())
+    for share, accepted in ((1, True), (Fraction(1, 100), False)):
+        ends = dict.fromkeys(data["graph"]["nodes"], ball("0", str(share * size)))
+        report = forged(
+            name,
+            (("proof",), proof),
+            (("lyapunov", "functions"), functions),
+            (("input",), {"bounded": None, "peaks": None}),
+            (("final_state",), ends),
+        )
+        assert functions and report.accepted == accepted
+        assert accepted or report.rejected == "family-final-state of final_state"
+
+
+def test_a_row_of_a_kernel_has_columns_of_its_own_component_alone():
+    data = next(data for name, data in cases() if name == "bipartite containment")
+    (place,) = steps("bipartite containment", "family-claim")
+    rows = data["proof"][place]["witness"][0]["rows"]
+    label = next(iter(rows))
+    for key in ("0", "9", "01", "-1", ""):
+        path = ("proof", place, "witness", 0, "rows")
+        report = forged("bipartite containment", (path, {**rows, label: {**rows[label], key: "0"}}))
+        assert report.reason == "a row of a kernel"
+
+
+def test_many_components_take_time_in_proportion():
+    edges = [(f"{s}{i}", f"{t}{i}", 1, 1 + (t == "d")) for i in range(500) for s, t in ("ac", "bc", "cd")]
+    family = Family.from_intervals(edges)
+    data = family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+    begin = time.process_time()
+    assert check(data, stdlib=True).accepted
+    assert time.process_time() - begin < 1.5
+
+
 def test_known_weights_are_one_family_whether_undirected_or_not():
     path = [("a", "b", 1, 1), ("b", "c", -2, -2)]
     both = path + [(t, s, low, high) for s, t, low, high in path]
