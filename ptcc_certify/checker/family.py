@@ -18,7 +18,7 @@ from typing import Any
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import EDGE_BYTES, NODE_BYTES, positions
+from ptcc_certify.checker.graph import NODE_BYTES, positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -26,6 +26,8 @@ from ptcc_certify.checker.structure import CONNECTIVITY, Structure, check_struct
 
 #: Modes that are read.
 MANY_MODES = 1000
+#: Bytes that an edge takes beside its text, at most about.
+EDGE_BYTES = 500
 THEOREM = "common kernel"
 TOO_LARGE = "a family that may take more memory than is allowed; allow more by --memory"
 STABILITY, CONSENSUS, DEPENDS = "stability", "bipartite consensus", "depends on the signal"
@@ -183,13 +185,13 @@ def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[list[Edg
         section = fields(section, ("count", "source", "target", "least", "largest"), "edges")
         count = section["count"]
         need(type(count) is int and 0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
-        need(keeps((EDGE_BYTES[0] + EDGE_BYTES[1]) * count), TOO_LARGE)
+        need(keeps(EDGE_BYTES * count), TOO_LARGE)
         need(all(beside(section[key]) for key in section if key != "count"), "edges: not in side files")
         source, target = (doc.files.integers(section[key], key, count) for key in ("source", "target"))
         need(all(0 <= v < len(index) for end in (source, target) for v in end), "an edge of an unknown node")
         least, largest = (doc.files.numbers(section[key], key, count) for key in ("least", "largest"))
     else:
-        need(keeps(EDGE_BYTES[1] * len(entries(section, "edges"))), TOO_LARGE)
+        need(keeps(EDGE_BYTES * len(entries(section, "edges"))), TOO_LARGE)
         rows = [entries(row, "an edge") for row in section]
         need(all(len(row) in (3, 4) for row in rows), "an edge has not 3 or 4 entries")
         need(all(isinstance(x, str) and x in index for row in rows for x in row[:2]), "an edge of an unknown node")
