@@ -1,6 +1,6 @@
 """Verifies the Lyapunov functions of a family: one quadratic form for every signal, and what it says of agents.
 
-Section 15 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
+Section 19 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
 make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``,
 ``|delta_e| <= radius_e``.
 """
@@ -132,9 +132,9 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
 
 def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
-    mode, place, inside = family.modes[number], {v: i for i, v in enumerate(nodes)}, set(component.nodes)
+    mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
     kernel, scale = component.whole
-    edges = [edge for edge in mode.edges if edge[1] in inside]
+    spend(len(edges) + len(component.nodes), mode.unit.bit_length(), what="a quotient")
     rows: dict[int, Whole] = {v: {} for v in component.nodes}
     for s, t, sign, low, high in edges:
         for v, weight in ((t, low + high), (s, -sign * (low + high))):
