@@ -143,14 +143,14 @@ def _modes(family: Family) -> dict[str, Any]:
     return {"nodes": list(labels), "modes": modes, "sha256": family.sha256}
 
 
-def read_family(section: Mapping[str, Any]) -> Family:
+def certificate_family(section: Mapping[str, Any]) -> Family:
     """Return the family of an accepted certificate.
 
     Examples
     --------
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
-    >>> read_family(family_sections(family, decide(family))["graph"]) == family
+    >>> certificate_family(family_sections(family, decide(family))["graph"]) == family
     True
     """
     labels, modes = tuple(section["nodes"]), []

@@ -18,6 +18,7 @@ from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
@@ -66,9 +67,9 @@ def family_options(command: Any) -> Any:
     return command
 
 
-def read_family(graphs: tuple[str, ...], options: shared.Options) -> Family | None:
-    """Return the family that files and options make; None where it is one graph with known weights."""
-    from ptcc_certify.graphs.io import read_family as run
+def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
+    """Return what files and options make: a family, or the graph where there is one, with known weights."""
+    from ptcc_certify.graphs.io import read_family
     from ptcc_certify.graphs.io.family_files import is_family_file
 
     if len(graphs) > 1 and not options["switching"]:
@@ -80,11 +81,13 @@ def read_family(graphs: tuple[str, ...], options: shared.Options) -> Family | No
     files = [shared.graph_file(graph) for graph in graphs]
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
-        return None
+        return shared.read(graphs[0], options)
     how = {name: options[name] for name in shared.READING if name != "edges"}
     more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
-    family = run(files, orientation=options["edges"], **more, **how)
-    return None if family.graph is not None else family
+    family = read_family(files, orientation=options["edges"], **more, **how)
+    if family.graph is None:
+        return family
+    return shared.read(graphs[0], options) if not is_family_file(files[0]) else family.graph
 
 
 def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
@@ -220,7 +223,7 @@ def same_family(
     """Compare the family of an accepted certificate with that of files; return the report, and how these were read."""
     from dataclasses import replace
 
-    from ptcc_certify.certificate.format_family import read_family as family_of
+    from ptcc_certify.certificate.format_family import certificate_family
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.family_difference import family_difference
 
@@ -228,10 +231,11 @@ def same_family(
         scenario = read_scenario(graphs[0])
         given = {name: value for name, value in scenario.options.items() if name in options}
         graphs, options = scenario.graphs, {**options, **given, "switching": len(scenario.graphs) > 1}
-    family = read_family(graphs, options) or Family.from_graph(shared.read(graphs[0], options))
+    read_back = read_graph_or_family(graphs, options)
+    family = read_back if isinstance(read_back, Family) else Family.from_graph(read_back)
     name, read = _names(graphs, family, options)
     how = {"graph_read": f"{name}, {read}"}
     if family.sha256 == report.sha256:
         return report, how
-    reason = f"another family than {name}: {family_difference(family_of(document['graph']), family)}"
+    reason = f"another family than {name}: {family_difference(certificate_family(document['graph']), family)}"
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how

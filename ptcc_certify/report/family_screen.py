@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.format_family import read_family
+from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
@@ -143,7 +143,7 @@ def family_check_lines(document: Mapping[str, Any]) -> list[str]:
     rate       3.59999, proved
     input      bounded for every signal and every initial state
     """
-    family, gains = read_family(document["graph"]), document["protocol"]
+    family, gains = certificate_family(document["graph"]), document["protocol"]
     parts = document.get("components") or [{"nodes": family.labels, "claim": document["claim"]}]
     entries = [("family", family_text(family, mode_name(family, 0)))]
     told = ", ".join(f"{key}={near(exact(value), 12)}" for key, value in gains.items() if key != "kind")
@@ -184,15 +184,15 @@ def family_text(family: Family, name: str) -> str:
     Examples
     --------
     >>> family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair")
-    'pair: 2 nodes, 1 edge, 1 uncertain, all of them optional'
+    'pair: 2 nodes, 1 edge, 1 optional'
     """
     several = len(family.modes) > 1
     edges = sum(mode.n_edges for mode in family.modes)
     uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
     optional = sum(int(mode.optional.sum()) for mode in family.modes)
     rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
-    rest += f", {uncertain} uncertain" * bool(uncertain)
-    rest += f", {'all' if optional == uncertain else optional} of them optional" * bool(optional)
+    rest += f", {uncertain} uncertain" * (uncertain > optional)
+    rest += f", {optional}{' of them' * (uncertain > optional)} optional" * bool(optional)
     if not several:
         return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
     names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
@@ -274,7 +274,8 @@ def _claim_text(component: FamilyComponent, when: str, every: bool) -> str:
         return "not decided"
     if component.behaviour == DEPENDS:
         return DEPENDS if component.signal == "any" else "depends on which graph it is"
-    text = f"{sharpest(component)}{when} {WHATEVER[component.signal]}"
+    whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
+    text = f"{sharpest(component)}{when} {whatever}"
     sides = [_names(component, side.tolist(), TEXT if every else 20) for side in camps(component)]
     if component.behaviour == STABILITY or len(sides) < 2:
         return text
