@@ -104,7 +104,13 @@ _EXPORTS = {
 }
 __all__ = [*_EXPORTS, "__version__"]
 #: What others call a public name.
-_ALSO_CALLED = {"analyze": "analyse", "classify": "analyse", "load_certificate": "read_certificate"}
+_ALSO_CALLED = {
+    "analyze": "analyse",
+    "classify": "analyse",
+    "load_certificate": "read_certificate",
+    "plot_states": "plot_trajectory",
+    "load_graph": "as_graph",
+}
 
 
 class Room(ModuleType):

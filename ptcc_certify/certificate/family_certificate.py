@@ -18,9 +18,11 @@ import numpy as np
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
+from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
+from ptcc_certify.certificate.format_vectors import side_files
 from ptcc_certify.certificate.request import (
     Expectations,
     listener,
@@ -37,6 +39,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
@@ -48,6 +51,8 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, dec
 from ptcc_certify.theorems.family_groups import FamilyGroups
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
+#: GB that the check may take for families whose members have more nodes than are solved for exactly.
+LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
@@ -115,6 +120,8 @@ class FamilyCertificate(Shown):
     initial_state : tuple of N Fraction, or None
     expectations : Expectations
     notes : tuple of str
+    source : Source or None
+        The file that it was read from.
     origins : mapping of str to str
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
 
@@ -138,6 +145,7 @@ class FamilyCertificate(Shown):
     initial_state: tuple[Fraction, ...] | None = None
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
+    source: Source | None = None
     origins: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -279,15 +287,26 @@ class FamilyCertificate(Shown):
     # ------------------------------------------------------------------ the file
 
     @cached_property
-    def _document(self) -> dict[str, Any]:
-        return family_document(self)
+    def _document(self) -> tuple[dict[str, Any], Mapping[str, bytes]]:
+        """The JSON, and its side files by name."""
+        if self.source is not None:
+            return dict(self.source.document), side_files(self.source.document, self.source.path.parent)
+        document, out = family_document(self, files=True)
+        return document, out.files
 
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says; None where a behaviour is not decided."""
+        if self.source is not None:
+            return self.source.report
         if any(part.component.behaviour is None for part in self.parts):
             return None
-        return check(self._document)
+        document, files = self._document
+        return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+
+    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
+        """Return the JSON and the contents of its side files, as the independent check takes them."""
+        return self._document
 
     @property
     def verdict(self) -> str:
@@ -295,11 +314,14 @@ class FamilyCertificate(Shown):
         return "certified" if self.checked is not None and self.checked.accepted else "undecided"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data."""
-        return json.loads(json.dumps(self._document))
+        """Return the certificate as JSON-ready data, without side files: a copy."""
+        document, files = self._document
+        return json.loads(json.dumps(family_document(self)[0] if files and self.source is None else document))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
+
+        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
 
         Raises
         ------
@@ -310,7 +332,11 @@ class FamilyCertificate(Shown):
         """
         if self.verdict != "certified":
             raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        write_atomically(path, (json.dumps(self._document, indent=1, ensure_ascii=False) + "\n").encode("utf-8"))
+        document, files = self._document
+        for name, content in files.items():
+            write_atomically(Path(path).parent / name, content)
+        text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+        write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
 
     def __repr__(self) -> str:
         behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"

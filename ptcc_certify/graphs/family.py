@@ -154,6 +154,12 @@ class Mode:
             ends = names[self.source[edge]], names[self.target[edge]]
             yield f"[{', '.join([*ends, *map(json.dumps, weights)])}]"
 
+    def marked_lines(self) -> Iterator[str]:
+        """Yield a line that tells whether uncertain edges are undirected, if so, then those of all edges."""
+        if self.tied and not self.known.all():
+            yield json.dumps({"undirected": True})
+        yield from self.lines()
+
     def __repr__(self) -> str:
         uncertain, optional = int((~self.known).sum()), int(self.optional.sum())
         more = f", {uncertain} uncertain" if uncertain else ""
@@ -225,10 +231,11 @@ class Family(Shown):
 
         Lines of UTF-8, ``\n`` after each: ``[label]`` of every node, sorted; then the modes in their order, a line
         ``{}`` between two, each with the lines of its edges (:meth:`Mode.lines`), numbers as ``p`` or ``p/q`` in lowest
-        terms. That of one graph is the graph's own.
+        terms. Before the edges of a mode that are undirected, some of them uncertain, a line ``{"undirected": true}``:
+        both directions change together. That of one graph is the graph's own.
         """
         nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
-        modes = "{}\n".join("".join(f"{line}\n" for line in mode.lines()) for mode in self.modes)
+        modes = "{}\n".join("".join(f"{line}\n" for line in mode.marked_lines()) for mode in self.modes)
         return hashlib.sha256((nodes + modes).encode("utf-8", "surrogatepass")).hexdigest()
 
     # ------------------------------------------------------------------ constructors
