@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -78,16 +79,25 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
         raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
     if graphs.count("-") > 1:
         raise ParameterError("- stands for standard input, which is one graph; name files for the others")
-    files = [shared.graph_file(graph) for graph in graphs]
+    files = [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
-        return shared.read(graphs[0], options)
+        return shared.read(files[0], options)
     how = {name: options[name] for name in shared.READING if name != "edges"}
     more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
     family = read_family(files, orientation=options["edges"], **more, **how)
     if family.graph is None:
         return family
-    return shared.read(graphs[0], options) if not is_family_file(files[0]) else family.graph
+    return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
+
+
+def _standard_input() -> BytesIO:
+    """Return standard input as a file that is read more than once."""
+    from ptcc_certify.graphs.io.files import read_bytes
+
+    file = BytesIO(read_bytes(shared.graph_file("-"), "standard input"))
+    file.name = "standard input"  # type: ignore[attr-defined]
+    return file
 
 
 def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:

@@ -62,6 +62,14 @@ def test_one_graph_with_known_weights_is_no_family():
     assert "Theorem 2.1" in ptcc("classify", "known.csv").out
 
 
+def test_standard_input_holds_intervals_or_a_mode():
+    unsure = ptcc("classify", "-", stdin=FILES["unsure.csv"].encode())
+    assert unsure.code == 0 and "for every signal" in unsure.out
+    assert "for every signal" in ptcc("classify", "day.csv", "-", "--switching", stdin=FILES["night.csv"].encode()).out
+    assert "Theorem 2.1" in ptcc("classify", "-", stdin=FILES["day.csv"].encode()).out
+    assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
+
+
 def test_what_is_written_is_checked_against_the_files_in_their_order():
     assert ptcc("certify", *BOTH, "--kappa", "3", "-o", "c.json").code == 0
     checked = ptcc("check", "c.json")
