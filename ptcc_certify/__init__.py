@@ -12,7 +12,7 @@ The names at the top, by topic:
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
-- Runs: ``simulate``, ``Trajectory``
+- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
@@ -57,6 +57,7 @@ _EXPORTS = {
     "GainLimits": "protocols.gain_limits",
     # Runs
     "simulate": "simulation.run",
+    "simulate_family": "simulation.family_run",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
