@@ -33,7 +33,7 @@ _POWER = 15
 # Steps of the worst-case search for the time in which agents move.
 _STEPS = 10
 # Against the largest entry of the initial state: what still moves below is rounding, and the steps grow.
-_AT_REST = 1e-13
+_AT_REST = 1e-11
 _SHORTEST, _LONGEST = 1e-12, 1e12
 
 State = Callable[[], np.ndarray]
