@@ -22,16 +22,20 @@ import numpy as np
 
 from lmi import child_process
 from lmi.diagonal import run_solver
-from lmi.errors import MatrixError, NoCertificate
+from lmi.errors import MatrixError, NoCertificate, OutOfTime
 from lmi.matrix_classes import square
 from lmi.search_time import checkpoint, seconds_left, uncounted
 
 #: Steps at most, and the relative gain that is worth another one.
 _STEPS, _GAIN = 12, 1e-4
+#: Loss of the rate without uncertainty at which the search with it begins.
+_START_LOSS = 0.2
 #: How much smaller than the last ``P`` the next one may be in some direction, and the largest condition of ``P``.
 _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
-#: Rows up to which Clarabel takes a matrix as it is.
-_WHOLE_ROWS = 60
+#: The same of steps that weigh modes by their shares: large ones, then smaller ones.
+_TRUST = (0.3, 0.8)
+#: Rows up to which Clarabel takes a matrix as it is; with a diagonal ``P`` those of sparse matrices have zeros.
+_WHOLE_ROWS = {False: 60, True: 24}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +118,19 @@ class CommonCertificate:
 
 
 def common_lyapunov(
-    modes: Sequence[UncertainMatrix], *, shape: str = "full", tolerance: float = 1e-7, start: Any = None
+    modes: Sequence[UncertainMatrix],
+    *,
+    shape: str = "full",
+    shares: Sequence[float] | None = None,
+    tolerance: float = 1e-7,
+    start: Any = None,
 ) -> CommonCertificate:
-    """Find one ``P > 0`` of the largest common rate: the smallest ``b_i`` of all modes.
+    """Find one ``P > 0`` of the largest common rate: the smallest ``b_i`` of all modes, or their mean over ``shares``.
 
     With ``b`` from the last ``P_0``, in coordinates in which ``P_0 = I``, the program ``maximise t`` subject to the
     inequalities above with ``b P + t I`` instead of ``b P``, ``0 <= P <= I``, gives a rate of ``b + t`` at least; it is
-    repeated until it gains less than a ten-thousandth.
+    repeated until it gains less than a ten-thousandth. With shares ``sum_i shares_i (b_i + t_i)`` is maximised, in
+    steps that change ``P`` little; then what comes out need not be the best.
 
     Parameters
     ----------
@@ -128,6 +138,8 @@ def common_lyapunov(
         All with the same n >= 1.
     shape : {"full", "diagonal"}
         Of ``P``.
+    shares : sequence of float, optional
+        Of the clock that each mode is active: some may have no positive rate, and the mean is made large.
     tolerance : float
         Relative gap asked of the solver.
     start : (n, n) array, optional
@@ -164,7 +176,11 @@ def common_lyapunov(
         raise MatrixError("all modes have the same number of rows, at least one")
     if child_process.forked:
         raise NoCertificate("Clarabel is not run in a forked process")
-    search = _Search(tuple(modes), shape == "diagonal", tolerance)
+    if shares is not None and (len(shares) != len(modes) or not min(shares) >= 0 or not max(shares) > 0):
+        raise MatrixError("shares are one number for each mode, none negative, not all 0")
+    search = _Search(tuple(modes), shape == "diagonal", tolerance, None if shares is None else np.array(shares, float))
+    if start is None and shares is None and any(mode.radii.size for mode in modes):
+        start = search.nominal_start()
     return search.climb(start)
 
 
@@ -173,30 +189,50 @@ class _Search:
     modes: tuple[UncertainMatrix, ...]
     diagonal: bool
     tolerance: float
+    shares: np.ndarray | None = None
+
+    def worth(self, rates: Sequence[float]) -> float:
+        """Return what is maximised."""
+        return min(rates) if self.shares is None else float(self.shares @ np.array(rates) / self.shares.sum())
 
     def climb(self, start: Any = None) -> CommonCertificate:
         """Climb from the best of a few matrices until nothing is gained."""
-        starts = [*self._starts(), *([] if start is None else [np.asarray(start, dtype=float)])]
-        P = max(starts, key=self._nominal_rate)
-        P, b, best = P / np.linalg.eigvalsh(P)[-1], self._nominal_rate(P), None
+        starts = list(self._starts()) if start is None else [np.asarray(start, dtype=float)]
+        P = max(starts, key=lambda P: self.worth(self._nominal_rates(P)))
+        P, rates, best = P / np.linalg.eigvalsh(P)[-1], self._nominal_rates(P), None
+        trust = _LEAST if self.shares is None else _TRUST[0]
         for _ in range(_STEPS):
             try:
-                found = self._step(P, b)
+                found = self._step(P, rates, trust)
             except (NoCertificate, np.linalg.LinAlgError):
                 break
-            except Exception:
+            except OutOfTime:
                 if best is None:
                     raise
                 break
-            if best is not None and not found.rate > best.rate:
+            gain = math.inf if best is None else self.worth(found.rates) - self.worth(best.rates)
+            if gain > 0:
+                best, P, rates = found, found.matrix, found.rates
+            if best is None or best.condition > _LARGEST_CONDITION:
                 break
-            gain = math.inf if best is None else found.rate - best.rate
-            best, P, b = found, found.matrix, found.rate
-            if gain <= _GAIN * abs(best.rate) or best.condition > _LARGEST_CONDITION:
-                break
+            if gain <= _GAIN * abs(self.worth(best.rates)):
+                if trust not in _TRUST[:-1]:
+                    break
+                trust = _TRUST[_TRUST.index(trust) + 1]
         if best is None:
             raise NoCertificate("no common Lyapunov matrix was found in floating point")
         return best
+
+    def nominal_start(self) -> np.ndarray | None:
+        """Return a well-conditioned ``P`` for the matrices without their uncertainty, which cost little."""
+        known = tuple(UncertainMatrix.known(mode.A) for mode in self.modes)
+        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+            nominal = replace(self, modes=known, tolerance=1e-5).climb()
+            shape = "diagonal" if self.diagonal else "full"
+            return least_condition(
+                known, [nominal.rate - _START_LOSS * abs(nominal.rate)] * len(known), shape=shape
+            ).matrix
+        return None
 
     def _starts(self) -> Iterator[np.ndarray]:
         """Yield the identity, and the solution of a Lyapunov equation of the mean mode (its diagonal)."""
@@ -211,17 +247,17 @@ class _Search:
             if np.isfinite(P).all() and np.linalg.eigvalsh(P)[0] > 1e-9 * np.abs(P).max():
                 yield P
 
-    def _nominal_rate(self, P: np.ndarray) -> float:
-        """Return the least rate of the matrices without their uncertainty."""
+    def _nominal_rates(self, P: np.ndarray) -> tuple[float, ...]:
+        """Return the rates of the matrices without their uncertainty."""
         R = np.linalg.cholesky(P).T
         transformed = (np.linalg.solve(R.T, (R @ mode.A).T).T for mode in self.modes)
-        return min(float(np.linalg.eigvalsh(B + B.T)[0]) for B in transformed)
+        return tuple(float(np.linalg.eigvalsh(B + B.T)[0]) for B in transformed)
 
-    def _step(self, P: np.ndarray, b: float) -> CommonCertificate:
+    def _step(self, P: np.ndarray, rates: Sequence[float], least: float) -> CommonCertificate:
         """Solve the program of :func:`common_lyapunov`, and compute the rates of its ``P``."""
         R = np.diag(np.sqrt(np.diag(P))) if self.diagonal else np.linalg.cholesky(P).T
         pairs = [mode.transformed(R) for mode in self.modes]
-        Q, multipliers = self._solve([mode for mode, _ in pairs], b)
+        Q, multipliers = self._solve([mode for mode, _ in pairs], rates, least)
         if self.diagonal:
             Q = np.diag(np.diag(Q))
         sizes = np.linalg.eigvalsh(Q)
@@ -232,7 +268,9 @@ class _Search:
         taus = [np.maximum(t, 1e-12) / scale / top for t, (_, scale) in zip(multipliers, pairs, strict=True)]
         return evaluate(P / top, self.modes, taus)
 
-    def _solve(self, modes: Sequence[UncertainMatrix], b: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    def _solve(
+        self, modes: Sequence[UncertainMatrix], rates: Sequence[float], least: float
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
         with uncounted():
             import cvxpy as cp
         checkpoint()
@@ -240,15 +278,16 @@ class _Search:
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in modes) or 1.0
         p = cp.Variable(n) if self.diagonal else cp.Variable((n, n), symmetric=True)
         P = cp.diag(p) if self.diagonal else p
-        t = cp.Variable()
-        constraints = [p >= _LEAST, p <= 1] if self.diagonal else [P >> _LEAST * np.eye(n), P << np.eye(n)]
+        t = cp.Variable(1 if self.shares is None else len(modes))
+        constraints = [p >= least, p <= 1] if self.diagonal else [P >> least * np.eye(n), P << np.eye(n)]
         taus = []
-        for mode in modes:
+        for i, mode in enumerate(modes):
             tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
-            constraints.append(_inequality(P, mode, tau, b, t, unit) >> 0)
+            own, rise = (min(rates), t[0]) if self.shares is None else (rates[i], t[i])
+            constraints.append(_inequality(P, mode, tau, own, rise, unit) >> 0)
             taus.append(tau)
-        problem = cp.Problem(cp.Maximize(t), constraints)
-        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance)
+        problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
+        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
         if p.value is None or not np.isfinite(p.value).all():
             raise NoCertificate(f"the solver answered {problem.status}")
         value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
@@ -258,22 +297,23 @@ class _Search:
 def _inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
     """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
     import cvxpy as cp
+    from scipy import sparse
 
     n = len(mode.A)
-    product = P @ (mode.A / unit)
+    product = P @ sparse.csr_array(mode.A / unit)  # keeps the zeros, of which chordal decomposition makes use
     form = product + product.T - (b / unit) * P - t * np.eye(n)
     if tau is None:
         return form
-    H, F = mode.H / math.sqrt(unit), mode.F / math.sqrt(unit)
+    H, F = (sparse.csr_array(x / math.sqrt(unit)) for x in (mode.H, mode.F))
     coupling = P @ F
     return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
 
 
-def _run(problem: Any, rows: int, tolerance: float) -> None:
+def _run(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
     import warnings
 
     options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
-    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS
+    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
     options["chordal_decomposition_merge_method"] = "parent_child"
     options["time_limit"] = seconds_left()
     with warnings.catch_warnings():
@@ -331,7 +371,7 @@ def least_condition(
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
         constraints.append(_inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
     problem = cp.Problem(cp.Minimize(c), constraints)
-    _run(problem, n + max(mode.radii.size for mode in modes), tolerance)
+    _run(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
     if p.value is None or not np.isfinite(p.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
     value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
@@ -378,7 +418,7 @@ def evaluate(P: np.ndarray, modes: Sequence[UncertainMatrix], multipliers: Seque
 
 
 def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMatrix]) -> CommonCertificate:
-    """Return the same ``P`` with the multipliers of the largest rate of each mode by itself.
+    """Return the same ``P`` with the multipliers of the largest rate of each mode by itself, as far as time allows.
 
     Parameters
     ----------
@@ -399,7 +439,7 @@ def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMa
         if not len(taus[i]) or (len(modes) > 1 and rates[i] == certificate.rate):
             continue
         own, scale = mode.transformed(R)
-        with contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+        with contextlib.suppress(NoCertificate, OutOfTime, np.linalg.LinAlgError):
             tau = np.maximum(_multipliers(own), 1e-12) / scale
             rate = evaluate(P, [mode], [tau]).rate
             if rate > rates[i]:

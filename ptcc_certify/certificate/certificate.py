@@ -5,27 +5,30 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.checking import check, read_and_check
 from ptcc_certify.certificate.format import certificate_document, read_document
-from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.certificate.format_vectors import Writer, side_file_names, side_files
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.io.files import read_bytes, refuse_no_path
+from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
 
 #: GB that the check of a large graph may take while it is certified.
 LARGE_MEMORY = 16
@@ -212,7 +215,7 @@ class Certificate(Content, Shown):
                 write_atomically(path.parent / name, content)
         else:
             document = dict(self.source.document)
-            for name in set(_side_files(document)):
+            for name in set(side_file_names(document)):
                 if not (path.parent / name).exists():
                     shutil.copyfile(self.source.path.parent / name, path.parent / name)
         write_atomically(path, _bytes(document))
@@ -228,8 +231,7 @@ class Certificate(Content, Shown):
         if self.source is None:
             document, out = self._document(self.verdict)
             return document, out.files
-        folder, names = self.source.path.parent, set(_side_files(self.document))
-        return self.document, {name: read_bytes(folder / name, name) for name in names}
+        return self.document, side_files(self.document, self.source.path.parent)
 
     def plot(self, what: str = "decay", **keywords: Any) -> Any:
         """Draw a figure of the certificate.
@@ -277,8 +279,8 @@ class Certificate(Content, Shown):
 
 
 def read_certificate(
-    path: str | Path | Mapping[str, Any] | Certificate, *, stdlib: bool = False, memory: float = 1
-) -> Certificate:
+    path: str | Path | Mapping[str, Any] | Certificate | FamilyCertificate, *, stdlib: bool = False, memory: float = 1
+) -> Certificate | FamilyCertificate:
     """Check a certificate's file with the independent check, and read it back.
 
     Nothing is taken from a file that the check does not accept, and no claim from its key ``unverified``. Bounds are
@@ -286,7 +288,7 @@ def read_certificate(
 
     Parameters
     ----------
-    path : str, Path, mapping or Certificate
+    path : str, Path, mapping, Certificate or FamilyCertificate
         A file of schema ``ptcc-certificate/2``; its side files are in the same folder. Or its parsed JSON, without side
         files; or a certificate, which is written down and read back.
     stdlib : bool
@@ -296,7 +298,7 @@ def read_certificate(
 
     Returns
     -------
-    Certificate
+    Certificate or FamilyCertificate
         Its verdict is ``certified`` or ``undecided``.
 
     Raises
@@ -321,7 +323,7 @@ def read_certificate(
     >>> saved.with_simulation(samples=11).comparison.violated
     False
     """
-    if isinstance(path, Certificate):
+    if not isinstance(path, str | Path | Mapping) and hasattr(path, "for_check"):
         with TemporaryDirectory() as folder:  # for its side files
             path.save(Path(folder, "certificate.json"))
             return read_certificate(Path(folder, "certificate.json"), stdlib=stdlib, memory=memory)
@@ -334,15 +336,39 @@ def read_certificate(
         file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
         if not report.accepted:
             raise RejectedCertificate(file, report)
-        return Certificate(**read_document(file, document, sha256, report))
+        return _accepted(file, document, sha256, report)
     refuse_no_path(path)
-    path = Path(path)
+    path = Path(path)  # type: ignore[arg-type]
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)
     if _file_hash(path) != sha256:
         raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
     if not report.accepted:
         raise RejectedCertificate(path, report)
+    return _accepted(path, document, sha256, report)
+
+
+def read_graph_certificate(path: Any, *, memory: float = 1) -> Certificate:
+    """Read a certificate of one graph; see :func:`read_certificate`.
+
+    Raises
+    ------
+    ParameterError
+        It is one of a family.
+    """
+    certificate = read_certificate(path, memory=memory)
+    if not isinstance(certificate, Certificate):
+        raise ParameterError(f"{shorten(str(path), 200)}: a certificate of a family of graphs; give one of a graph")
+    return certificate
+
+
+def _accepted(
+    path: Path, document: dict[str, Any], sha256: str, report: CheckReport
+) -> Certificate | FamilyCertificate:
+    if "modes" in document["graph"]:
+        from ptcc_certify.certificate.read_family_certificate import read_family_certificate
+
+        return read_family_certificate(Source(path, sha256, document, report, None, ()))
     return Certificate(**read_document(path, document, sha256, report))
 
 
@@ -352,14 +378,6 @@ def _file_hash(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
-
-
-def _side_files(value: Any) -> Iterator[str]:
-    """Yield the names of the side files of a document."""
-    if isinstance(value, dict) and {"file", "sha256"} <= set(value):
-        yield value["file"]
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from _side_files(part)
 
 
 def _json(document: Mapping[str, Any]) -> str:

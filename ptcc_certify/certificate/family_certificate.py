@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -18,27 +17,44 @@ import numpy as np
 
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
+from lmi.search_time import share_of_time
+from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
+from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
-from ptcc_certify.certificate.request import Expectations, read_initial_state
+from ptcc_certify.certificate.format_vectors import side_files
+from ptcc_certify.certificate.request import (
+    Expectations,
+    listener,
+    origins_of,
+    read_expectations,
+    read_initial_state,
+    read_seconds,
+)
+from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.display_hook import Shown, family_summary
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse, behaviour_name
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
-from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.family_groups import FamilyGroups
 
-STEPS = ("the decision", "Lyapunov functions", "upper bound on the decay rate", "independent check")
+STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
+#: GB that the check may take for families whose members have more nodes than are solved for exactly.
+LARGE_MEMORY = 16
+#: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
+_ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +120,10 @@ class FamilyCertificate(Shown):
     initial_state : tuple of N Fraction, or None
     expectations : Expectations
     notes : tuple of str
+    source : Source or None
+        The file that it was read from.
+    origins : mapping of str to str
+        What ``"graph"`` is called, and where ``"x(0)"`` comes from.
 
     References
     ----------
@@ -125,6 +145,32 @@ class FamilyCertificate(Shown):
     initial_state: tuple[Fraction, ...] | None = None
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
+    source: Source | None = None
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def common(self) -> bool:
+        """Whether every component keeps one kernel, so that every signal brings all agents to rest."""
+        return all(part.component.behaviour not in (None, DEPENDS) for part in self.parts)
+
+    @property
+    def unbounded(self) -> bool:
+        """Whether the input is proved to grow without limit for some signal and some initial state.
+
+        Where rest states differ, or where the upper bound of the rate times ``rho2 kappa / 2`` is below 1.
+        """
+        pole, bounds = self.protocol.gain.pole, [part.upper_bound for part in self.parts]
+        slow = any(bound is not None and bound.value * pole < 2 for bound in bounds)
+        return slow or any(part.component.behaviour == DEPENDS for part in self.parts)
+
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The graded verdict: what became of what was asked, whether the bound is useful, and the exit code."""
+        return assess_family(self)
+
+    def summary(self) -> str:
+        """Return what ``ptcc certify`` prints of it."""
+        return family_summary(self)
 
     @property
     def behaviours(self) -> tuple[str, ...]:
@@ -241,15 +287,26 @@ class FamilyCertificate(Shown):
     # ------------------------------------------------------------------ the file
 
     @cached_property
-    def _document(self) -> dict[str, Any]:
-        return family_document(self)
+    def _document(self) -> tuple[dict[str, Any], Mapping[str, bytes]]:
+        """The JSON, and its side files by name."""
+        if self.source is not None:
+            return dict(self.source.document), side_files(self.source.document, self.source.path.parent)
+        document, out = family_document(self, files=True)
+        return document, out.files
 
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says; None where a behaviour is not decided."""
+        if self.source is not None:
+            return self.source.report
         if any(part.component.behaviour is None for part in self.parts):
             return None
-        return check(self._document)
+        document, files = self._document
+        return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+
+    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
+        """Return the JSON and the contents of its side files, as the independent check takes them."""
+        return self._document
 
     @property
     def verdict(self) -> str:
@@ -257,11 +314,14 @@ class FamilyCertificate(Shown):
         return "certified" if self.checked is not None and self.checked.accepted else "undecided"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data."""
-        return json.loads(json.dumps(self._document))
+        """Return the certificate as JSON-ready data, without side files: a copy."""
+        document, files = self._document
+        return json.loads(json.dumps(family_document(self)[0] if files and self.source is None else document))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
+
+        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
 
         Raises
         ------
@@ -272,7 +332,11 @@ class FamilyCertificate(Shown):
         """
         if self.verdict != "certified":
             raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        write_atomically(path, (json.dumps(self._document, indent=1, ensure_ascii=False) + "\n").encode("utf-8"))
+        document, files = self._document
+        for name, content in files.items():
+            write_atomically(Path(path).parent / name, content)
+        text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+        write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
 
     def __repr__(self) -> str:
         behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"
@@ -286,9 +350,10 @@ def certify_family(
     protocol: Protocol,
     x0: Any = None,
     *,
-    time_limit: float = 60,
+    time_limit: float | None = None,
     expectations: Expectations | str | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    origins: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> FamilyCertificate:
     """Certify what the nominal protocol does on a family of graphs, whatever the signal.
 
@@ -299,9 +364,11 @@ def certify_family(
         With ``rho2 > 0``.
     x0 : state-like, optional
         The initial state; without it no final states and no peaks.
-    time_limit : float
-        Seconds of wall time for the searches.
+    time_limit : float, optional
+        Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
     expectations : Expectations or str, optional
+    origins : mapping of str to str, optional
+        See :func:`ptcc_certify.certify`.
     progress : callable
         Is told each step as it begins.
 
@@ -327,17 +394,18 @@ def certify_family(
         raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-    if isinstance(expectations, str):
-        expectations = Expectations(behaviour_name(expectations))
+    asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
+    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
     components = decide(family)
-    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     parts, notes = [], list(family.notes)
-    with deadline.time_limit(time_limit):
+    with deadline.time_limit(seconds):
         for component in components:
             parts.append(_prove(component, notes, progress))
+    progress(STEPS[3])
+    told = origins_of(None, x0, None) | dict(origins or {})
     return FamilyCertificate(
-        family, protocol, tuple(parts), initial_state, expectations or Expectations(), tuple(dict.fromkeys(notes))
+        family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), origins=told
     )
 
 
@@ -345,11 +413,17 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
     if component.kernel is None or component.nodes.size == 1:
         return ComponentProof(component)
     quotient = Quotient.of(component)
+    bound, search = None, FamilySearch()
     progress(STEPS[1])
-    search = search_family(quotient)
-    notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
+    with share_of_time(_BOUND_SHARE, STEPS[1], notes):
+        bound = prove_family_rate_bound(quotient)
     progress(STEPS[2])
-    bound = None
-    with suppress(deadline.OutOfTime):
-        bound = prove_family_rate_bound(quotient, search.functions)
+    with share_of_time(1.0, STEPS[2], notes):
+        search = search_family(quotient, enough=None if bound is None else _ENOUGH * bound.value)
+    notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
+    rate = max((V.rate for V in search.functions), default=Fraction(0))
+    if bound is not None and search.functions and rate < _ENOUGH * bound.value:
+        with share_of_time(1.0, STEPS[1], notes):  # signals played against what was found
+            again = prove_family_rate_bound(quotient, search.functions)
+            bound = bound if again is None else min(bound, again, key=lambda b: b.value)
     return ComponentProof(component, search.functions, bound)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
@@ -29,8 +31,9 @@ if TYPE_CHECKING:
 _BITS = 64
 
 
-def family_document(certificate: FamilyCertificate) -> dict[str, Any]:
-    """Return a certificate of a family as JSON-ready data."""
+def family_document(certificate: FamilyCertificate, files: bool = False) -> tuple[dict[str, Any], Writer]:
+    """Return a certificate of a family as JSON-ready data, and what holds its side files."""
+    out = Writer(certificate.family.labels, files)
     family, parts = certificate.family, certificate.parts
     components = [part.component for part in parts]
     functions = [(k, V) for k, part in enumerate(parts) for V in part.functions]
@@ -38,11 +41,11 @@ def family_document(certificate: FamilyCertificate) -> dict[str, Any]:
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": producer(),
-        **family_sections(family, components),
+        **family_sections(family, components, out),
         "protocol": certificate.protocol.to_dict(),
         **dict.fromkeys(NOT_OF_FAMILIES),
         "lyapunov": {"functions": [_function(family, components[k], k, V) for k, V in functions]},
-        "initial_state": Writer(labels).state("start", certificate.initial_state),
+        "initial_state": out.state("start", certificate.initial_state),
         "final_state": None
         if finals is None
         else {label: None if ends is None else _enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
@@ -53,7 +56,7 @@ def family_document(certificate: FamilyCertificate) -> dict[str, Any]:
         "proof": _proof(certificate, components, functions),
         "verdict": "certified",
     }
-    return document | {"digest": digest(document), "unverified": _unverified(certificate)}
+    return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
 
 
 def _function(family: Family, component: FamilyComponent, number: int, V: FamilyFunction) -> dict[str, Any]:
@@ -64,26 +67,26 @@ def _function(family: Family, component: FamilyComponent, number: int, V: Family
         "nodes": [labels[v] for v in V.nodes],
         "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
         "rate": format_exact(V.rate),
-        "inputs": dict(zip(labels, map(_up, V.input_constants), strict=True)),
-        "coordinates": dict(zip([labels[v] for v in V.nodes], map(_up, V.coordinate_constants), strict=True)),
+        "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
+        "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
     }
 
 
 def _up(x: Fraction) -> str:
-    """Write a bound, rounded up to 60 bits or so; the check forms it with other roundings."""
+    """Write a bound, rounded up to 60 bits or so."""
     if not x:
         return "0"
     unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
-    return format_exact((-(-x // unit) + 2**20) * unit)
+    return format_exact(-(-x // unit) * unit)
 
 
 def _enclosed(low: Fraction, high: Fraction) -> Any:
     """Write ends as a middle and a radius, rounded outwards."""
-    if low == high == 0:
-        return "0"
+    if low == high:
+        return format_exact(low)
     size = max(abs(low), abs(high))
     unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
-    below, above = low // unit - 2**20, -(-high // unit) + 2**20
+    below, above = low // unit, -(-high // unit)
     return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
 
 
@@ -121,12 +124,12 @@ def _unverified(certificate: FamilyCertificate) -> dict[str, Any]:
     }
 
 
-def family_sections(family: Family, components: Sequence[FamilyComponent]) -> dict[str, Any]:
+def family_sections(family: Family, components: Sequence[FamilyComponent], out: Writer | None = None) -> dict[str, Any]:
     """Return modes, the structure of their mandatory graphs, and the claim of every component."""
-    out, labels = Writer(family.labels), family.labels
+    out, labels = out or Writer(family.labels), family.labels
     structures = [structure_section(analyse(mode.mandatory), out) for mode in family.modes]
     claims = [{"theorem": THEOREM, "behaviour": c.behaviour, "signal": "any"} for c in components]
-    sections: dict[str, Any] = {"graph": _modes(family), "structure": {"modes": structures}, "claim": claims[0]}
+    sections: dict[str, Any] = {"graph": _modes(family, out), "structure": {"modes": structures}, "claim": claims[0]}
     if len(claims) > 1:
         nodes = [[labels[v] for v in c.nodes.tolist()] for c in components]
         sections["claim"] = None
@@ -134,17 +137,26 @@ def family_sections(family: Family, components: Sequence[FamilyComponent]) -> di
     return sections
 
 
-def _modes(family: Family) -> dict[str, Any]:
-    labels, modes = family.labels, []
-    for mode in family.modes:
+def _modes(family: Family, out: Writer) -> dict[str, Any]:
+    modes = [{"name": mode.name, "undirected": mode.tied, "edges": _edges(mode, out)} for mode in family.modes]
+    return {"nodes": list(family.labels), "modes": modes, "sha256": family.sha256}
+
+
+def _edges(mode: Mode, out: Writer) -> Any:
+    labels = mode.labels
+    if not out.aside(mode.n_edges) or mode.lower.table.dtype == object:
         columns = mode.source.tolist(), mode.target.tolist(), *mode.texts
-        edges = [[labels[s], labels[t], *dict.fromkeys(ends)] for s, t, *ends in zip(*columns, strict=True)]
-        modes.append({"name": mode.name, "undirected": mode.tied, "edges": edges})
-    return {"nodes": list(labels), "modes": modes, "sha256": family.sha256}
+        return [[labels[s], labels[t], *dict.fromkeys(ends)] for s, t, *ends in zip(*columns, strict=True)]
+    ends = {}
+    for key, below, above in (("least", mode.upper, mode.lower), ("largest", mode.lower, mode.upper)):
+        values = np.where(mode.sign < 0, -below.table, above.table)
+        ends[key] = out.vector(key, values) | ({"scale": str(mode.lower.scale)} if values.dtype.kind == "i" else {})
+    source, target = out.vector("source", mode.source), out.vector("target", mode.target)
+    return {"count": mode.n_edges, "source": source, "target": target, **ends}
 
 
-def read_family(section: Mapping[str, Any]) -> Family:
-    """Return the family of an accepted certificate.
+def read_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
+    """Return the family of an accepted certificate; ``folder`` holds its side files.
 
     Examples
     --------
@@ -153,15 +165,21 @@ def read_family(section: Mapping[str, Any]) -> Family:
     >>> read_family(family_sections(family, decide(family))["graph"]) == family
     True
     """
-    labels, modes = tuple(section["nodes"]), []
+    labels, modes, files = tuple(section["nodes"]), [], SideFiles(folder, None)
     index = {label: v for v, label in enumerate(labels)}
     for mode in section["modes"]:
         rows = mode["edges"]
-        source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))
-        ends = [(exact(row[2]), exact(row[-1])) for row in rows]
+        if isinstance(rows, dict):
+            count = rows["count"]
+            source, target = (np.array(files.integers(rows[key], key, count)) for key in ("source", "target"))
+            least, largest = (files.numbers(rows[key], key, count) for key in ("least", "largest"))
+            ends = list(zip(least, largest, strict=True))
+        else:
+            source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))
+            ends = [(exact(row[2]), exact(row[-1])) for row in rows]
         sign = np.array([1 if high > 0 else -1 for _, high in ends], dtype=np.int8)
         sizes = [sorted(map(abs, pair)) for pair in ends]
-        both, m = Weights([low for low, _ in sizes] + [high for _, high in sizes]), len(rows)
+        both, m = Weights([low for low, _ in sizes] + [high for _, high in sizes]), len(ends)
         bounds = both.take(np.arange(m)), both.take(np.arange(m, 2 * m))
         modes.append(Mode(labels, source, target, sign, *bounds, name=mode["name"], tied=mode["undirected"]))
     return Family(tuple(modes))
@@ -190,5 +208,13 @@ def _witness(family: Family, component: FamilyComponent, number: Mapping[int, in
     if why.edge is not None:
         mode = component.family.modes[why.other]
         edge = [labels[mode.source[why.edge]], labels[mode.target[why.edge]], int(mode.sign[why.edge])]
-    state = {label: format_exact(x) for label, x in zip(labels, why.state or (), strict=True) if x}
+    state: dict[str, Any] = {}
+    if why.state is not None:
+        state = {label: format_exact(x) for label, x in zip(labels, why.state, strict=True) if x}
+    elif (q := why.enclosure) is not None:
+        for label, middle, radius in zip(labels, q.middle, q.radius, strict=True):
+            if radius:
+                state[label] = {"mid": format_exact(middle * q.unit), "radius": format_exact(radius * q.unit)}
+            elif middle:
+                state[label] = format_exact(middle * q.unit)
     return {"mode": why.mode, "other": why.other, "edge": edge, "state": state}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles, beside
+from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.rationals import format_exact, writable
 from ptcc_certify.graphs.structure import Structure
 
@@ -93,6 +94,25 @@ class Writer:
                 if max(map(abs, whole)) < 2**63:
                     return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
         return dict(zip(self.labels, map(format_exact, state), strict=True))
+
+
+def side_files(document: Any, folder: Path) -> dict[str, bytes]:
+    """Return the contents of the side files that a document names, by name.
+
+    Raises
+    ------
+    FormatError
+        One is no longer there.
+    """
+    return {name: read_bytes(folder / name, name) for name in set(side_file_names(document))}
+
+
+def side_file_names(value: Any) -> Iterator[str]:
+    """Yield the names of the side files of a document."""
+    if isinstance(value, dict) and {"file", "sha256"} <= set(value):
+        yield value["file"]
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from side_file_names(part)
 
 
 class Reader:

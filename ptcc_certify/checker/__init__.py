@@ -183,6 +183,7 @@ def _close(doc: Document, proved: bool) -> str:
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
+    need(not protocol.sliding, "families are certified under the nominal protocol")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)

@@ -11,26 +11,29 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
-from operator import itemgetter
 from typing import Any
 
-from lmi.exact.work import spend
+from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.work import keeps, spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.graph import EDGE_BYTES, NODE_BYTES, positions
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same
-from ptcc_certify.checker.structure import Structure, check_structure
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
+from ptcc_certify.checker.side_files import Numbers, beside
+from ptcc_certify.checker.structure import CONNECTIVITY, Structure, check_structure
 
 #: Modes that are read.
 MANY_MODES = 1000
 THEOREM = "common kernel"
+TOO_LARGE = "a family that may take more memory than is allowed; allow more by --memory"
 STABILITY, CONSENSUS, DEPENDS = "stability", "bipartite consensus", "depends on the signal"
 INTERVAL, CONTAINMENT = "interval bipartite consensus", "bipartite containment"
 
 Row = dict[int, Fraction]
-#: Source, target, sign, least and largest size of an edge.
-Edge = tuple[int, int, int, Fraction, Fraction]
+#: Source, target, sign, least and largest size of an edge, times the unit of its mode.
+Edge = tuple[int, int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +43,17 @@ class Mode:
     Attributes
     ----------
     edges : list of Edge
-    structure : Structure
+    unit : int
+        What divides the sizes.
     tied : bool
         Both directions of every edge change together.
+    structure : Structure
     """
 
     edges: list[Edge]
-    structure: Structure
+    unit: int
     tied: bool
+    structure: Structure
 
     @property
     def uncertain(self) -> Iterator[Edge]:
@@ -98,28 +104,39 @@ class Component:
         """Whether there is no common kernel."""
         return self.behaviour == DEPENDS
 
+    @cached_property
+    def whole(self) -> tuple[dict[int, dict[int, int]], int]:
+        """The rows of the basis in integers, and what divides them."""
+        return _whole(self.kernel)
+
 
 def check_family(doc: Document) -> Family:
     """Verify modes, structures and what is claimed of every component."""
     labels, drafts = _read_modes(doc)
     sections = entries(fields(doc.section("structure"), ("modes",), "structure")["modes"], "modes", len(drafts))
     modes = []
-    for number, ((edges, tied), section) in enumerate(zip(drafts, sections, strict=True)):
-        edges_on = [edge for edge in edges if edge[3]]
-        source, target, weights = ([x(e) for e in edges_on] for x in (itemgetter(0), itemgetter(1), _least))
-        graph = Digraph(labels, source, target, weights, 1)
-        modes.append(Mode(edges, check_structure(doc, graph, section, f"graph.modes[{number}]"), tied))
+    for number, ((edges, unit, tied), section) in enumerate(zip(drafts, sections, strict=True)):
+        on = [edge for edge in edges if edge[3]]
+        source, target = ([edge[k] for edge in on] for k in (0, 1))
+        need(keeps(NODE_BYTES * len(labels)), TOO_LARGE)
+        graph = Digraph(labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
+        structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
+        need(section["connectivity"] == _connectivity(structure), "another connectivity of a mode")
+        modes.append(Mode(edges, unit, tied, structure))
     return Family(labels, modes, _check_claims(doc, labels, modes))
 
 
-def _least(edge: Edge) -> Fraction:
-    return edge[2] * edge[3]
+def _connectivity(structure: Structure) -> str:
+    if len(set(structure.graph.pieces[0])) > 1:
+        return "disconnected"
+    single = len(structure.closed) == 1
+    return CONNECTIVITY[2 - single - (single and len(structure.closed[0]) == structure.graph.n)]
 
 
 # ---------------------------------------------------------------------- modes
 
 
-def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], bool]]]:
+def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
     section = fields(doc.section("graph"), ("nodes", "modes", "sha256"), "graph")
     labels = entries(section["nodes"], "nodes")
     need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
@@ -131,24 +148,54 @@ def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], bool]]
     for item in items:
         fields(item, ("name", "undirected", "edges"), "a mode")
         need(isinstance(item["name"], str) and type(item["undirected"]) is bool, "name or undirected of a mode")
-        edges = [_edge(entries(row, "an edge"), index) for row in entries(item["edges"], "edges")]
+        edges, unit = _edges(doc, item["edges"], index)
         _check_edges(edges, item["undirected"])
-        drafts.append((edges, item["undirected"]))
-    doc.sha256 = _hash(labels, [edges for edges, _ in drafts])
+        drafts.append((edges, unit, item["undirected"]))
+    doc.sha256 = _hash(labels, drafts)
     need(section["sha256"] == doc.sha256, "the SHA-256 of the modes is another")
     return labels, drafts
 
 
-def _edge(row: list[Any], index: dict[str, int]) -> Edge:
-    need(len(row) in (3, 4), "an edge has not 3 or 4 entries")
-    need(all(isinstance(x, str) and x in index for x in row[:2]), "an edge of an unknown node")
-    least, largest = exact(row[2]), exact(row[-1])
-    need(len(row) == 3 or least < largest, "the least weight of an edge is not below the largest")
-    need(least >= 0 or largest <= 0, "an edge without a sign")
-    need(bool(least or largest), "an edge of weight 0")
-    need(row[0] != row[1], "an edge of a node to itself")
-    sign = 1 if largest > 0 else -1
-    return index[row[0]], index[row[1]], sign, min(abs(least), abs(largest)), max(abs(least), abs(largest))
+def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[list[Edge], int]:
+    """Return the edges of a mode, and what divides their sizes."""
+    least: Numbers
+    largest: Numbers
+    if isinstance(section, dict):
+        section = fields(section, ("count", "source", "target", "least", "largest"), "edges")
+        count = section["count"]
+        need(type(count) is int and 0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
+        need(keeps((EDGE_BYTES[0] + EDGE_BYTES[1]) * count), TOO_LARGE)
+        need(all(beside(section[key]) for key in section if key != "count"), "edges: not in side files")
+        source, target = (doc.files.integers(section[key], key, count) for key in ("source", "target"))
+        need(all(0 <= v < len(index) for end in (source, target) for v in end), "an edge of an unknown node")
+        least, largest = (doc.files.numbers(section[key], key, count) for key in ("least", "largest"))
+    else:
+        need(keeps(EDGE_BYTES[1] * len(entries(section, "edges"))), TOO_LARGE)
+        rows = [entries(row, "an edge") for row in section]
+        need(all(len(row) in (3, 4) for row in rows), "an edge has not 3 or 4 entries")
+        need(all(isinstance(x, str) and x in index for row in rows for x in row[:2]), "an edge of an unknown node")
+        source, target = ([index[row[k]] for row in rows] for k in (0, 1))
+        least, largest = (Numbers([exact(row[k]) for row in rows]) for k in (2, -1))
+        apart = all(len(row) == 3 or x < y for row, x, y in zip(rows, least, largest, strict=True))
+        need(apart, "the least weight of an edge is not below the largest")
+    (lows, highs), unit = _over_one_unit(least, largest)
+    need(all(low <= high for low, high in zip(lows, highs, strict=True)), "the least weight of an edge is the larger")
+    need(all(low >= 0 or high <= 0 for low, high in zip(lows, highs, strict=True)), "an edge without a sign")
+    need(all(low or high for low, high in zip(lows, highs, strict=True)), "an edge of weight 0")
+    need(all(s != t for s, t in zip(source, target, strict=True)), "an edge of a node to itself")
+    columns = zip(source, target, lows, highs, strict=True)
+    return [(s, t, 1, low, high) if high > 0 else (s, t, -1, -high, -low) for s, t, low, high in columns], unit
+
+
+def _over_one_unit(one: Numbers, other: Numbers) -> tuple[list[list[int]], int]:
+    """Return two vectors as integers over one scale, and that."""
+    parts = [numbers.over(range(len(numbers))) for numbers in (one, other)]
+    (factors,), _ = integers([[Fraction(1, scale) for _, scale in parts]])
+    values = []
+    for factor, (numbers, _) in zip(factors, parts, strict=True):
+        sized(len(numbers), longest(numbers) + factor.bit_length(), "the weights")
+        values.append([factor * x for x in numbers])
+    return values, parts[0][1] * factors[0]
 
 
 def _check_edges(edges: Sequence[Edge], tied: bool) -> None:
@@ -163,13 +210,17 @@ def _check_edges(edges: Sequence[Edge], tied: bool) -> None:
         )
 
 
-def _hash(labels: Sequence[str], modes: Sequence[Sequence[Edge]]) -> str:
+def _hash(labels: Sequence[str], modes: Sequence[tuple[Sequence[Edge], int, bool]]) -> str:
+    """Return the SHA-256 of nodes and modes; of undirected edges it tells if some weight is uncertain."""
     quote = json.JSONEncoder(ensure_ascii=False).encode
     hashed = hashlib.sha256("".join(f"[{quote(x)}]\n" for x in sorted(labels)).encode("utf-8", "surrogatepass"))
-    for number, edges in enumerate(modes):
+    for number, (edges, unit, tied) in enumerate(modes):
         hashed.update(b"{}\n" if number else b"")
+        hashed.update(b'{"undirected": true}\n' if tied and any(low < high for _, _, _, low, high in edges) else b"")
+        spend(2 * len(edges), unit.bit_length(), unit.bit_length(), "the hash of long weights")
         for s, t, sign, low, high in sorted(edges, key=lambda e: (labels[e[0]], labels[e[1]], e[2])):
-            weights = ", ".join(f'"{w}"' for w in dict.fromkeys(sorted((sign * low, sign * high))))
+            ends = dict.fromkeys(sorted((sign * low, sign * high)))
+            weights = ", ".join(f'"{Fraction(w, unit)}"' for w in ends)
             line = f"[{quote(labels[s])}, {quote(labels[t])}, {weights}]\n"
             hashed.update(line.encode("utf-8", "surrogatepass"))
     return hashed.hexdigest()
@@ -210,15 +261,15 @@ def _parts(n: int, modes: Sequence[Mode]) -> list[tuple[list[int], dict[int, int
     for root in range(n):
         if camp[root]:
             continue
-        camp[root], found, keeps = 1, [root], True
+        camp[root], found, fit = 1, [root], True
         for v in found:
             for u, sign in near[v]:
                 if not camp[u]:
                     camp[u] = sign * camp[v]
                     found.append(u)
-                keeps &= camp[u] == sign * camp[v]
+                fit &= camp[u] == sign * camp[v]
         found.sort()
-        parts.append((found, {v: camp[v] for v in found} if keeps else None))
+        parts.append((found, {v: camp[v] for v in found} if fit else None))
     return parts
 
 
@@ -253,35 +304,70 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witnes
     dict of int to Row
         The basis; empty if they do not.
     """
-    if isinstance(witness, dict) and "rows" in witness:
-        rows = _basis(doc, modes[0].structure, inside, fields(witness, ("rows",), "a kernel")["rows"])
-        for mode in modes:
-            graph = mode.structure.graph
-            spend(sum(len(graph.row(v)) for v in inside), graph.bits, 64, "rows of kernels")
-            for v in inside:
-                need(not _row_product(graph.row(v), rows), "a column of the kernel is not at rest")
-            for s, t, sign, _, _ in mode.uncertain:
-                agrees = s not in inside or rows[t] == {j: sign * x for j, x in rows[s].items()}
-                need(agrees, "an uncertain edge does not agree with the kernel")
-        return rows
+    if not (isinstance(witness, dict) and "rows" in witness):
+        _check_counterexample(doc, modes, inside, witness)
+        return {}
+    rows = _basis(doc, modes[0].structure, inside, fields(witness, ("rows",), "a kernel")["rows"])
+    whole, _ = _whole(rows)
+    bits = longest(x for row in whole.values() for x in row.values())
+    for mode in modes:
+        graph = mode.structure.graph
+        count = sum(len(whole[u]) for v in inside for u in graph.row(v))
+        spend(count, graph.bits, bits, "rows of kernels")
+        for v in inside:
+            need(not _row_product(graph.row(v), whole), "a column of the kernel is not at rest")
+        for s, t, sign, _, _ in mode.uncertain:
+            agrees = s not in inside or whole[t] == {j: sign * x for j, x in whole[s].items()}
+            need(agrees, "an uncertain edge does not agree with the kernel")
+    return rows
+
+
+def _whole(rows: dict[int, Row]) -> tuple[dict[int, dict[int, int]], int]:
+    """Return rows in integers over one scale, and that."""
+    values, scale = integers([list(row.values()) for row in rows.values()])
+    pairs = zip(rows.items(), values, strict=True)
+    return {v: dict(zip(row, some, strict=True)) for (v, row), some in pairs}, scale
+
+
+def _check_counterexample(doc: Document, modes: Sequence[Mode], inside: set[int], witness: Any) -> None:
+    """Verify that a state is at rest in the mandatory graph of one mode, and moves in a member of another.
+
+    The state is enclosed: of every agent its middle is told, and a radius, which is 0 but for followers. A state at
+    rest with these leaders exists, and lies within the radii if, for all followers ``k``,
+
+        sum_l |w_kl| (radius_k - radius_l)  >=  |sum_l |w_kl| (middle_k - sgn(w_kl) middle_l)|.
+    """
     fields(witness, ("mode", "other", "edge", "state"), "a counterexample")
     numbers = witness["mode"], witness["other"]
     need(all(type(k) is int and 0 <= k < len(modes) for k in numbers), "an unknown mode")
     mode, other = (modes[k] for k in numbers)
-    labels = mode.structure.graph.labels
-    state = {v: {0: x} for v, x in _state(doc, mode.structure.graph, witness["state"]).items()}
-    need(set(state) <= inside, "a state outside the component")
-    state |= {v: {} for v in range(len(labels)) if v not in state}
-    need(not any(_row_product(mode.structure.graph.row(v), state) for v in inside), "the state is not at rest")
-    moved = {v for v in inside if _row_product(other.structure.graph.row(v), state)}
-    if (edge := witness["edge"]) is not None:
-        s, t = positions(doc, other.structure.graph, entries(edge, "an edge", 3)[:2], "an edge")
-        need(edge[2] in (1, -1) and (s, t, sign := int(edge[2])) in {e[:3] for e in other.uncertain}, "a known edge")
-        need(t not in moved, "the listener of the edge moves already")
-        if state[t].get(0, 0) != sign * state[s].get(0, 0):
-            moved.add(t)
-    need(bool(moved), "the state is at rest in both")
-    return {}
+    middle, radius = _state(doc, mode.structure, inside, witness["state"])
+    bits = longest([*middle.values(), *radius.values()])
+    for m in (mode, other):
+        graph = m.structure.graph
+        spend(2 * sum(len(graph.row(v)) for v in inside), graph.bits, bits, "a state at rest")
+    for v in inside:
+        row = mode.structure.graph.row(v)
+        spare = sum(x * radius[u] if u == v else -abs(x) * radius[u] for u, x in row.items())
+        need(abs(_dot(row, middle)) <= spare, "the state is not at rest")
+    if (edge := witness["edge"]) is None:
+        rows = (other.structure.graph.row(v) for v in inside)
+        need(any(_moves(row, middle, radius) for row in rows), "the state is at rest in both")
+        return
+    s, t = positions(doc, other.structure.graph, entries(edge, "an edge", 3)[:2], "an edge")
+    sign = edge[2]
+    need(type(sign) is int and (s, t, sign) in {e[:3] for e in other.uncertain}, "a known edge")
+    need(s in inside and _moves({t: 1, s: -sign}, middle, radius), "the state is at rest in both")
+    # Row t of one of two members differs: with this edge at w-, and at w+.
+
+
+def _dot(row: dict[int, int], values: dict[int, int]) -> int:
+    return sum(x * values[u] for u, x in row.items())
+
+
+def _moves(row: dict[int, int], middle: dict[int, int], radius: dict[int, int]) -> bool:
+    """Tell whether a row times the state is not 0, for all states within the radii."""
+    return abs(_dot(row, middle)) > _dot({u: abs(x) for u, x in row.items()}, radius)
 
 
 def _basis(doc: Document, structure: Structure, inside: set[int], entry: Any) -> dict[int, Row]:
@@ -295,24 +381,32 @@ def _basis(doc: Document, structure: Structure, inside: set[int], entry: Any) ->
     need(isinstance(entry, dict), "rows of a kernel are no object")
     followers = {v for v in inside if structure.number[v] < 0}
     nodes = positions(doc, structure.graph, list(entry), "rows of a kernel")
+    keys = set(map(str, numbers))
     for v, row in zip(nodes, entry.values(), strict=True):
         need(v in followers, "a row of a node that is no follower")
-        need(isinstance(row, dict) and all(key in map(str, numbers) for key in row), "a row of a kernel")
+        need(isinstance(row, dict) and keys.issuperset(row), "a row of a kernel")
         rows[v] = {int(key): value for key, x in row.items() if (value := exact(x))}
     return rows
 
 
-def _state(doc: Document, graph: Digraph, entry: Any) -> dict[int, Fraction]:
+def _state(doc: Document, structure: Structure, inside: set[int], entry: Any) -> tuple[dict[int, int], dict[int, int]]:
+    """Return middles and radii of a state of all agents of a component, over one scale; those not told are 0."""
     if not isinstance(entry, dict):
         raise RejectedError("a state is no object")
-    nodes = positions(doc, graph, list(entry), "a state")
-    return dict(zip(nodes, map(exact, entry.values()), strict=True))
+    nodes = positions(doc, structure.graph, list(entry), "a state")
+    need(set(nodes) <= inside, "a state outside the component")
+    ends = [interval(x) for x in entry.values()]
+    exact_leaders = all(structure.number[v] < 0 or not radius for v, (_, radius) in zip(nodes, ends, strict=True))
+    need(exact_leaders, "the state of a leader is not exact")
+    (middles, radii), _ = integers([[x for x, _ in ends], [r for _, r in ends]])
+    zero = dict.fromkeys(inside, 0)
+    return zero | dict(zip(nodes, middles, strict=True)), zero | dict(zip(nodes, radii, strict=True))
 
 
-def _row_product(row: dict[int, int], rows: dict[int, Row]) -> Row:
+def _row_product(row: dict[int, int], rows: dict[int, dict[int, int]]) -> dict[int, int]:
     """Return a row of ``L B``, without zeros."""
-    total: Row = {}
+    total: dict[int, int] = {}
     for v, weight in row.items():
         for j, x in rows[v].items():
-            total[j] = total.get(j, Fraction(0)) + weight * x
+            total[j] = total.get(j, 0) + weight * x
     return {j: x for j, x in total.items() if x}

@@ -13,10 +13,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Protocol
 
+from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
 from ptcc_certify.checker.family_function import FamilyFunction
 from ptcc_certify.checker.graph import ordered
-from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import Interval, exact, fields, interval, need
 
@@ -48,7 +49,7 @@ def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction
     for V in functions:
         if V.rate <= 0:
             continue
-        value = V.value(x)
+        value = rounded(V.value(x), BITS, up=True)
         bounds = {k: 2 * root_above(c * value) / V.rate for k, c in V.inputs.items()}
         for k, c in V.coordinates.items() if stable else ():
             bounds[k] = min(bounds[k], root_above(c * value))
@@ -77,7 +78,7 @@ def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) ->
     first, least = gains["rho1"] + pole / gains["T"], dict[int, Fraction]()
     for V in functions:
         if V.rate * pole >= 2:
-            value = V.value(x)
+            value = rounded(V.value(x), BITS, up=True)
             bounds = {k: first * root_above(c * value) for k, c in V.inputs.items()}
             least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
     return least

@@ -7,23 +7,25 @@ make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import mul
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
-from lmi.exact.numbers import integers, sized
+from lmi.exact.definite import Arithmetic
+from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Edge, Family
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.checker.matrix_products import need_rows
+from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows, times, transposed
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, triangle
 
-Matrix = list[list[Fraction]]
 Vector = dict[int, Fraction]
+Whole = dict[int, int]
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
 KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates")
@@ -31,21 +33,28 @@ KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coor
 
 @dataclass(frozen=True)
 class Part:
-    """What one uncertain parameter adds to a mode: ``delta f h'``; ``effect`` is ``f`` of the states of all nodes."""
+    """What one uncertain parameter adds to a mode: ``delta f h'``; ``effect`` is ``f`` of the states of all nodes.
 
-    f: Vector
-    h: Vector
-    effect: Vector
-    radius: Fraction
+    In integers: ``f`` over the scale of the kernel, ``|delta| <= radius`` over twice the unit of the mode.
+    """
+
+    f: Whole
+    h: Whole
+    effect: Whole
+    radius: int
 
 
 @dataclass(frozen=True)
 class QuotientMode:
-    """One mode: ``A_0`` and ``L_0 C^r`` by rows, at the middles of all weights, and the uncertain parts."""
+    """One mode: ``A_0`` and ``L_0 C^r`` by rows, at the middles of all weights, and the uncertain parts.
 
-    center: list[Vector]
-    rows: dict[int, Vector]
+    In integers: ``A_0`` over ``unit`` times the scale of the kernel, ``L_0 C^r`` over ``unit``.
+    """
+
+    center: list[Whole]
+    rows: dict[int, Whole]
     parts: list[Part]
+    unit: int
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,9 @@ class FamilyFunction:
     component : Component
     nodes : list of int
     matrix : Matrix
+        ``P`` in integers,
+    scale : int
+        over this.
     rate : Fraction
     inputs : dict of int to Fraction
         ``|(L X)_k|^2 <= inputs[k] V`` for every member.
@@ -67,16 +79,22 @@ class FamilyFunction:
     component: Component
     nodes: list[int]
     matrix: Matrix
+    scale: int
     rate: Fraction
     inputs: Vector
     coordinates: Vector
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
-        kernel, pivots = self.component.kernel, self.component.pivots
-        xi = [x[v] - sum((b * x[pivots[j]] for j, b in kernel[v].items()), Fraction(0)) for v in self.nodes]
-        rows = zip(xi, self.matrix, strict=True)
-        return sum((y * sum(map(Fraction.__mul__, row, xi), Fraction(0)) for y, row in rows), Fraction(0))
+        (kernel, unit), pivots = self.component.whole, self.component.pivots
+        (whole,), scale = integers([[x[v] for v in (*self.nodes, *pivots.values())]])
+        own, rest = whole[: len(self.nodes)], dict(zip(pivots, whole[len(self.nodes) :], strict=True))
+        bits = longest(b for v in self.nodes for b in kernel[v].values())
+        spend(sum(len(kernel[v]) for v in self.nodes), longest(whole), bits, "a Lyapunov function")
+        xi = [unit * y - sum(b * rest[j] for j, b in kernel[v].items()) for v, y in zip(self.nodes, own, strict=True)]
+        spend(len(xi) ** 2, longest(xi), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
+        total = sum(y * sum(map(mul, row, xi)) for y, row in zip(xi, self.matrix, strict=True))
+        return Fraction(total, self.scale * (unit * scale) ** 2)
 
 
 def check_family_functions(doc: Document, family: Family) -> list[FamilyFunction]:
@@ -100,12 +118,14 @@ def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunct
     pivots = set(component.pivots.values())
     need(nodes == [v for v in component.nodes if v not in pivots] and bool(nodes), "nodes of a function")
     need_rows(len(nodes))
-    P, rate = triangle(entry["lower_triangle"], len(nodes)), exact(entry["rate"])
+    (P, scale), rate = integers(triangle(entry["lower_triangle"], len(nodes))), exact(entry["rate"])
+    need(doc.exact.definite(P), "P is not proved definite")
     rates = []
-    modes = [_quotient(family, k, component, nodes) for k in range(len(family.modes))]
-    for k, mode in enumerate(modes):
+    modes = []
+    for k in range(len(family.modes)):
         numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
-        _decreases(doc, mode, P, numbers["b"], numbers["witness"])
+        modes.append(_quotient(family, k, component, nodes))
+        _decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
         rates.append(numbers["b"])
         doc.done(f"b = {down(numbers['b'])}")
     need(min(rates) == rate, "the rate is not the least of the modes'")
@@ -115,9 +135,9 @@ def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunct
     inputs = dict(zip(own, map(exact, ordered(list(own.values()), entry["inputs"], "inputs").values()), strict=True))
     some = [labels[v] for v in nodes]
     coordinates = dict(zip(nodes, map(exact, ordered(some, entry["coordinates"], "coordinates").values()), strict=True))
-    _constants(doc, modes, P, inputs, coordinates)
+    _constants(doc.exact, modes, (P, scale), inputs, coordinates)
     doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates")
-    return FamilyFunction(component, nodes, P, rate, inputs, coordinates)
+    return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates)
 
 
 # ---------------------------------------------------------------------- the quotient
@@ -126,133 +146,168 @@ def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunct
 def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
     mode, place, inside = family.modes[number], {v: i for i, v in enumerate(nodes)}, set(component.nodes)
-    rows: dict[int, Vector] = {v: {} for v in component.nodes}
-    parts = []
-    for edge in mode.edges:
-        s, t, sign, low, high = edge
-        if t not in inside:
-            continue
-        middle = (low + high) / 2
-        for v, weight in ((t, middle), (s, -sign * middle)):
+    kernel, scale = component.whole
+    edges = [edge for edge in mode.edges if edge[1] in inside]
+    rows: dict[int, Whole] = {v: {} for v in component.nodes}
+    for s, t, sign, low, high in edges:
+        for v, weight in ((t, low + high), (s, -sign * (low + high))):
             if v in place:
-                rows[t][place[v]] = rows[t].get(place[v], Fraction(0)) + weight
-        if low < high and not (mode.tied and s > t):
-            parts.append(_part(component, place, edge, mode.tied))
-    spend(len(nodes) * sum(map(len, rows.values())), 64, 64, "rows of a quotient")
-    return QuotientMode([_projected(component, v, rows) for v in nodes], rows, parts)
+                rows[t][place[v]] = rows[t].get(place[v], 0) + weight
+    uncertain = [edge for edge in edges if edge[3] < edge[4] and not (mode.tied and edge[0] > edge[1])]
+    columns = _columns(component, nodes, place)
+    sized(sum(len(columns[v]) for edge in uncertain for v in edge[:2]), 64, "the uncertain weights of a family")
+    parts = [_part(columns, place, edge, mode.tied) for edge in uncertain]
+    bits = longest(x for row in rows.values() for x in row.values())
+    own = longest(b for v in nodes for b in kernel[v].values()) + scale.bit_length()
+    pulls = sum(len(rows[component.pivots[j]]) for v in nodes for j in kernel[v])
+    spend(sum(len(rows[v]) for v in nodes) + pulls, bits, own, "a quotient")
+    sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + pulls), bits + own + len(nodes), "a quotient")
+    center = []
+    for v in nodes:
+        total = {i: scale * x for i, x in rows[v].items()}
+        for i, x in _sum(kernel[v], {j: rows[component.pivots[j]] for j in kernel[v]}).items():
+            total[i] = total.get(i, 0) - x
+        center.append({i: x for i, x in total.items() if x})
+    return QuotientMode(center, rows, parts, 2 * mode.unit)
 
 
-def _part(component: Component, place: dict[int, int], edge: Edge, tied: bool) -> Part:
-    s, t, sign, low, high = edge
-    h = {place[v]: Fraction(x) for v, x in ((t, 1), (s, -sign)) if v in place}
-    effect = {t: Fraction(1), **({s: Fraction(-sign)} if tied else {})}
-    columns = {v: {0: x} for v, x in effect.items()}
-    f = {i: x.get(0, Fraction(0)) for v, i in place.items() if (x := _projected(component, v, columns)).get(0)}
-    return Part(f, h, effect, (high - low) / 2)
+def _columns(component: Component, nodes: list[int], place: dict[int, int]) -> dict[int, Whole]:
+    """Return the columns of ``C``, over the scale of the kernel, of all nodes of a component."""
+    kernel, scale = component.whole
+    columns: dict[int, Whole] = {v: {place[v]: scale} if v in place else {} for v in component.nodes}
+    for v in nodes:
+        for j, b in kernel[v].items():
+            columns[component.pivots[j]][place[v]] = -b
+    return columns
 
 
-def _projected(component: Component, v: int, rows: dict[int, Vector]) -> Vector:
-    """Return the row of a node, minus those of the pivots times its row of the kernel."""
-    total = dict(rows.get(v, {}))
-    for j, b in component.kernel[v].items():
-        for i, x in rows.get(component.pivots[j], {}).items():
-            total[i] = total.get(i, Fraction(0)) - b * x
+def _sum(factors: Whole, vectors: Mapping[int, Whole]) -> Whole:
+    """Return the sum of multiples of some vectors."""
+    total: Whole = {}
+    for k, factor in factors.items():
+        for i, x in vectors[k].items():
+            total[i] = total.get(i, 0) + factor * x
     return total
+
+
+def _part(columns: dict[int, Whole], place: dict[int, int], edge: Edge, tied: bool) -> Part:
+    s, t, sign, low, high = edge
+    h = {place[v]: x for v, x in ((t, 1), (s, -sign)) if v in place}
+    effect = {t: 1, **({s: -sign} if tied else {})}
+    f = _sum(effect, columns)
+    return Part({i: x for i, x in f.items() if x}, h, effect, high - low)
 
 
 # ---------------------------------------------------------------------- rates
 
 
-def _decreases(doc: Document, mode: QuotientMode, P: Matrix, b: Fraction, witness: Any) -> None:
-    """Verify ``P > 0`` and ``P A + A'P >= b P`` for all members of a mode.
+def _decreases(
+    judge: Arithmetic, mode: QuotientMode, form: tuple[Matrix, int], kernel_scale: int, b: Fraction, witness: Any
+) -> None:
+    """Verify ``P A + A'P >= b P`` for all members of a mode, ``P > 0``.
 
     With multipliers ``tau > 0``: ``[[P A_0 + A_0'P - b P - H diag(tau) H', P F diag(r)], [.., diag(tau)]] > 0``.
     Without: every ``P f_e`` is a multiple ``c_e >= 0`` of ``h_e``, so that the least weights are the worst.
     """
-    n, zero = len(P), Fraction(0)
-    moves = any(map(bool, mode.center)) or bool(mode.parts)
-    need(doc.exact.definite(integers(P)[0]), "P is not proved definite")
-    if not moves:
+    (P, scale), n, unit = form, len(form[0]), mode.unit * kernel_scale
+    parts = [part for part in mode.parts if part.f and part.h]
+    if not parts and not any(mode.center):
         need(b == 0 and witness is None, "nothing moves in this mode")
         return
-    sized(n * n, 64, "a form of a family")
-    product = [
-        [sum((P[i][k] * row.get(j, zero) for k, row in enumerate(mode.center)), zero) for j in range(n)]
-        for i in range(n)
-    ]
-    S = [[product[i][j] + product[j][i] - b * P[i][j] for j in range(n)] for i in range(n)]
-    pushed = [[sum((row[j] * x for j, x in part.f.items()), zero) for row in P] for part in mode.parts]
-    parts = list(zip(mode.parts, pushed, strict=True))
+    need_rows(n)
+    product = times(judge, P, mode.center, n)
     if witness is None:
-        for part, Pf in parts:
-            c = _multiple(Pf, part.h)
-            for i, x in part.h.items():
-                for j, y in part.h.items():
-                    S[i][j] -= 2 * c * part.radius * x * y
-        need(doc.exact.definite(integers(S)[0]), "not proved definite")
+        slack = _least_weights(P, parts)
+        S = combined("a form of a family", (1, product), (1, transposed(product)), (-2, slack))
+        S = combined("a form of a family", (b.denominator, S), (-b.numerator * unit, P))
+        need(judge.definite(S), "not proved definite")
         return
-    multipliers = [
-        exact(x) for x in entries(fields(witness, ("multipliers",), "the witness")["multipliers"], "multipliers")
-    ]
-    parts = [(part, Pf) for part, Pf in parts if part.f and part.h]
-    need(len(multipliers) == len(parts), "a multiplier for each uncertain parameter")
-    q = len(parts)
+    texts = entries(fields(witness, ("multipliers",), "the witness")["multipliers"], "multipliers", len(parts))
+    q = len(texts)
     need_rows(n + q)
-    for tau, (part, _) in zip(multipliers, parts, strict=True):
-        for i, x in part.h.items():
-            for j, y in part.h.items():
-                S[i][j] -= tau * x * y
-    whole = [[*row, *(part.radius * Pf[i] for part, Pf in parts)] for i, row in enumerate(S)]
-    whole += [
-        [part.radius * x for x in Pf] + [tau if e == k else zero for k in range(q)]
-        for e, (tau, (part, Pf)) in enumerate(zip(multipliers, parts, strict=True))
-    ]
-    need(doc.exact.definite(integers(whole)[0]), "not proved definite")
+    (taus,), common = integers([[exact(x) for x in texts]])
+    pushes = [_push(P, part) for part in parts]
+    diagonal, pulled = [[tau * (e == k) for k in range(q)] for e, tau in enumerate(taus)], _zeros(n)
+    for tau, part in zip(taus, parts, strict=True):
+        _add_square(pulled, tau, part)
+    # Everything times b.denominator * common * scale * unit.
+    p, d = b.as_integer_ratio()
+    low = combined("a form of a family", (d, product), (d, transposed(product)), (-p * unit, P))
+    low = combined("a form of a family", (common, low), (-d * scale * unit, pulled))
+    rounds = [[part.radius * x for x in push] for part, push in zip(parts, pushes, strict=True)]
+    side = combined("a form of a family", (d * common, rounds)) if q else []
+    corner = combined("a form of a family", (d * scale * unit, diagonal)) if q else []
+    whole = [[*row, *(push[i] for push in side)] for i, row in enumerate(low)]
+    whole += [[*push, *row] for push, row in zip(side, corner, strict=True)]
+    need(judge.definite(whole), "not proved definite")
 
 
-def _multiple(Pf: Sequence[Fraction], h: Vector) -> Fraction:
-    """Return ``c`` with ``P f = c h``; refuse any other, and a negative one."""
-    c = next((Pf[i] / x for i, x in h.items()), Fraction(0))
-    need(c >= 0 and all(y == c * h.get(i, 0) for i, y in enumerate(Pf)), "the least weights are not the worst")
-    return c
+def _zeros(n: int) -> Matrix:
+    return [[0] * n for _ in range(n)]
+
+
+def _push(P: Matrix, part: Part) -> list[int]:
+    """Return ``P f``."""
+    bits = longest(max(row, key=abs) for row in P), longest(part.f.values())
+    spend(len(P) * len(part.f), *bits, "the uncertain weights of a family")
+    sized(len(P), sum(bits) + len(P).bit_length())
+    return [sum(row[j] * x for j, x in part.f.items()) for row in P]
+
+
+def _add_square(S: Matrix, factor: int, part: Part) -> None:
+    """Add ``factor h h'``."""
+    for i, x in part.h.items():
+        for j, y in part.h.items():
+            S[i][j] += factor * x * y
+
+
+def _least_weights(P: Matrix, parts: Sequence[Part]) -> Matrix:
+    """Return ``sum_e c_e radius_e h_e h_e'`` where every ``P f_e`` is ``c_e h_e``, ``c_e >= 0``; refuse any other."""
+    S = _zeros(len(P))
+    for part in parts:
+        push = _push(P, part)
+        i, x = next(iter(part.h.items()))
+        c = push[i] * x  # entries of h are 1 and -1
+        agrees = c >= 0 and all(y == c * part.h.get(k, 0) for k, y in enumerate(push))
+        need(agrees, "the least weights are not the worst")
+        _add_square(S, c * part.radius, part)
+    return S
 
 
 # ---------------------------------------------------------------------- constants
 
 
-def _constants(doc: Document, modes: Sequence[QuotientMode], P: Matrix, inputs: Vector, coordinates: Vector) -> None:
+def _constants(
+    judge: Arithmetic, modes: Sequence[QuotientMode], form: tuple[Matrix, int], inputs: Vector, coordinates: Vector
+) -> None:
     """Verify what ``V`` says of inputs and coordinates, for every member of every mode.
 
     ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``, ``y`` the row ``k`` of ``L_0 C^r`` and
     ``|z| = sqrt(z' P^-1 z)``.
     """
-    n = len(P)
-    vectors: dict[tuple[tuple[int, Fraction], ...], int] = {}
+    (P, scale), n = form, len(form[0])
+    vectors: dict[tuple[tuple[int, int], ...], int] = {}
 
-    def number(vector: Vector) -> int:
+    def number(vector: Whole) -> int:
         return vectors.setdefault(tuple(sorted((i, x) for i, x in vector.items() if x)), len(vectors))
 
     sums = []
     for mode in modes:
-        for k, row in mode.rows.items():
-            terms = [(Fraction(1), number(row))]
-            terms += [(part.radius * abs(part.effect[k]), number(part.h)) for part in mode.parts if k in part.effect]
-            sums.append((k, terms))
-    units = [number({i: Fraction(1)}) for i in range(n)]
-    (rows, scale), (whole, unit) = integers(P), integers([_dense(vector, n) for vector in vectors])
-    above = doc.exact.above(rows, whole)
-    need(above is not None, "P is not proved definite")
-    squares = [x * scale / unit**2 for x in above or ()]
+        terms = {k: [(1, number(row))] for k, row in mode.rows.items()}
+        for part in mode.parts:
+            for k in part.effect:
+                terms[k].append((part.radius, number(part.h)))
+        sums += [(k, mode.unit, some) for k, some in terms.items()]
+    units = [number({i: 1}) for i in range(n)]
+    sized(len(vectors) * n, max(64, longest(x for vector in vectors for _, x in vector)), "the inputs of a family")
+    above = judge.above(P, [[vector.get(i, 0) for i in range(n)] for vector in map(dict, vectors)])
+    if above is None:
+        raise RejectedError("P is not proved definite")
+    squares = [x * scale for x in above]
     norms = [root_above(x) if x else Fraction(0) for x in squares]
-    for k, terms in sums:
-        total = sum((factor * norms[place] for factor, place in terms), Fraction(0))
+    spend(sum(len(some) for _, _, some in sums), 128, 2 * max(mode.unit for mode in modes).bit_length())
+    for k, unit, some in sums:
+        total = sum((factor * norms[place] for factor, place in some), Fraction(0)) / unit
         need(total**2 <= inputs[k], "the constant of an input is not proved")
     for (v, c), place in zip(coordinates.items(), units, strict=True):
         need(squares[place] <= c, f"the constant of coordinate {v} is not proved")
-
-
-def _dense(vector: Sequence[tuple[int, Fraction]], n: int) -> list[Fraction]:
-    row = [Fraction(0)] * n
-    for i, x in vector:
-        row[i] = x
-    return row

@@ -27,7 +27,7 @@ _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x
 OF_A_RUN = ("states", "input", "decay")
 
 
-@click.command()
+@click.command(cls=shared.OneGraph)
 @click.argument(
     "graph",
     metavar="CERT|GRAPH",
@@ -83,7 +83,7 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
 
 def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate:
     """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
-    from ptcc_certify.certificate.certificate import read_certificate
+    from ptcc_certify.certificate.certificate import read_graph_certificate
 
     context = click.get_current_context()
     for parameter in context.command.params:
@@ -93,7 +93,7 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
     begins = any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in ("x0", "seed"))
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
-        certificate = read_certificate(path, memory=options["memory"])
+        certificate = read_graph_certificate(path, memory=options["memory"])
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         if what not in OF_A_RUN:

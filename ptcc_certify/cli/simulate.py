@@ -15,7 +15,7 @@ from ptcc_certify.errors import ExitCode, ParameterError
 _TABLES = ("", ".csv", ".txt")
 
 
-@click.command()
+@click.command(cls=shared.OneGraph)
 @shared.graph_argument
 @shared.reading_options
 @shared.protocol_options

@@ -154,6 +154,12 @@ class Mode:
             ends = names[self.source[edge]], names[self.target[edge]]
             yield f"[{', '.join([*ends, *map(json.dumps, weights)])}]"
 
+    def marked_lines(self) -> Iterator[str]:
+        """Yield a line that tells whether uncertain edges are undirected, if so, then those of all edges."""
+        if self.tied and not self.known.all():
+            yield json.dumps({"undirected": True})
+        yield from self.lines()
+
     def __repr__(self) -> str:
         uncertain, optional = int((~self.known).sum()), int(self.optional.sum())
         more = f", {uncertain} uncertain" if uncertain else ""
@@ -225,10 +231,11 @@ class Family(Shown):
 
         Lines of UTF-8, ``\n`` after each: ``[label]`` of every node, sorted; then the modes in their order, a line
         ``{}`` between two, each with the lines of its edges (:meth:`Mode.lines`), numbers as ``p`` or ``p/q`` in lowest
-        terms. That of one graph is the graph's own.
+        terms. Before the edges of a mode that are undirected, some of them uncertain, a line ``{"undirected": true}``:
+        both directions change together. That of one graph is the graph's own.
         """
         nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
-        modes = "{}\n".join("".join(f"{line}\n" for line in mode.lines()) for mode in self.modes)
+        modes = "{}\n".join("".join(f"{line}\n" for line in mode.marked_lines()) for mode in self.modes)
         return hashlib.sha256((nodes + modes).encode("utf-8", "surrogatepass")).hexdigest()
 
     # ------------------------------------------------------------------ constructors
@@ -257,6 +264,9 @@ class Family(Shown):
         >>> Family.from_graph(SignedDigraph.from_edges([("a", "b", 3)])).graph.edges
         (('a', 'b', Fraction(3, 1)),)
         """
+        if not isinstance(graph, SignedDigraph):
+            mend = "ptcc_certify.as_graph and as_family take other forms"
+            raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; {mend}")
         share = read_share(uncertainty)
         tied = bool(graph.read.get("undirected"))
         off = np.zeros(graph.n_edges, dtype=bool)
@@ -300,9 +310,10 @@ class Family(Shown):
         Examples
         --------
         >>> unsure = Family.from_intervals([("a", "b", -1, 2)])
-        >>> unsure, unsure.notes
-        (Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional), ('1 weight of unknown sign was read as two \
-edges that may fail, one of each sign',))
+        >>> unsure
+        Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional)
+        >>> print(unsure.notes[0])
+        1 weight of unknown sign was read as two edges that may fail, one of each sign
         """
         refuse_unknown_orientation(orientation)
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []

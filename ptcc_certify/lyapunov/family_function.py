@@ -21,6 +21,8 @@ from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, inte
 
 #: Significant bits of constants, which are rounded up.
 _CONSTANT_BITS = 53
+#: Room for a check that forms the constants with other roundings.
+_MARGIN = 1 + Fraction(1, 2**40)
 #: Against the entries of a mode: bounds of growth that are tried where a rate is about 0.
 _NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
 
@@ -137,7 +139,7 @@ def prove_mode(mode: QuotientMode, P: Matrix, multipliers: Sequence[Fraction], g
     if mode.at_rest:
         return Fraction(0)
     S, Z = decay_matrices(mode, P, multipliers)
-    return prove_margin_about(S, Z, guess, max(float(abs(x)) for row in mode.center for x in row))
+    return prove_margin_about(S, Z, guess, mode.largest_entry)
 
 
 def prove_margin_about(S: Matrix, Z: Matrix, guess: float, unit: float) -> Fraction | None:
@@ -208,8 +210,8 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
         largest = [max(pair) for pair in zip(largest, sizes, strict=True)]
     return replace(
         function,
-        input_constants=tuple(rounded_up(x * x) for x in largest),
-        coordinate_constants=tuple(rounded_up(squares[vectors[unit]]) for unit in units),
+        input_constants=tuple(rounded_up(x * x * _MARGIN) for x in largest),
+        coordinate_constants=tuple(rounded_up(squares[vectors[unit]] * _MARGIN) for unit in units),
     )
 
 

@@ -28,6 +28,7 @@ import numpy as np
 from lmi.common import UncertainMatrix
 from lmi.dyadic import round_to_bits
 from lmi.search_time import checkpoint
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.family_function import FamilyFunction, rounded_up
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.rate_upper_bound import prove_slow_eigenvalues
@@ -57,7 +58,8 @@ class Member:
     ----------
     mode : int
     levels : tuple of Fraction
-        Of the uncertain parts of the quotient's mode: sizes are ``w- + level (w+ - w-)``.
+        Of the uncertain parts of the quotient's mode: sizes are ``w- + level (w+ - w-)``. Those of two optional edges
+        of opposite signs on one pair of nodes sum to 1 at most; where both are 1/2, it is a convex combination.
     """
 
     mode: int
@@ -109,7 +111,7 @@ class Candidate:
 def prove_family_rate_bound(
     quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0
 ) -> FamilyRateBound | None:
-    """Find and prove an upper bound on the rate for every signal; None if none is proved, or nothing moves.
+    """Find and prove an upper bound on the rate for every signal; None if none is proved, or above 120 rows.
 
     Parameters
     ----------
@@ -128,7 +130,7 @@ def prove_family_rate_bound(
     >>> bound.kind, round(float(bound.value), 2)
     ('word', 1.41)
     """
-    if not quotient.nodes:
+    if not 0 < len(quotient.nodes) <= EXACT_NODES:
         return None
     candidates = rate_bounds(quotient, functions, seed)
     proved: list[FamilyRateBound] = []

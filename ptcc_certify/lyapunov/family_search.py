@@ -21,17 +21,21 @@ import numpy as np
 from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError
-from lmi.search_time import checkpoint, seconds_left, share_of_time
+from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.undirected_family import undirected_function
 
+#: Classes of functions.
+KINDS = ("undirected", "diagonal", "full")
 #: Rows up to which a full matrix, and a diagonal one, is searched.
 FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
 #: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
 _DIAGONAL_SHARE = 0.3
+#: Share of the time of a class for the climb to the largest rate.
+_CLIMB_SHARE = 0.7
 #: Losses of the rate for which a smaller overshoot constant is looked for, unless it is as good as this; and by what
 #: factor it has to be smaller.
 _LOSSES, _GOOD_CONDITION, _WORTH = (1e-3, 0.03, 0.2), 4.0, 0.7
@@ -58,7 +62,10 @@ class FamilySearch:
 
 
 def search_family(
-    quotient: Quotient, kinds: Sequence[str] = ("undirected", "diagonal", "full"), enough: Fraction | None = None
+    quotient: Quotient,
+    kinds: Sequence[str] = KINDS,
+    enough: Fraction | None = None,
+    shares: Sequence[float] | None = None,
 ) -> FamilySearch:
     """Search and prove Lyapunov functions of a family for every signal.
 
@@ -71,6 +78,9 @@ def search_family(
         What to search. ``undirected`` costs one eigenvalue and where it is optimal ends the search.
     enough : Fraction, optional
         A rate that ends the search, such as 0.99 of a proved upper bound.
+    shares : sequence of float, optional
+        Of the clock that each mode is active: the mean of the rates is made large instead of the least one, for
+        families with modes in which not everything decays.
 
     Returns
     -------
@@ -91,6 +101,8 @@ def search_family(
     >>> round(float(best.rate), 2), len(best.rates), float(best.rates[1]) >= float(best.rate)
     (0.96, 2, True)
     """
+    if len(quotient.nodes) > DIAGONAL_ROWS:
+        return FamilySearch(notes=(f"{len(quotient.nodes)} agents are above the {DIAGONAL_ROWS} of the searches",))
     if not quotient.nodes or all(mode.at_rest for mode in quotient.modes):
         return FamilySearch()
     functions: list[FamilyFunction] = []
@@ -99,11 +111,11 @@ def search_family(
     if "undirected" in kinds:
         with share_of_time(1.0, "undirected", cut_off):
             functions += filter(None, [undirected_function(quotient)])
-    if not any(V.optimal for V in functions):
+    if shares is not None or not any(V.optimal for V in functions):
         limited = np.isfinite(seconds_left())
         for kind, rows, share in (("diagonal", DIAGONAL_ROWS, _DIAGONAL_SHARE), ("full", FULL_ROWS, 1.0)):
             if kind not in kinds or (
-                enough is not None and any(_moving_rate(quotient, V) >= enough for V in functions)
+                enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)
             ):
                 continue
             if len(quotient.nodes) > rows:
@@ -111,34 +123,42 @@ def search_family(
                 continue
             with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
                 try:
-                    for function in _common_functions(quotient, kind, notes):
+                    for function in _common_functions(quotient, kind, notes, shares):
                         functions.append(function)
                 except (LMIError, np.linalg.LinAlgError) as error:
                     if type(error).__name__ == "OutOfTime":
                         raise
                     notes.append(f"class {kind}: {error}")
-    functions.sort(key=lambda V: (-_moving_rate(quotient, V), V.overshoot))
+    functions.sort(key=lambda V: (-_worth(quotient, V, shares), V.overshoot))
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
 
 
-def _moving_rate(quotient: Quotient, V: FamilyFunction) -> Fraction:
-    """Return the least rate of the modes in which something moves."""
+def _worth(quotient: Quotient, V: FamilyFunction, shares: Sequence[float] | None) -> Fraction:
+    """Return the mean of the rates over the shares, or the least rate of the modes in which something moves."""
+    if shares is not None:
+        return sum((Fraction(s) * rate for s, rate in zip(shares, V.rates, strict=True)), Fraction(0)) / Fraction(
+            sum(shares)
+        )
     return min(rate for rate, mode in zip(V.rates, quotient.modes, strict=True) if not mode.at_rest)
 
 
-def _common_functions(quotient: Quotient, kind: str, notes: list[str]) -> Iterator[FamilyFunction]:
+def _common_functions(
+    quotient: Quotient, kind: str, notes: list[str], shares: Sequence[float] | None
+) -> Iterator[FamilyFunction]:
     """Yield the function of the largest rate, then slower ones whose overshoot constants are much smaller."""
     moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
     arrays = [quotient.modes[number].array for number in moving]
     with np.errstate(all="ignore"):
-        best = common_lyapunov(arrays, shape=kind)
-        condition = math.inf
+        own = None if shares is None else [shares[number] for number in moving]
+        with time_limit(_CLIMB_SHARE * max(seconds_left(), 0.0)):  # what it has by then is proved in the rest
+            best = common_lyapunov(arrays, shape=kind, shares=own)
+        goal = [best.rate] * len(arrays) if shares is None else best.rates
+        condition, top = math.inf, max(goal)
         for loss in (0.0, *_LOSSES):
-            if condition <= _GOOD_CONDITION or (loss and not best.rate > 0):
+            if condition <= _GOOD_CONDITION or (loss and not top > 0):
                 return
-            certificate = (
-                best if not loss else least_condition(arrays, [best.rate * (1 - loss)] * len(arrays), shape=kind)
-            )
+            wanted = [rate - loss * top for rate in goal]
+            certificate = least_condition(arrays, wanted, shape=kind) if loss else best
             if not certificate.condition < _WORTH * condition:
                 continue
             certificate = best_multipliers(certificate, arrays)

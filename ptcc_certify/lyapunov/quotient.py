@@ -88,6 +88,11 @@ class QuotientMode:
         """Whether nothing moves in this mode: a mode without edges, an outage."""
         return not self.parts and not any(map(any, self.center))
 
+    @property
+    def largest_entry(self) -> float:
+        """The size of the largest entry of ``A_0``."""
+        return max((float(abs(x)) for row in self.center for x in row), default=0.0)
+
     def member(self, levels: Sequence[Fraction]) -> Matrix:
         """Return ``A`` with each uncertain size at ``w- + level (w+ - w-)``, levels in the order of ``parts``."""
         A = [list(row) for row in self.center]

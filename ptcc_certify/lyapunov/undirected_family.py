@@ -33,7 +33,9 @@ Vector = tuple[Fraction, ...]
 
 
 def undirected_function(quotient: Quotient) -> FamilyFunction | None:
-    """Return the function of the module, proved; None without a common left vector, with too many nodes, or at rest.
+    """Return the function of the module, proved; None if no common left vector is found.
+
+    Nor is one tried above 120 nodes, or where nothing moves.
 
     Examples
     --------
@@ -56,7 +58,7 @@ def undirected_function(quotient: Quotient) -> FamilyFunction | None:
         L = mode.mandatory.exact_laplacian()
         S = [[p[i] * L[i][j] + p[j] * L[j][i] for j in quotient.nodes] for i in quotient.nodes]
         guess = _least_eigenvalue(S, P)
-        rate = Fraction(0) if own.at_rest else prove_margin_about(S, P, guess, float(max(map(max, S))))
+        rate = Fraction(0) if own.at_rest else prove_margin_about(S, P, guess, own.largest_entry)
         if rate is None:
             return None
         rates.append(rate)

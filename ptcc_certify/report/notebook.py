@@ -76,8 +76,9 @@ def _structure_page(lines: Iterable[str], structure: Structure) -> str:
 
 def _page(lines: Iterable[str], figure: Any, alt: str) -> str:
     """Return lines, each with a head of ten characters, as a table beside a figure, if there is one."""
+    head = "text-align:left;vertical-align:top;padding-right:0.8em"
     rows = "".join(
-        f'<tr><th scope="row" style="text-align:left;vertical-align:top">{html.escape(line[:_HEAD].strip())}</th>'
+        f'<tr><th scope="row" style="{head}">{html.escape(line[:_HEAD].strip())}</th>'
         f'<td style="text-align:left">{html.escape(line[_HEAD:].strip())}</td></tr>'
         for line in lines
     )

@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_graph_certificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
@@ -92,7 +92,7 @@ def write_report(
     progress = listener(progress)
     progress("independent check")
     try:
-        saved = read_certificate(certificate, memory=memory)
+        saved = read_graph_certificate(certificate, memory=memory)
     except RejectedCertificate as error:
         if suffix == ".tex":
             raise

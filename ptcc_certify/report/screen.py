@@ -17,6 +17,7 @@ from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.family_screen import family_check_lines
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -54,6 +55,8 @@ SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
+#: Columns of a list of nodes on the long screen: twelve lines.
+_LONG_LIST = 12 * TEXT
 
 
 def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
@@ -134,7 +137,9 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
-    if report.accepted and path:
+    if report.accepted and "modes" in document["graph"]:
+        lines = family_check_lines(document)
+    elif report.accepted and path:
         with suppress(PTCCError):
             certificate = Certificate(**read_document(Path(path), document, "", report))
             told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
@@ -182,7 +187,7 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
-    """Tell where the agents end, in two lines if all of them fit there, else the least and the largest state."""
+    """Tell where the agents end, in two lines if all fit there, else how many where, or the least and largest state."""
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
@@ -194,9 +199,12 @@ def _short_final_state(certificate: Certificate) -> Lines:
     listed = value_list(labels, result.states, 2 * TEXT)
     grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
     text = min(listed, grouped, key=columns)
+    cut = ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2
     if len(groups) == 1 < len(labels):
         text = f"every agent at {short_number(result.states[0])}"
-    elif ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2:
+    elif cut and len(groups) == 2:
+        text = " and ".join(f"{len(names):,} agents at {short_number(state)}" for state, names in groups.items())
+    elif cut:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
         text = f"least {least}, largest {most}, of {len(labels):,} agents"
@@ -299,9 +307,11 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
     labels = structure.graph.labels
     followers = [labels[v] for v in structure.followers.tolist()]
     claims = _claim_lines(structure, [component.claim for component in structure.components])
-    told = [("followers", shorten_list(followers))] if followers else []
+    told = [("followers", shorten_list(followers, _LONG_LIST))] if followers else []
     facts = [("nodes", shorten_list(labels)), ("structure", structure_text(structure))]
-    return format_lines([*_graph_lines(structure, name), *facts, *leader_lines(structure, 4), *told, *claims])
+    return format_lines(
+        [*_graph_lines(structure, name), *facts, *leader_lines(structure, 4, _LONG_LIST), *told, *claims]
+    )
 
 
 def certificate_lines(
@@ -352,13 +362,14 @@ def _final_state_lines(certificate: Certificate) -> Lines:
         yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
 
 
-def _accuracy(result: FinalState, rounded: str = "exact; here to 5 digits") -> str:
-    """Tell how exactly a final state is known, and of exact ones whether they are written with fewer digits."""
+def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and whether it is written with fewer digits."""
     if result.radius is None and not result.exact:
         return "floating point"
+    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
     if widest := max(result.radius or (0,)):
-        return f"to within {up(widest, 2)}, proved"
-    return rounded if any(Fraction(short_number(x)) != x for x in result.states[:100]) else "exact"
+        return f"to within {up(widest, 2)}, proved" + f"; {rounded}" * cut
+    return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
 
 
 def _rate_lines(certificate: Certificate) -> Lines:

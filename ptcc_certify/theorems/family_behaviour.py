@@ -19,10 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.io import as_family
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
@@ -77,10 +81,10 @@ class Counterexample:
     column : int or None
         The balanced closed component of the first mode at the camps of which the state is, the others being at 0.
     state : tuple of N Fraction, or None
-        The state that moves; None where it takes a solve of too many rows: then edges alone tell that an agent ends in
-        a camp of that component in the first mode, whatever the weights, and does not stay there in the other; or
+        The state that moves; None where it takes a solve of too many rows.
     enclosure : StateEnclosure or None
-        an enclosed state does.
+        Then an enclosed state that moves. None also where floats find none: then edges alone tell, for one end of an
+        edge is in a camp of ``column`` for all weights of the first mode, and the other is not.
     off : tuple of int
         Optional edges of ``mode``.
 
@@ -197,7 +201,7 @@ class FamilyComponent:
         return None
 
 
-def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
+def decide(family: Any, signal: str = "any") -> tuple[FamilyComponent, ...]:
     """Decide what every weakly connected component of a family does under every signal.
 
     Stability and bipartite consensus are always decided. Whether a component keeps one kernel of other rows is decided
@@ -208,7 +212,8 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
 
     Parameters
     ----------
-    family : Family
+    family : family-like
+        Whatever :func:`ptcc_certify.as_family` takes.
     signal : {"any", "constant"}
         ``any``: modes and weights change at any instants, arbitrarily often. ``constant``: they are those of one
         member, which is not known. A claim for constant signals does not hold for others.
@@ -220,8 +225,10 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
 
     Raises
     ------
-    ValueError
+    ParameterError
         No signals are called so.
+    GraphError
+        It is no family and no graph.
 
     References
     ----------
@@ -242,7 +249,8 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
     'bipartite consensus'
     """
     if signal not in SIGNALS:
-        raise ValueError(f'signals are "any" or "constant", not "{signal}"')
+        raise ParameterError(f'signals are "any" or "constant", not "{shorten(str(signal))}"')
+    family = as_family(family)
     n = family.n_nodes
     source, target, _ = family.union
     result = []
@@ -310,9 +318,9 @@ def moving_rest_state(family: Family, kernel: Kernel) -> Counterexample | None:
         try:
             # An edge tells only where the mandatory graph of its mode leaves the state at rest.
             if answer := first_answer(kernel, rows) or first_answer(kernel, edges):
-                edge, column = answer
-                enclosure = kernel.enclosure if column is None else None
+                edge, column, question = answer
                 state = None if column is None else kernel.column(column)
+                enclosure = kernel.enclosure if state is None and kernel.moves_enclosed(question) else None
                 return Counterexample(MOVING, 0, number, edge=edge, column=column, state=state, enclosure=enclosure)
         except TooLarge:
             unknown = True

@@ -153,11 +153,11 @@ class Kernel:
                 result[abs(number)] = result.get(abs(number), Fraction(0)) + (a if number > 0 else -a)
         return {c: b for c, b in result.items() if b}
 
-    def _reduced(self, node: int, row: dict[int, Fraction]) -> Combination:
+    def _reduced(self, node: int, row: dict[int, Fraction], own_row: dict[int, Fraction]) -> Combination:
         """Return row ``node`` of another ``L B`` as a combination, less a multiple of the kernel's own, which is 0."""
         result, c = self.combination(row), abs(int(self.numbers[node]))
         if c in result and c > self.dimension:
-            own = self.combination(self.structure.graph.exact_rows([node])[0])
+            own = self.combination(own_row)
             if c in own:
                 share = result[c] / own[c]
                 result = {x: result.get(x, 0) - share * own.get(x, 0) for x in result.keys() | own.keys()}
@@ -187,17 +187,28 @@ class Kernel:
                 yield edge, self.combination({k: Fraction(1), one: Fraction(-int(sign[edge]))})
 
     def row_questions(self, graph: SignedDigraph) -> Iterator[Combination]:
-        """Yield rows of ``L B`` of another graph that may not be 0."""
+        """Yield rows of ``L B`` of another graph that may not be 0.
+
+        First come those of agents whose rows of ``B`` edges alone tell.
+        """
         ends, heard = self.codes[graph.target], self.codes[graph.source]
         # Where all edges of a row agree with B, its sum is 0.
         agree = (ends != UNKNOWN) & (ends == graph.sign * np.where(heard == UNKNOWN, 0, heard))
-        suspects = np.unique(graph.target[~agree])
-        if suspects.size:
-            also = self.numbers[graph.target] == graph.sign * self.numbers[graph.source]
-            suspects = np.unique(graph.target[~(agree | also)])
-        for node, row in zip(suspects.tolist(), graph.exact_rows(suspects.tolist()), strict=True):
-            if question := self._reduced(node, row):
-                yield question
+        suspects = np.zeros(graph.n_nodes, dtype=bool)
+        suspects[graph.target[~agree]] = True
+        if suspects.any():
+            suspects &= ~_proportional_rows(self.structure.graph, graph)
+        if suspects.any():
+            agree |= self.numbers[graph.target] == graph.sign * self.numbers[graph.source]
+            spoiled = np.zeros_like(suspects)
+            spoiled[graph.target[~agree]] = True
+            suspects &= spoiled
+        told = suspects & (self.codes != UNKNOWN)
+        for some in (np.flatnonzero(told).tolist(), np.flatnonzero(suspects & ~told).tolist()):
+            rows = graph.exact_rows(some), self.structure.graph.exact_rows(some)
+            for node, row, own_row in zip(some, *rows, strict=True):
+                if question := self._reduced(node, row, own_row):
+                    yield question
 
     def told_column(self, question: Combination) -> int | None:
         """Return a column in which a combination is not 0 by the edges alone; None if these do not tell."""
@@ -284,6 +295,22 @@ def _number_rows(graph: SignedDigraph, codes: np.ndarray, dimension: int) -> np.
             return numbers
         alone[edges[1][spoiled]] = True
     return np.where(unknown, own, codes)
+
+
+def _proportional_rows(graph: SignedDigraph, other: SignedDigraph) -> np.ndarray:
+    """(n,) bool array: agents who hear the same agents in both graphs, with the same signs and in the same shares."""
+    n = graph.n_nodes
+    alike = np.zeros(n, dtype=bool)
+    degrees = [np.bincount(g.target, minlength=n) for g in (graph, other)]
+    alike[(degrees[0] == degrees[1]) & (degrees[0] > 0)] = True
+    edges = [np.flatnonzero(alike[g.target]) for g in (graph, other)]  # in one order, by target and source
+    target = graph.target[edges[0]]
+    same = (graph.source[edges[0]] == other.source[edges[1]]) & (graph.sign[edges[0]] == other.sign[edges[1]])
+    first = np.searchsorted(target, target)
+    sizes = [_exact_sizes(g, some) for g, some in zip((graph, other), edges, strict=True)]
+    same &= np.asarray(sizes[0] * sizes[1][first] == sizes[1] * sizes[0][first], dtype=bool)
+    alike[target[~same]] = False
+    return alike
 
 
 def spread(codes: np.ndarray, source: np.ndarray, target: np.ndarray, sign: np.ndarray) -> np.ndarray:
@@ -403,7 +430,9 @@ def _propose(
     return (results[0], results[1]) if all(np.isfinite(r).all() for r in results) else None
 
 
-def first_answer(kernel: Kernel, questions: Iterable[tuple[Any, Combination]]) -> tuple[Any, int | None] | None:
+def first_answer(
+    kernel: Kernel, questions: Iterable[tuple[Any, Combination]]
+) -> tuple[Any, int | None, Combination] | None:
     """Return the first question that the edges, an exact solve or an enclosure answers with "not 0".
 
     Parameters
@@ -413,8 +442,8 @@ def first_answer(kernel: Kernel, questions: Iterable[tuple[Any, Combination]]) -
 
     Returns
     -------
-    (name, column) or None
-        ``column`` of the basis tells; None if it is the enclosed state. None instead of a pair: all are 0.
+    (name, column, combination) or None
+        ``column`` of the basis tells; None if it is the enclosed state. None instead of all: all are 0.
 
     Raises
     ------
@@ -426,15 +455,15 @@ def first_answer(kernel: Kernel, questions: Iterable[tuple[Any, Combination]]) -
         if not question:
             continue
         if (column := kernel.told_column(question)) is not None:
-            return name, column
+            return name, column, question
         open_questions.append((name, question))
     try:
         for name, question in open_questions:
             if (column := kernel.solved_column(question)) is not None:
-                return name, column
+                return name, column, question
     except TooLarge:
         for name, question in open_questions:
             if kernel.moves_enclosed(question):
-                return name, None
+                return name, None, question
         raise
     return None

@@ -11,6 +11,7 @@ from common_kernel_families import KINDS, random_family
 from scipy.linalg import expm
 
 import lmi
+import lmi.common
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -63,7 +64,7 @@ def certified(request):
         family = unsure_pair()
     else:
         rng = np.random.default_rng(KINDS.index(request.param))
-        family = random_family(rng, request.param, 5, 2, TENTH, 0.3)
+        family = random_family(rng, request.param, 4, 2, TENTH, 0.3)
     quotient = Quotient.of(decide(family)[0])
     functions = search_family(quotient).functions
     return quotient, functions, prove_family_rate_bound(quotient, functions)
@@ -167,6 +168,16 @@ def test_an_outage_keeps_v_and_the_other_modes_let_it_fall():
     assert best.rate == 0 and best.deviation_constants is None
 
 
+def test_a_mode_without_decay_may_be_given_a_share_of_the_clock():
+    full = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "a", 1), ("c", "d", 2)])
+    part = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)], nodes="abcd")
+    quotient = Quotient(Family.switching([full, part]))
+    equal, shared = (search_family(quotient, ["full"], shares=s).functions for s in (None, [0.5, 0.5]))
+    assert all(V.rates[1] <= 0 for V in (*equal, *shared))
+    # The spectral rate of the full mode is 3; the other costs little.
+    assert sum(shared[0].rates) > Fraction(29, 10) > sum(equal[0].rates)
+
+
 def test_where_all_is_at_rest_there_is_nothing_to_prove():
     quotient = Quotient(Family.from_intervals([], nodes=["a"]))
     assert search_family(quotient).functions == () and prove_family_rate_bound(quotient) is None
@@ -187,6 +198,30 @@ def test_a_time_limit_leaves_what_was_proved_before():
     with lmi.time_limit(0):
         search = search_family(quotient)
     assert search.functions == () and search.cut_off == ("class diagonal", "class full")
+
+
+def test_what_was_climbed_to_before_a_time_limit_is_proved():
+    quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 5, 2, TENTH))
+    real, calls = lmi.common._Search._step, []
+
+    def slow_after_the_first(*step):
+        calls.append(1)
+        if len(calls) > 1:
+            raise lmi.OutOfTime("the time limit is reached")
+        return real(*step)
+
+    with pytest.MonkeyPatch.context() as patch, lmi.time_limit(300):
+        patch.setattr(lmi.common._Search, "_step", slow_after_the_first)
+        patch.setattr(lmi.common._Search, "nominal_start", lambda self: None)
+        search = search_family(quotient, ["full"])
+    assert search.functions and len(calls) == 2
+
+
+def test_large_families_are_left_to_others():
+    path = Family.from_intervals([(k, k + 1, 1, 2) for k in range(300)])
+    search = search_family(Quotient(path))
+    assert search.functions == () and "300 agents" in search.notes[0]
+    assert prove_family_rate_bound(Quotient(path)) is None
 
 
 def test_enough_ends_the_search():

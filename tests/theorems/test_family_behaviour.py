@@ -234,6 +234,14 @@ def test_an_undirected_edge_of_unknown_sign_keeps_camps_unless_something_else_jo
     assert decide(Family.from_intervals([*pair, ("b", "a", -1, 1)]), "constant")[0].behaviour == DEPENDS
 
 
+@pytest.mark.parametrize("least", [1, -2])
+def test_of_an_edge_of_unknown_sign_the_one_that_breaks_the_camps_is_taken(least):
+    family = Family.from_intervals([("a", "b", least, least + 1), ("b", "a", -1, 1)])
+    component = decide(family, "constant")[0]
+    assert component.behaviour == DEPENDS
+    assert replay(component, component.counterexample)
+
+
 def test_signals_of_another_name_are_refused():
     with pytest.raises(ValueError, match="slow"):
         decide(Family.from_intervals([("a", "b", 1, 2)]), "slow")

@@ -1,0 +1,223 @@
+"""Boxes that attract followers under every signal, where what they follow may move in known intervals.
+
+Let the agents outside ``F`` stay in ``[l_j, u_j]`` from the beginning, and nobody outside hears one of ``F``. With
+``y_l = u_l`` for ``w > 0`` and ``-l_l`` for ``w < 0``, let ``u`` and ``-l`` on ``F`` satisfy, in every mode,
+
+    sum_l |w_kl| (u_k - y_l)  >=  0        at w+ where y_l > u_k, at w- elsewhere,
+
+and the mirror image for ``-l``, and let ``d``, ``alpha`` be those of :mod:`ptcc_certify.lyapunov.family_rows`. Then
+
+    rho = max_k max(0, (x_k - u_k) / d_k, (l_k - x_k) / d_k)    decays with e^(-alpha s) for every signal:
+
+at the largest, ``x_l <= u_l + rho d_l`` and ``x_l >= l_l - rho d_l``; add both conditions of its row. Policy iteration
+finds the smallest such box: solve for ``u``, take the worst weights, again until they stand. If some rows fail by a
+little, ``u + e d`` repairs them, since every row of ``d`` is at least ``alpha d_k``.
+
+References
+----------
+docs/theory/families.md, "Where it ends".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import frexp
+
+import numpy as np
+
+from lmi.sparse_h_matrix import solve
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.structure import find_camps, weak_components
+from ptcc_certify.lyapunov.family_rows import FollowerDecay, least_rate
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
+
+_ROUNDS = 60
+#: Binary places of the ends, against the largest of them.
+_BITS = 50
+#: Further places of a box that was repaired.
+_PLACES = 70
+#: Relative accuracy of a solve.
+_RESIDUAL = 1e-12
+Interval = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, eq=False)
+class AttractingBox:
+    """A box to which followers come under every signal: ``rho(s) <= e^(-decay.rate s) rho(0)``, see the module.
+
+    Attributes
+    ----------
+    decay : FollowerDecay
+        ``nodes``, ``d`` and ``alpha``.
+    lower, upper : tuple of n Fraction
+    attained : tuple of two tuples of n Fraction, or None
+        Some constant weights, with all agents outside at one of their ends, take agent ``k`` to at most the first and
+        at least the second. None where modes, weights that change together, or edges that keep no camps leave open how
+        much of the box is needed.
+    """
+
+    decay: FollowerDecay
+    lower: tuple[Fraction, ...]
+    upper: tuple[Fraction, ...]
+    attained: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None = None
+
+    def excess(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``rho`` of the states of all agents; ``d`` in integers as in ``decay``.
+
+        Examples
+        --------
+        >>> from ptcc_certify.lyapunov.family_rows import follower_decay
+        >>> family = Family.from_intervals([("a", "b", 1, 2)])
+        >>> box = attracting_box(family, follower_decay(family), {0: (Fraction(0), Fraction(1))})
+        >>> box.upper[0] >= 1, float(box.excess([Fraction(0), box.upper[0] + 3 * int(box.decay.vector[0])]))
+        (True, 3.0)
+        """
+        rows = zip(self.decay.nodes.tolist(), self.decay.vector.tolist(), self.lower, self.upper, strict=True)
+        return max(max(Fraction(0), (x[k] - high) / d, (low - x[k]) / d) for k, d, low, high in rows)
+
+
+def invariant_intervals(family: Family, followers: np.ndarray, x0: Sequence[Fraction]) -> dict[int, Interval]:
+    """Return intervals that the agents that are no followers never leave, under any signal.
+
+    Of a part that hears nobody else and whose edges keep camps ``g``, these are ``g`` times the range of ``g X(0)``;
+    of another part, plus and minus its largest ``|x_k(0)|``. Limits, or narrower intervals about them, are not
+    invariant, and a box that is built on them attracts nobody at once.
+
+    Parameters
+    ----------
+    family : Family
+    followers : (n,) int array
+        Nobody else hears them.
+    x0 : sequence of N Fraction
+
+    Examples
+    --------
+    >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "c", 1, 2)])
+    >>> ends = invariant_intervals(family, np.array([2]), [Fraction(1), Fraction(2), Fraction(9)])
+    >>> {k: tuple(map(str, pair)) for k, pair in ends.items()}
+    {0: ('-2', '1'), 1: ('-1', '2')}
+    """
+    rest = np.setdiff1d(np.arange(family.n_nodes), followers)
+    if not rest.size:
+        return {}
+    part = family.restricted(rest)
+    source, target, sign = part.union
+    camps, violated, _ = find_camps(rest.size, source, target, sign)
+    spoiled = np.zeros(rest.size, dtype=bool)
+    spoiled[target[violated]] = True
+    result = {}
+    for own in weak_components(rest.size, source, target):
+        values = [int(camps[v]) * Fraction(x0[int(rest[v])]) for v in own.tolist()]
+        low, high = min(values), max(values)
+        if spoiled[own].any():
+            low, high = -max(-low, high), max(-low, high)
+        for v in own.tolist():
+            result[int(rest[v])] = (low, high) if camps[v] > 0 else (-high, -low)
+    return dict(sorted(result.items()))
+
+
+def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, Interval]) -> AttractingBox:
+    """Return the smallest box of the module's kind, proved row by row in integers.
+
+    Parameters
+    ----------
+    family : Family
+    decay : FollowerDecay
+        Of the followers.
+    intervals : dict of int to (Fraction, Fraction)
+        Of all other agents, which they never leave; see :func:`invariant_intervals`.
+
+    Returns
+    -------
+    AttractingBox
+
+    Examples
+    --------
+    >>> from ptcc_certify.lyapunov.family_rows import follower_decay
+    >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
+    >>> ends = {0: (Fraction(0), Fraction(0)), 1: (Fraction(4), Fraction(4))}
+    >>> box = attracting_box(family, follower_decay(family), ends)
+    >>> round(float(box.lower[0]), 9), round(float(box.upper[0]), 9)
+    (1.0, 2.0)
+    """
+    nodes, d = decay.nodes, decay.vector
+    rows = IntervalRows.of(family.modes, nodes)
+    lifted = rows.lifted()
+    unit, z = _outside(intervals)
+    with np.errstate(all="ignore"):
+        y, policy = _largest(lifted, z)
+    d_twice = np.concatenate([d, d])
+    zeros = np.zeros(lifted.outside, dtype=np.int64).astype(object)
+    rate = least_rate(lifted, d_twice) / rows.unit
+    if rate <= 0:
+        raise ValueError("the vector proves no decay of these followers")
+    # sum |w| (y_k - y_l) + e sum |w| (d_k - d_l) >= 0 with e alpha d_k >= what is missing
+    needed = _missing(lifted.pull(np.concatenate([y, z])), d_twice) / rate
+    upper = _shifted(y, d_twice, needed)
+    if not (lifted.pull(np.concatenate([upper, z * 2**_PLACES])) >= 0).all():
+        raise ArithmeticError("a row of a box fails, against what was proved")
+    fine = unit / 2**_PLACES
+    box = AttractingBox(decay, *_ends(upper, fine))
+    if not _is_attained(family, rows):
+        return box
+    pull = lifted.pull_of(policy, np.concatenate([y, z]))
+    spare = lifted.pull_of(policy, np.concatenate([d_twice.astype(object), zeros]))
+    surplus = _missing(-pull, d_twice) / least_quotient(spare, d_twice)
+    return replace(box, attained=_ends(_shifted(y, d_twice, -surplus), fine))
+
+
+def _ends(y: np.ndarray, unit: Fraction) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+    """Return ``l`` and ``u`` of the lifted rows."""
+    half = y.size // 2
+    values = [int(v) * unit for v in y.tolist()]
+    return tuple(-v for v in values[half:]), tuple(values[:half])
+
+
+def _outside(intervals: dict[int, Interval]) -> tuple[Fraction, np.ndarray]:
+    """Return ends rounded outwards to integers times a unit, ``u`` of all agents before ``-l`` of all."""
+    values = [intervals[k] for k in sorted(intervals)]
+    z = [high for _, high in values] + [-low for low, _ in values]
+    top = max(map(abs, z), default=Fraction(0)) or Fraction(1)
+    unit = Fraction(2) ** (frexp(nearest_float(top))[1] - _BITS)
+    return unit, np.array([-((-x / unit).__floor__()) for x in z], dtype=object)
+
+
+def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
+    """Return ``y`` of the fixed point of the worst weights, in integers, and these weights."""
+    ends = z.astype(float)
+    top = float(np.abs(ends).max(initial=0))
+    y = np.full(lifted.n, max(float(ends.max(initial=0)), 0.0))
+    policy = lifted.worst(np.concatenate([y, ends]))
+    for _ in range(_ROUNDS):
+        M, N = lifted.system(policy)
+        y = np.clip(solve(M, N @ ends, M.diagonal(), _RESIDUAL), -top, top)
+        new = lifted.worst(np.concatenate([y, ends]))
+        if new == policy or not np.isfinite(y).all():
+            break
+        policy = new
+    y = np.where(np.isfinite(y), y, top)
+    return np.array([int(v) for v in np.rint(y).tolist()], dtype=object), policy
+
+
+def _missing(pull: np.ndarray, d: np.ndarray) -> Fraction:
+    """Return the least ``e >= 0`` with ``pull + e d >= 0`` in all rows."""
+    return max(Fraction(0), -least_quotient(pull.ravel(), np.tile(d, pull.size // d.size)))
+
+
+def _shifted(y: np.ndarray, d: np.ndarray, e: Fraction) -> np.ndarray:
+    """Return integers ``2^_PLACES (y + e d)``, ``e`` rounded away from 0."""
+    steps = -((-abs(e) * 2**_PLACES).__floor__())
+    return y.astype(object) * 2**_PLACES + (steps if e > 0 else -steps) * d.astype(object)
+
+
+def _is_attained(family: Family, rows: IntervalRows) -> bool:
+    """Tell whether constant weights attain the box: one mode, independent weights, camps of all edges into it."""
+    if rows.modes > 1:
+        return False
+    if family.modes[0].tied and (rows.lower != rows.upper)[rows.source < rows.n].any():
+        return False
+    _, violated, _ = find_camps(rows.n + rows.outside, rows.source, rows.target, rows.sign)
+    return violated.size == 0

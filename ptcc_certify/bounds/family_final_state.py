@@ -1,0 +1,331 @@
+"""Where a family that comes to bipartite consensus ends: for unknown constant weights exactly, for every signal nearer.
+
+**Constant weights.** Let ``z = G X(0)`` and ``c = eta(w)' z``, ``eta(w)`` the normalised left null vector of ``M(L)``.
+If numbers ``h_k`` satisfy for every node ``k`` of the closed set
+
+    z_k + sum_l |w_kl| (h_l - h_k)  <=  c+        at w+ where h_l > h_k, at w- elsewhere,
+
+then ``c <= c+`` for all weights of the mode: multiply by ``eta_k(w) >= 0`` and add. Policy iteration, which solves for
+``(c, h)`` and takes the worst weights, ends at the maximum, which is so attained. Weights that change may exceed it.
+
+**Every signal.** ``|c - p' G X(0)| <= (kappa / alpha) sqrt(V(0))`` with ``p' 1 = 1``, a common function ``V`` and
+``kappa >= ||p' M(L) G C^r||_(P^-1)`` for every member.
+
+References
+----------
+docs/theory/families.md, "Where it ends".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.dyadic import dyadic_array, round_to_bits
+from lmi.sparse_h_matrix import solve
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import analyse, find_camps
+from ptcc_certify.lyapunov.family_function import FamilyFunction, inverse_forms, root_above, rounded_up
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.family_kernel import reached
+from ptcc_certify.theorems.lemmas import solve_exact
+
+_ROUNDS = 60
+Interval = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, eq=False)
+class FinalValue:
+    """Ends of the consensus value of one mode over all constant weights in its intervals.
+
+    ``x_k(T) = camps_k c`` with ``lower <= c <= upper``.
+
+    Attributes
+    ----------
+    camps : (N,) int8 array
+        The first node +1.
+    nodes : tuple of int
+        The closed set that decides.
+    lower, upper : Fraction
+    reached_lower, reached_upper : Fraction or None
+        Members have a value that is at most, or at least, this: those of ``members``. Equal to the ends where it was
+        proved in rationals. None of weights that change together.
+    members : tuple of two Policy, or None
+        On the rows of ``nodes``.
+    vectors : tuple of two tuples of Fraction
+        ``h`` of the upper end, and of the lower end, which is that of ``-z``.
+    """
+
+    camps: np.ndarray
+    nodes: tuple[int, ...]
+    lower: Fraction
+    upper: Fraction
+    reached_lower: Fraction | None
+    reached_upper: Fraction | None
+    members: tuple[Policy, Policy] | None
+    vectors: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]
+
+    @property
+    def exact(self) -> bool:
+        """Whether constant weights attain both ends."""
+        return self.reached_lower == self.lower and self.reached_upper == self.upper
+
+
+def final_value(mode: Mode, x0: Sequence[Fraction]) -> FinalValue:
+    """Enclose the consensus value of a mode over all constant weights in its intervals.
+
+    Parameters
+    ----------
+    mode : Mode
+        Connected; its edges keep camps, its mandatory graph has one closed component.
+    x0 : sequence of N Fraction
+
+    Returns
+    -------
+    FinalValue
+        Exact up to 120 nodes in the closed set, and for undirected graphs; else the ends are proved, and the members
+        near them.
+
+    Raises
+    ------
+    HypothesisError
+        The mode does not come to bipartite consensus.
+
+    Examples
+    --------
+    >>> pair = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes[0]
+    >>> value = final_value(pair, [Fraction(0), Fraction(6)])
+    >>> value.lower, value.upper, value.exact
+    (Fraction(2, 1), Fraction(3, 1), True)
+    """
+    n = len(mode.labels)
+    camps, violated, _ = find_camps(n, mode.source, mode.target, mode.sign)
+    closed = analyse(mode.mandatory).closed_components
+    if violated.size or len(closed) != 1:
+        raise HypothesisError("the mode does not come to bipartite consensus for all weights in its intervals")
+    nodes = reached(n, mode.target, mode.source, np.array(closed[0].nodes))
+    z = [int(camps[v]) * Fraction(x0[v]) for v in nodes.tolist()]
+    if mode.tied:  # eta = 1 for every member
+        mean = sum(z, Fraction(0)) / len(z)
+        zeros = (Fraction(0),) * len(z)
+        return FinalValue(camps, tuple(nodes.tolist()), mean, mean, mean, mean, None, (zeros, zeros))
+    rows = IntervalRows.of([mode], nodes)
+    root = int(np.searchsorted(nodes, closed[0].nodes[0]))
+    high, least_high, above, most = _largest_value(rows, z, root)
+    low, most_low, below, fewest = _largest_value(rows, [-x for x in z], root)
+    return FinalValue(camps, tuple(nodes.tolist()), -low, high, -most_low, least_high, (fewest, most), (above, below))
+
+
+def constant_final_states(family: Family, x0: Sequence[Fraction]) -> tuple[Interval, ...]:
+    """Return ends of ``x_k(T)`` of every node, under constant weights of any one mode; attained if all values are.
+
+    Raises
+    ------
+    HypothesisError
+        Some mode does not come to bipartite consensus.
+
+    Examples
+    --------
+    >>> pair = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1)])
+    >>> [tuple(map(str, ends)) for ends in constant_final_states(pair, [Fraction(0), Fraction(6)])]
+    [('-3', '-2'), ('2', '3')]
+    """
+    values = [final_value(mode, x0) for mode in family.modes]
+    ends = [
+        [(v.lower, v.upper) if v.camps[k] > 0 else (-v.upper, -v.lower) for v in values] for k in range(family.n_nodes)
+    ]
+    return tuple((min(low for low, _ in one), max(high for _, high in one)) for one in ends)
+
+
+def largest_row(
+    rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction], policy: Policy | None = None
+) -> Fraction:
+    """Return ``max_k z_k + sum_l |w_kl| (h_l - h_k)`` over all weights; with a policy, the least ``k`` at its weights.
+
+    By the left null vector, the value of every member is at most the first; that of the policy is at least the second.
+
+    Examples
+    --------
+    >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes, np.array([0, 1]))
+    >>> str(largest_row(rows, [Fraction(0), Fraction(6)], [Fraction(0), Fraction(3)]))
+    '3'
+    """
+    scale = math.lcm(*(x.denominator for x in h))
+    whole = np.array([x.numerator * (scale // x.denominator) for x in h] + [0] * rows.outside, dtype=object)
+    pull = rows.pull(whole).ravel() if policy is None else rows.pull_of(policy, whole)
+    unit = rows.unit / scale
+    values = (x - unit * p for x, p in zip(z, pull.tolist(), strict=True))
+    return max(values) if policy is None else min(values)
+
+
+# ---------------------------------------------------------------------- policy iteration
+
+
+def _largest_value(
+    rows: IntervalRows, z: list[Fraction], root: int
+) -> tuple[Fraction, Fraction, tuple[Fraction, ...], Policy]:
+    """Return a bound of all values, a value that a member reaches or exceeds, ``h``, and that member."""
+    floats = np.array([nearest_float(x) for x in z])
+    top = float(np.abs(floats).max(initial=0)) or 1.0
+    policy = rows.worst(np.zeros(rows.n))
+    h = np.zeros(rows.n)
+    seen = -np.inf
+    for _ in range(_ROUNDS):
+        h, c = _solve(rows, policy, floats / top, root)
+        new = rows.worst(h)
+        if not np.isfinite(h).all() or new == policy or c <= seen:
+            break
+        seen, policy = c, new
+    if rows.n <= EXACT_NODES:
+        return _largest_exactly(rows, z, root, policy)
+    whole, power = dyadic_array(np.where(np.isfinite(h), h, 0.0) * top)
+    vector = tuple(int(x) * Fraction(2) ** power for x in whole.tolist())
+    bound, value = largest_row(rows, z, vector), largest_row(rows, z, vector, policy)
+    if bound > max(z):
+        bound, vector = max(z), (Fraction(0),) * rows.n
+    return bound, value, vector, policy
+
+
+def _solve(rows: IntervalRows, policy: Policy, z: np.ndarray, root: int) -> tuple[np.ndarray, float]:
+    """Return ``h`` and ``c`` with ``M h + c 1 = z`` and ``h_root = 0``, in floats."""
+    h = np.zeros(rows.n)
+    if rows.n == 1:
+        return h, float(z[0])
+    M, _ = rows.system(policy)
+    rest = np.flatnonzero(np.arange(rows.n) != root)
+    block = M[rest][:, rest]
+    diagonal = block.diagonal()
+    A, B = solve(block, z[rest], diagonal), solve(block, np.ones(rest.size), diagonal)
+    heard = M[[root]][:, rest].toarray()[0]
+    c = float((z[root] - heard @ A) / (1 - heard @ B))
+    h[rest] = A - c * B
+    return h, c
+
+
+def _largest_exactly(
+    rows: IntervalRows, z: list[Fraction], root: int, policy: Policy
+) -> tuple[Fraction, Fraction, tuple[Fraction, ...], Policy]:
+    while True:
+        c, h = _solve_exactly(rows, policy, z, root)
+        bound = largest_row(rows, z, h)
+        if bound == c:
+            return c, c, h, policy
+        heard = np.array([h[j] > h[k] for k, j in zip(rows.target.tolist(), rows.source.tolist(), strict=True)])
+        policy = Policy(policy.mode, heard)
+
+
+def _solve_exactly(
+    rows: IntervalRows, policy: Policy, z: list[Fraction], root: int
+) -> tuple[Fraction, tuple[Fraction, ...]]:
+    n, zero = rows.n, Fraction(0)
+    system = [[zero] * n for _ in range(n)]  # the column of the root is that of c
+    weights = np.where(policy.largest, rows.upper, rows.lower).tolist()
+    for k, j, w in zip(rows.target.tolist(), rows.source.tolist(), weights, strict=True):
+        system[k][k] += w * rows.unit
+        system[k][j] -= w * rows.unit
+    for row in system:
+        row[root] = Fraction(1)
+    solution = solve_exact(system, [[x] for x in z])
+    assert solution is not None, "there is one closed component"
+    h = [row[0] for row in solution]
+    c, h[root] = h[root], zero
+    return c, tuple(h)
+
+
+# ---------------------------------------------------------------------- every signal
+
+
+def weighted_mean_interval(
+    quotient: Quotient,
+    function: FamilyFunction,
+    camps: Sequence[int],
+    x: Sequence[Fraction],
+    p: Sequence[Fraction] | None = None,
+) -> Interval:
+    """Enclose the consensus value ``c`` of every signal about the weighted mean ``p' G X(0)``.
+
+    Parameters
+    ----------
+    quotient : Quotient
+    function : FamilyFunction
+        Of positive rate.
+    camps : sequence of N +1/-1
+    x : sequence of N Fraction
+    p : sequence of N Fraction, optional
+        With the sum 1. By default near to the left null vector at the middles of all intervals, for which the interval
+        is short; the exact one of undirected graphs makes it a point.
+
+    Raises
+    ------
+    HypothesisError
+        The function does not decay, or the sum is not 1.
+
+    Examples
+    --------
+    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> pair = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))[0]
+    >>> quotient, x = Quotient.of(pair), (Fraction(0), Fraction(1))
+    >>> low, high = weighted_mean_interval(quotient, search_family(quotient).functions[0], (1, 1), x)
+    >>> round(float(low), 2), round(float(high), 2)
+    (0.44, 0.56)
+    """
+    if function.rate <= 0:
+        raise HypothesisError("the function has no positive rate for every signal")
+    p = middle_left_vector(quotient.family) if p is None else p
+    if sum(p, Fraction(0)) != 1:
+        raise HypothesisError("the sum of the weights is not 1")
+    signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
+    zero = Fraction(0)
+    vectors, factors = [], []
+    for mode in quotient.modes:
+        row = [
+            sum((s * r for s, r in zip(signed, column, strict=True) if s and r), zero)
+            for column in zip(*mode.rows, strict=True)
+        ]
+        terms = [(Fraction(1), row)]
+        for part in mode.parts:
+            size = abs(sum((signed[k] * sign for k, sign in part.effect.items()), zero))
+            if size:
+                terms.append((part.radius * size, list(part.h)))
+        factors.append([factor for factor, _ in terms])
+        vectors += [vector for _, vector in terms]
+    squares = inverse_forms(function.matrix, vectors)
+    if squares is None:
+        raise HypothesisError("the matrix of the function is not proved definite")
+    norms = iter([root_above(y) for y in squares])
+    kappa = max(sum((factor * next(norms) for factor in own), zero) for own in factors)
+    mean = sum((s * y for s, y in zip(signed, x, strict=True)), zero)
+    reach = 2 * kappa / function.rate * root_above(function.value(quotient.coordinates(x)))
+    reach = rounded_up(reach)
+    return mean - reach, mean + reach
+
+
+def middle_left_vector(family: Family) -> tuple[Fraction, ...]:
+    """Return a short rational vector near to the left null vector of ``M(L)``, all weights in the middle, of sum 1.
+
+    Examples
+    --------
+    >>> middle_left_vector(Family.from_intervals([("a", "b", 1, 3), ("b", "a", 2, 2)]))
+    (Fraction(1, 2), Fraction(1, 2))
+    """
+    n = family.n_nodes
+    M = np.zeros((n, n))
+    for mode in family.modes:
+        weights = (mode.lower.as_float() + mode.upper.as_float()) / 2
+        np.add.at(M, (mode.target, mode.target), weights)
+        np.add.at(M, (mode.target, mode.source), -weights)
+    system = np.vstack([M.T / (np.abs(M).max() or 1.0), np.ones(n)])
+    eta = np.maximum(np.linalg.lstsq(system, np.append(np.zeros(n), 1.0), rcond=None)[0], 0.0)
+    p = [round_to_bits(float(x), 40) if x > 1e-12 else Fraction(0) for x in eta]
+    largest = int(np.argmax(eta))
+    p[largest] += 1 - sum(p, Fraction(0))
+    return tuple(p)

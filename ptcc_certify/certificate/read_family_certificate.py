@@ -1,0 +1,70 @@
+"""Reads a certificate of a family back from a file that the independent check accepts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
+from ptcc_certify.certificate.format import read_protocol
+from ptcc_certify.certificate.format_family import read_family
+from ptcc_certify.certificate.format_vectors import Reader
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.checker.reading import exact, triangle
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
+
+
+def read_family_certificate(source: Source) -> FamilyCertificate:
+    """Return what an accepted file says: family, behaviours, Lyapunov functions and what follows of them.
+
+    The decision is made anew; no upper bound on the rate is taken from the file, which does not prove it.
+    """
+    document = source.document
+    family = read_family(document["graph"], source.path.parent)
+    claims = [document["claim"]] if document["claim"] is not None else [c["claim"] for c in document["components"]]
+    components = [
+        component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])
+        for component, claim in zip(decide(family), claims, strict=True)
+    ]
+    functions: list[list[FamilyFunction]] = [[] for _ in components]
+    for k, section in enumerate(document["lyapunov"]["functions"]):
+        number = section["component"]
+        functions[number].append(_read_function(k, section, components[number], document["proof"]))
+    parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
+    state = Reader(family.labels, source.path.parent).state(document["initial_state"])
+    expectations = _read_expectations(document["unverified"].get("asked"))
+    return FamilyCertificate(family, read_protocol(document["protocol"]), parts, state, expectations, source=source)
+
+
+def _read_expectations(asked: Any) -> Expectations:
+    """Return what was asked, as the file says; nothing if it says what nobody can ask."""
+    try:
+        return Expectations(asked["behaviour"])
+    except (TypeError, LookupError, ParameterError):
+        return Expectations()
+
+
+def _read_function(number: int, section: Mapping[str, Any], component: FamilyComponent, proof: Any) -> FamilyFunction:
+    labels = component.family.labels
+    index = {label: v for v, label in enumerate(labels)}
+    nodes = tuple(index[label] for label in section["nodes"])
+    matrix = triangle(section["lower_triangle"], len(nodes))
+    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"lyapunov.functions[{number}].")]
+    witnesses = [step["witness"] for step in steps if step["witness"] is not None]
+    ends = prove_ends(matrix)
+    assert ends is not None, "the check has proved it definite"
+    return FamilyFunction(
+        section["class"],
+        tuple(v for v in range(len(labels)) if v not in set(nodes)),
+        nodes,
+        matrix,
+        tuple(exact(step["numbers"]["b"]) for step in steps),
+        tuple(tuple(map(exact, witness["multipliers"])) for witness in witnesses),
+        *ends,
+        input_constants=tuple(map(exact, section["inputs"].values())),
+        coordinate_constants=tuple(map(exact, section["coordinates"].values())),
+    )

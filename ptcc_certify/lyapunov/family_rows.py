@@ -1,0 +1,327 @@
+"""The decay of followers of any size under every signal, proved row by row in integers.
+
+Let nobody outside ``F`` hear a node of ``F``. If ``d > 0`` and, for every node ``k`` of ``F``, in every mode,
+
+    sum_(l in F) |w_kl| (d_k - d_l) + sum_(l not in F) |w_kl| d_k  >=  alpha d_k
+
+at the worst weights, ``w+`` where ``d_l > d_k`` and ``w-`` elsewhere, then ``max_k |x_k| / d_k`` decays with
+``e^(-alpha s)`` along ``X_F' = -L_F X_F`` for every signal. With one mode, independent directed weights and camps that
+all edges in ``F`` keep, the largest ``alpha`` is the smallest eigenvalue of ``L_F`` over the box, and constant weights
+attain it: no certificate of any kind proves more.
+
+The search is policy iteration: solve ``(M - t I) d = 1``, take the worst weights for that ``d``, again until they
+stand. Whatever it proposes, integers decide.
+
+References
+----------
+docs/theory/families.md, "Rows". Howard, Dynamic Programming and Markov Processes, 1960.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.dyadic import dyadic_array
+from lmi.exact.elementary_enclosures import rounded
+from lmi.sparse_h_matrix import DIRECT_ROWS, diagonal_factor, solve
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.structure import analyse, find_camps
+from ptcc_certify.lyapunov.dominance import round_array
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
+from ptcc_certify.theorems.family_kernel import reached
+
+#: Rounds of policy iteration, and of the search for the rate.
+_ROUNDS, _TRIALS = 40, 24
+#: Relative distance of the search from the smallest eigenvalue, and at which it ends.
+_NEAR, _TOLERANCE = 1e-6, 1e-3
+#: Inverse iteration ends when its bound gains less than this, relatively.
+_GAIN = 1e-9
+#: Residual of a solve that leaves a witness what it is, over the root of the rows.
+_RESIDUAL = 0.05
+#: Strong components of more than one node in which the slowest member is looked for.
+_COMPONENTS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class FollowerDecay:
+    """``max_k |x_k| / d_k <= e^(-rate s)`` times its first value, along ``X_F' = -L_F X_F``, for every signal.
+
+    Attributes
+    ----------
+    nodes : (n,) int array
+        ``F``, ascending.
+    vector : (n,) array of positive int64 or Python ints
+        ``d``, up to a common factor.
+    rate : Fraction
+        ``alpha`` of the norm, per unit of the clock; that of squared functions is twice this.
+    upper_bound : Fraction or None
+        The smallest eigenvalue of ``L_F`` of the member ``slowest`` is not larger: no certificate proves more. None
+        where modes, weights that change together or edges that keep no camps leave open whether one does.
+    slowest : Policy or None
+        That member.
+    """
+
+    nodes: np.ndarray
+    vector: np.ndarray
+    rate: Fraction
+    upper_bound: Fraction | None = None
+    slowest: Policy | None = None
+
+    @property
+    def overshoot(self) -> Fraction:
+        """``max d / min d``, which multiplies the largest ``|x_k|``."""
+        return Fraction(int(self.vector.max()), int(self.vector.min()))
+
+
+def follower_nodes(family: Family) -> np.ndarray:
+    """Return the nodes of which no closed component of any mandatory graph hears, through any edges; ascending.
+
+    Examples
+    --------
+    >>> follower_nodes(Family.from_intervals([("a", "b", 1, 2), ("b", "c", 0, 1), ("a", "c", 1, 1)])).tolist()
+    [1, 2]
+    """
+    closed = [v for mode in family.modes for c in analyse(mode.mandatory).closed_components for v in c.nodes]
+    source, target, _ = family.union
+    heard = reached(family.n_nodes, target, source, np.unique(np.array(closed, dtype=np.int64)))
+    return np.setdiff1d(np.arange(family.n_nodes), heard)
+
+
+def follower_decay(family: Family, nodes: np.ndarray | None = None, loss: float = _NEAR) -> FollowerDecay | None:
+    """Search and prove the decay of followers.
+
+    Parameters
+    ----------
+    family : Family
+    nodes : (n,) int array, optional
+        ``F``, ascending; nobody outside hears them. By default :func:`follower_nodes`.
+    loss : float
+        Share of the largest rate that is given up, so that ``d`` has a smaller range.
+
+    Returns
+    -------
+    FollowerDecay or None
+        None if there are no followers or rows prove no positive rate.
+
+    Raises
+    ------
+    ValueError
+        A node outside hears one of ``F``.
+
+    References
+    ----------
+    docs/theory/families.md, "Rows".
+
+    Examples
+    --------
+    >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 3, 4), ("c", "b", 1, 2)])
+    >>> decay = follower_decay(chain)
+    >>> round(float(decay.rate), 5), round(float(decay.upper_bound), 5)
+    (0.55051, 0.55051)
+    """
+    return next(follower_decays(family, nodes, [loss]), None)
+
+
+def follower_decays(family: Family, nodes: np.ndarray | None, losses: Iterable[float]) -> Iterator[FollowerDecay]:
+    """Yield the decay of followers for every loss, as :func:`follower_decay`, from one search; nothing if that fails.
+
+    Examples
+    --------
+    >>> chain = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 2)])
+    >>> [(round(float(one.rate), 2), round(float(one.overshoot))) for one in follower_decays(chain, None, [0.01, 0.5])]
+    [(0.99, 101), (0.67, 3)]
+    """
+    nodes = follower_nodes(family) if nodes is None else np.asarray(nodes, dtype=np.int64)
+    source, target, _ = family.union
+    if (np.isin(source, nodes) & ~np.isin(target, nodes)).any():
+        raise ValueError("a node outside the followers hears one of them")
+    rows = IntervalRows.of(family.modes, nodes)
+    with np.errstate(all="ignore"):
+        found = _largest_rate(rows) if nodes.size else None
+        if found is None:
+            return
+        t, policies = found
+        bound = _least_bound(rows, policies) if _is_exact(family, rows, nodes) else {}
+    for loss in losses:
+        with np.errstate(all="ignore"):
+            d, _ = _vector(rows, t * (1 - loss), policies[0])
+        if d is not None and (decay := prove_follower_decay(rows, nodes, d)) is not None:
+            yield replace(decay, **bound)
+
+
+def _least_bound(rows: IntervalRows, policies: Iterable[Policy]) -> dict[str, Any]:
+    best: dict[str, Any] = {}
+    for policy in policies:
+        bound = _rate_of_member(rows, policy)
+        if bound is not None and (not best or bound < best["upper_bound"]):
+            best = {"upper_bound": bound, "slowest": policy}
+    return best
+
+
+def prove_follower_decay(rows: IntervalRows, nodes: np.ndarray, d: np.ndarray) -> FollowerDecay | None:
+    """Prove the rate of a positive vector, rounded to 40 bits: the least quotient of a row and ``d``, in integers.
+
+    None if that is not positive.
+
+    Examples
+    --------
+    >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 2, 5)]).modes, np.array([1]))
+    >>> prove_follower_decay(rows, np.array([1]), np.array([0.3])).rate
+    Fraction(2, 1)
+    """
+    whole, _ = dyadic_array(round_array(d))
+    rate = least_rate(rows, whole)
+    return FollowerDecay(nodes, whole, rounded(rate, 53)) if rate > 0 else None
+
+
+def least_rate(rows: IntervalRows, d: np.ndarray) -> Fraction:
+    """Return the largest ``alpha`` that positive integers ``d`` prove; exact.
+
+    Examples
+    --------
+    >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 2, 5), ("b", "c", 1, 3)]).modes, np.array([1, 2]))
+    >>> least_rate(rows, np.array([1, 2])), least_rate(rows, np.array([2, 1]))
+    (Fraction(1, 2), Fraction(-3, 1))
+    """
+    pull = rows.pull(np.concatenate([d, np.zeros(rows.outside, dtype=np.int64).astype(d.dtype)]))
+    return least_quotient(pull.ravel(), np.tile(d, rows.modes)) * rows.unit
+
+
+# ---------------------------------------------------------------------- search
+
+
+def _extended(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
+    return np.concatenate([d, np.zeros(rows.outside)])
+
+
+def _vector(rows: IntervalRows, t: float, policy: Policy) -> tuple[np.ndarray | None, Policy]:
+    """Return ``d`` that proves a rate above ``t``, or None, and the last policy: refused, its member is slower."""
+    ones = np.ones(rows.n)
+    loose = _RESIDUAL / np.sqrt(rows.n)
+    for _ in range(_ROUNDS):
+        M, _ = rows.system(policy)
+        diagonal = M.diagonal()
+        shifted = M - t * _identity(rows.n)
+        d = solve(shifted, ones, np.maximum(diagonal - t, diagonal * 1e-3 + 1e-300), loose)
+        if not (np.isfinite(d).all() and (d > 0).all() and d.max() < 1e250 * d.min()):
+            return None, policy
+        if (rows.pull(_extended(rows, d)) >= t * d).all():
+            return d, policy
+        new = rows.worst(_extended(rows, d))
+        if new == policy:
+            return None, policy
+        policy = new
+    return None, policy
+
+
+def _identity(n: int) -> Any:
+    from scipy import sparse
+
+    return sparse.eye_array(n, format="csr")
+
+
+def _largest_rate(rows: IntervalRows) -> tuple[float, list[Policy]] | None:
+    """Return a rate just below the largest, and policies of members that are slow; None if none is positive."""
+    policy = rows.worst(_extended(rows, np.ones(rows.n)))
+    low, refused = 0.0, policy
+    for _ in range(_ROUNDS):
+        found = _smallest(rows.system(policy)[0])
+        if found is None:
+            return None
+        high = found[0] * (1 - _NEAR)
+        d, new = _vector(rows, high, policy)
+        if d is not None:
+            low, policy, high = high, new, high * (1 + 3 * _NEAR)
+            break
+        if new == policy:
+            break
+        policy = new
+    # The bound of the eigenvalue of a block that is nearly triangular is far below it: the test itself decides.
+    if low:
+        d, refused = _vector(rows, high, policy)
+        if d is not None:
+            low, high = high, float(rows.system(policy)[0].diagonal().min())
+    for _ in range(_TRIALS):
+        if high <= low * (1 + _TOLERANCE):
+            break
+        t = (low + high) / 2
+        d, new = _vector(rows, t, policy)
+        low, high, policy, refused = (t, high, new, refused) if d is not None else (low, t, policy, new)
+    return (low, [policy, refused]) if low > 0 else None
+
+
+# ---------------------------------------------------------------------- no more
+
+
+def _is_exact(family: Family, rows: IntervalRows, nodes: np.ndarray) -> bool:
+    """Tell whether the slowest member is that of the rows: one mode, independent weights, camps."""
+    if rows.modes > 1:
+        return False
+    inside = rows.source < rows.n
+    if family.modes[0].tied and (rows.lower != rows.upper)[inside].any():
+        return False
+    _, violated, _ = find_camps(nodes.size, rows.source[inside], rows.target[inside], rows.sign[inside])
+    return violated.size == 0
+
+
+def _rate_of_member(rows: IntervalRows, policy: Policy) -> Fraction | None:
+    """Bound the smallest eigenvalue of a member from above, proved: ``max_k (M y)_k / y_k`` over a strong component.
+
+    With ``y = 0`` elsewhere, ``M y <= b y``, and the smallest eigenvalue of ``M`` is at most ``b``.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    M, _ = rows.system(policy)
+    _, strong = connected_components(M, directed=True, connection="strong")
+    size = np.bincount(strong)
+    diagonal = M.diagonal()
+    alone = np.flatnonzero(size[strong] == 1)
+    candidates = [] if not alone.size else [alone[[np.argmin(diagonal[alone])]]]
+    for number in np.argsort(-size)[:_COMPONENTS].tolist():
+        if size[number] > 1:
+            candidates.append(np.flatnonzero(strong == number))
+    best = None
+    for own in candidates:
+        y = np.zeros(rows.n + rows.outside, dtype=object)
+        found = _smallest(M[own][:, own])
+        if found is None:
+            continue
+        y[own] = dyadic_array(round_array(found[1]))[0].astype(object)
+        pull = rows.pull_of(policy, y)[own]
+        bound = -least_quotient(-pull, y[own]) * rows.unit
+        best = bound if best is None or bound < best else best
+    return None if best is None else rounded(best, 53, up=True)
+
+
+def _smallest(M: Any) -> tuple[float, np.ndarray] | None:
+    """Bound the smallest eigenvalue of an M-matrix from below by inverse iteration, in floats, with its last vector.
+
+    Up to ``DIRECT_ROWS`` rows the bound itself shifts the next solve (Noda's iteration). None if no positive bound is
+    found.
+    """
+    diagonal, n = M.diagonal(), M.shape[0]
+    if not (diagonal > 0).all():
+        return None
+    y, best, low = np.ones(n), np.ones(n), 0.0
+    for _ in range(_ROUNDS):
+        try:
+            if n <= DIRECT_ROWS:
+                y = diagonal_factor(M - low * (1 - _GAIN) * _identity(n)).solve(y)
+            else:
+                y = solve(M, y, diagonal)
+        except RuntimeError:  # exactly singular
+            break
+        y = np.abs(y) / np.abs(y).max()
+        if not (y > 0).all():
+            break
+        before, bound = low, float(((M @ y) / y).min())
+        if bound > low:
+            low, best = bound, y
+        if low > 0 and low - before <= _GAIN * low:
+            break
+    return (low, best) if low > 0 else None

@@ -1,0 +1,269 @@
+"""Lyapunov functions of families with followers, of any size: quadratic forms of what leads, rows of what follows.
+
+Of a component with common states at rest, ``F`` follows the agents ``R`` that hear none of ``F``. Parts ``j`` of ``R``
+have functions ``V_j`` of rates ``r_j``, with ``|xi_l| <= sqrt(c_l V_j)``, and ``|(L X)_p| <= sqrt(b_p V_j)`` of their
+pivots ``p``. With ``d > 0``, ``t_j > 0``, ``e_l >= t_j sqrt(c_l)``, ``q_p >= t_j sqrt(b_p)`` (0 of agents at rest) let
+
+    W = max( max_(k in F) |xi_k| / d_k,  max_j sqrt(V_j) / t_j ).
+
+If in every mode, at the worst weights, for all ``k`` in ``F``
+
+    sum_(l in F) |w_kl| (d_k - d_l) + sum_(l in R) |w_kl| (d_k - e_l) - sum_p |B_kp| q_p  >=  gamma d_k
+
+and ``gamma <= r_j / 2``, then ``W <= e^(-gamma s) W(0)`` for every signal: at the largest ``|xi_k| / d_k``, what agent
+``k`` hears is at most ``d_l W`` or ``e_l W``, and its target ``sum_p B_kp x_p`` moves at most that fast. One pass over
+the edges, in integers.
+
+References
+----------
+docs/theory/families.md, "Rows".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from lmi.exact.elementary_enclosures import rounded
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.structure import weak_components
+from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above, rounded_up
+from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
+from ptcc_certify.lyapunov.family_search import search_family
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
+from ptcc_certify.theorems.family_kernel import Kernel, TooLarge
+
+#: Shares of the rate of the followers that the agents they follow may take: the larger, the smaller is ``W(0)``.
+LOSSES = (0.01, 0.3)
+#: Bits of the least ``e``.
+_BITS = 24
+#: Agents of a part of ``R``, beyond which no function is searched for it.
+LARGEST_PART = 120
+
+
+@dataclass(frozen=True, eq=False)
+class LeadingPart:
+    """A part of ``R`` in which something moves.
+
+    Attributes
+    ----------
+    agents : (n,) int array
+        In the component, ascending. Nobody outside is heard.
+    quotient : Quotient
+        Of the family on them; its nodes are numbered within them.
+    function : FamilyFunction
+    times : Fraction
+        ``t``.
+    """
+
+    agents: np.ndarray
+    quotient: Quotient
+    function: FamilyFunction
+    times: Fraction
+
+    @property
+    def bounds(self) -> dict[int, Fraction]:
+        """``t sqrt(c_l)``, rounded up, of the agents that are no pivots, by their numbers in the component."""
+        pairs = zip(self.function.nodes, self.function.coordinate_constants, strict=True)
+        return {int(self.agents[v]): self.times * root_above(c) for v, c in pairs}
+
+    @property
+    def speeds(self) -> dict[int, Fraction]:
+        """``q_p``, rounded up, of the pivots, by their numbers in the component."""
+        constants = self.function.input_constants
+        return {int(self.agents[p]): self.times * root_above(constants[p]) for p in self.quotient.pivots}
+
+
+@dataclass(frozen=True, eq=False)
+class FollowerFunction:
+    """``W^2`` of the module: ``W^2 <= e^(-rate s) W(0)^2`` for every signal.
+
+    Attributes
+    ----------
+    family : Family
+        Of the component; nodes are numbered within it.
+    kernel : Kernel
+    followers : (n,) int array
+    vector : (n,) array of positive Python ints
+        ``d``.
+    outside : (N - n,) array of nonnegative Python ints
+        ``e`` of the agents that are no followers, ascending.
+    parts : tuple of LeadingPart
+    rate : Fraction
+        Of ``W^2``: at most ``2 gamma`` and every ``r_j``.
+    """
+
+    family: Family
+    kernel: Kernel
+    followers: np.ndarray
+    vector: np.ndarray
+    outside: np.ndarray
+    parts: tuple[LeadingPart, ...]
+    rate: Fraction
+
+    kind = "rows"
+    optimal = False
+
+    @property
+    def overshoot(self) -> Fraction:
+        """``(max d / min d)^2`` of the followers."""
+        return Fraction(int(self.vector.max()), int(self.vector.min())) ** 2
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        """(N,) array of Python ints: bounds of ``|xi_k| / W``; 0 of agents at rest and pivots."""
+        n = self.family.n_nodes
+        sizes = np.zeros(n, dtype=object)
+        sizes[self.followers] = self.vector
+        sizes[np.setdiff1d(np.arange(n), self.followers)] = self.outside
+        return sizes
+
+    @cached_property
+    def inputs(self) -> Mapping[int, Fraction]:
+        """``|(L X)_k|^2 <= inputs[k] W^2`` for every member: ``sum_l w+ (size_k + size_l)`` of followers."""
+        rows = IntervalRows.of(self.family.modes, self.followers)
+        sums = rows.largest_sums(np.concatenate([self.vector, self.outside]))
+        result = dict.fromkeys(range(self.family.n_nodes), Fraction(0))
+        for k, total in zip(self.followers.tolist(), sums.tolist(), strict=True):
+            result[k] = rounded_up((total * rows.unit) ** 2)
+        for part in self.parts:
+            for v, c in zip(part.agents.tolist(), part.function.input_constants, strict=True):
+                result[v] = rounded_up(c * part.times**2)
+        return result
+
+    @cached_property
+    def coordinates(self) -> Mapping[int, Fraction]:
+        """``xi_k^2 <= coordinates[k] W^2``, of all agents but pivots and those at rest."""
+        return {k: Fraction(int(size)) ** 2 for k, size in enumerate(self._sizes.tolist()) if size}
+
+    def value(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``W^2`` of a state of the component."""
+        pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
+        largest = Fraction(0)
+        for k, d in zip(self.followers.tolist(), self.vector.tolist(), strict=True):
+            rest = sum((b * x[p] for b, p in zip(self.kernel.row(k), pivots, strict=True) if b), Fraction(0))
+            largest = max(largest, abs(x[k] - rest) / d)
+        squares = [largest**2]
+        for part in self.parts:
+            xi = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
+            squares.append(part.function.value(xi) / part.times**2)
+        return max(squares)
+
+
+def follower_functions(component: FamilyComponent, losses: Sequence[float] = LOSSES) -> Iterator[FollowerFunction]:
+    """Search and prove functions of a component that has followers and common states at rest; from the fastest.
+
+    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> chain = [("a", "b", 1, 2), ("b", "a", 1, 2), ("b", "c", 3, 4), ("c", "d", 1, 2)]
+    >>> [round(float(W.rate), 3) for W in follower_functions(decide(Family.from_intervals(chain))[0])]
+    [1.995, 1.854]
+    """
+    family = component.family
+    followers = follower_nodes(family)
+    if component.kernel is None or not followers.size:
+        return
+    parts = _leading_parts(family, followers)
+    if parts is None:
+        return
+    for loss, decay in zip(losses, follower_decays(family, followers, [loss / 2 for loss in losses]), strict=False):
+        if (function := _compose(component, decay, parts, loss)) is not None:
+            yield function
+
+
+def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] | None:
+    """Return the parts of ``R`` in which something moves, each with its function; None if one has none."""
+    rest = np.setdiff1d(np.arange(family.n_nodes), followers)
+    part_family = family.restricted(rest)
+    source, target, _ = part_family.union
+    parts = []
+    for own in weak_components(rest.size, source, target):
+        if own.size == 1:
+            continue
+        if own.size > LARGEST_PART:
+            return None
+        (component,) = decide(part_family.restricted(own))
+        try:
+            quotient = Quotient.of(component)
+        except (HypothesisError, TooLarge):
+            return None
+        functions = search_family(quotient).functions
+        if not functions or functions[0].rate <= 0:
+            return None
+        parts.append(LeadingPart(rest[own], quotient, functions[0], Fraction(1)))
+    return parts
+
+
+def _compose(
+    component: FamilyComponent, decay: FollowerDecay, parts: list[LeadingPart], loss: float
+) -> FollowerFunction | None:
+    """Choose ``t`` so that the followers lose about this share of their rate, and prove what is left."""
+    family = component.family
+    rows = IntervalRows.of(family.modes, decay.nodes)
+    rest = np.setdiff1d(np.arange(family.n_nodes), decay.nodes)
+    d = decay.vector.astype(object)
+    place = {v: k for k, v in enumerate(rest.tolist())}
+    size = np.zeros(rest.size)
+    for part in parts:
+        for v, bound in part.bounds.items():
+            size[place[v]] = nearest_float(bound)
+    assert component.kernel is not None
+    drifts = np.array([nearest_float(q) for q in _drifts(component.kernel, decay.nodes, parts)])
+    push = rows.largest_pushes(np.concatenate([np.zeros(rows.n), size])) + drifts
+    floats = d.astype(float)
+    fastest = float(decay.rate) / (1 - loss / 2)
+    aim = (1 - loss) * min([fastest, *(float(part.function.rate) / 2 for part in parts)])
+    slack = rows.pull(np.concatenate([floats, np.zeros(rest.size)])) - aim * floats
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = float(np.where(push > 0, slack / push, np.inf).min())
+    outside = np.zeros(rest.size, dtype=object)
+    if parts:
+        if not (0 < room < np.inf):
+            room = float(d.max())
+        times = Fraction(2) ** int(np.floor(np.log2(room)))
+        least = min((times * bound for part in parts for bound in part.bounds.values() if bound), default=Fraction(1))
+        up = max(0, _BITS - (least.numerator.bit_length() - least.denominator.bit_length()))
+        d, times = d << up, times * 2**up
+        parts = [LeadingPart(p.agents, p.quotient, p.function, times) for p in parts]
+        for part in parts:
+            for v, bound in part.bounds.items():
+                outside[place[v]] = -(-bound // 1)
+    gamma = composite_rate(rows, d, outside, _drifts(component.kernel, decay.nodes, parts))
+    rate = min([rounded(2 * gamma, 53), *(part.function.rate for part in parts)])
+    if rate <= 0:
+        return None
+    return FollowerFunction(family, component.kernel, decay.nodes, d, outside, tuple(parts), rate)
+
+
+def _drifts(kernel: Kernel, followers: np.ndarray, parts: Sequence[LeadingPart]) -> list[Fraction]:
+    """Return ``sum_p |B_kp| q_p`` of every follower."""
+    speeds: dict[int, Fraction] = {}
+    for part in parts:
+        speeds |= part.speeds
+    zero = Fraction(0)
+    if not any(speeds.values()):
+        return [zero] * followers.size
+    own = [speeds.get(c.nodes[0], zero) for c in kernel.structure.closed_components if c.balanced]
+    rows = (zip(kernel.row(k), own, strict=True) for k in followers.tolist())
+    return [sum((abs(b) * q for b, q in row if b), zero) for row in rows]
+
+
+def composite_rate(rows: IntervalRows, d: np.ndarray, outside: np.ndarray, drifts: Sequence[Fraction]) -> Fraction:
+    """Return the largest ``gamma`` that integers ``d > 0`` and ``e >= 0`` prove for the followers; exact.
+
+    ``drifts`` are ``sum_p |B_kp| q_p``, which are rounded up to multiples of the unit.
+    """
+    pull = rows.pull(np.concatenate([d, outside]))
+    lost = np.array([-(-q // rows.unit) for q in drifts], dtype=object)
+    return least_quotient((pull - lost).ravel(), np.tile(d, rows.modes)) * rows.unit

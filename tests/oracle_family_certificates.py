@@ -1,0 +1,345 @@
+"""Whether a certificate of a small family is true, judged from its JSON by means that share nothing with the checker.
+
+:func:`false_family_claims` forms members of the family: the mandatory graphs, each uncertain weight alone at its other
+end, and vertices of the boxes at random. What the agents do follows from their kernels in rationals, rates from
+semidefiniteness in rationals, constants from inverses, final states and inputs from the motion under constant members
+(in rationals where they end) and under signals that switch. Witnesses are not read. A bound that some member or
+instant exceeds is false.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import random
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from oracle import Json, Matrix, Oracle, Vector, inverse, kernel, number, semidefinite, times, transposed
+from scipy.linalg import expm
+
+#: Vertices of the box of every mode, and signals that switch at random, that are tried.
+VERTICES, SIGNALS = 12, 4
+SLACK = 1e-9
+
+Edge = tuple[int, int, Fraction, Fraction]
+
+
+def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
+    """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
+    oracle = FamilyOracle(data, files or {})
+    for claim in (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.finals, oracle.inputs):
+        claim()
+    return oracle.false
+
+
+class FamilyOracle:
+    """One certificate."""
+
+    def __init__(self, data: Json, files: Mapping[str, bytes]):
+        self.data, self.files, self.false = data, files, list[str]()
+        self.labels: list[str] = data["graph"]["nodes"]
+        self.index = {label: v for v, label in enumerate(self.labels)}
+        self.n = len(self.labels)
+        self.modes = [(self.edges(mode["edges"]), mode["undirected"]) for mode in data["graph"]["modes"]]
+        self.draw = random.Random(0)
+
+    def require(self, holds: Any, claim: str) -> None:
+        if not holds:
+            self.false.append(claim)
+
+    def edges(self, said: Any) -> list[Edge]:
+        """The least and the largest weight of every edge, with its sign."""
+        if isinstance(said, list):
+            return [(self.index[row[0]], self.index[row[1]], number(row[2]), number(row[-1])) for row in said]
+        read = Oracle.column.__get__(self)
+        columns = [read(said[key]) for key in ("source", "target", "least", "largest")]
+        return [(int(s), int(t), low, high) for s, t, low, high in zip(*columns, strict=True)]
+
+    # ------------------------------------------------------------------ members
+
+    @staticmethod
+    def ends(edge: Edge) -> tuple[Fraction, Fraction]:
+        """The weights of the least and of the largest size."""
+        _, _, low, high = edge
+        return (low, high) if high > 0 else (high, low)
+
+    def member(self, number_of_mode: int, far: set[Any]) -> Matrix:
+        """The Laplacian with some weights of the largest size, the others of the least; named by :meth:`parameters`."""
+        L = [[Fraction(0)] * self.n for _ in range(self.n)]
+        edges, tied = self.modes[number_of_mode]
+        for edge in edges:
+            s, t = edge[:2]
+            w = self.ends(edge)[self.parameter(edge, tied) in far]
+            L[t][s] -= w
+            L[t][t] += abs(w)
+        return L
+
+    @staticmethod
+    def parameter(edge: Edge, tied: bool) -> Any:
+        s, t, _, high = edge
+        return (frozenset((s, t)) if tied else (s, t)), high > 0
+
+    def far_sets(self, number_of_mode: int) -> Iterator[set[Any]]:
+        """Which weights are of the largest size: none, each alone, and some at random; never both signs of a pair."""
+        edges, tied = self.modes[number_of_mode]
+        names = list(dict.fromkeys(self.parameter(e, tied) for e in edges if e[2] < e[3]))
+        yield set()
+        for name in names:
+            yield {name}
+        for share in (1, *[self.draw.random() for _ in range(VERTICES)]):
+            some = [name for name in names if self.draw.random() <= share]
+            self.draw.shuffle(some)
+            yield {(pair, sign) for pair, sign in dict(some).items()}
+
+    @cached_property
+    def members(self) -> list[list[Matrix]]:
+        """Of every mode; the mandatory graph is the first."""
+        return [[self.member(k, far) for far in self.far_sets(k)] for k in range(len(self.modes))]
+
+    @cached_property
+    def pieces(self) -> list[list[int]]:
+        graph = nx.Graph()
+        graph.add_nodes_from(range(self.n))
+        graph.add_edges_from((s, t) for edges, _ in self.modes for s, t, _, _ in edges)
+        return sorted(map(sorted, nx.connected_components(graph)))
+
+    @staticmethod
+    def part(L: Matrix, nodes: list[int]) -> Matrix:
+        return [[L[i][j] for j in nodes] for i in nodes]
+
+    def common_kernel(self, nodes: list[int]) -> Matrix | None:
+        """Rows that span the states at rest in all members; None if they have not all the same."""
+        own = [self.part(L, nodes) for some in self.members for L in some]
+        basis = kernel(own[0])
+        for L in own:
+            if len(kernel(L)) != len(basis) or any(x for b in basis for (x,) in times(L, [[y] for y in b])):
+                return None
+        return basis
+
+    # ------------------------------------------------------------------ graph, structure, behaviour
+
+    @property
+    def sha256(self) -> str:
+        lines = [json.dumps([x], ensure_ascii=False) for x in sorted(self.labels)]
+        for k, (edges, tied) in enumerate(self.modes):
+            lines += ["{}"] * (k > 0)
+            lines += ['{"undirected": true}'] * (tied and any(low < high for _, _, low, high in edges))
+            rows = [(self.labels[s], self.labels[t], low, high) for s, t, low, high in edges]
+            for s, t, low, high in sorted(rows, key=lambda row: (*row[:2], row[3] > 0)):
+                lines.append(json.dumps([s, t, *dict.fromkeys([str(low), str(high)])], ensure_ascii=False))
+        text = "".join(f"{line}\n" for line in lines)
+        return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+    def graph(self) -> None:
+        for edges, tied in self.modes:
+            for s, t, low, high in edges:
+                self.require(s != t and low <= high and (low or high) and low * high >= 0, "an edge")
+            if tied:
+                both = {(s, t, high > 0): (low, high) for s, t, low, high in edges}
+                self.require(all(both.get((t, s, x)) == ends for (s, t, x), ends in both.items()), "undirected edges")
+        self.require(self.sha256 == self.data["graph"]["sha256"], "the hash")
+
+    def structures(self) -> None:
+        for (edges, _), said in zip(self.modes, self.data["structure"]["modes"], strict=True):
+            weights = [(s, t, str(self.ends((s, t, low, high))[0])) for s, t, low, high in edges]
+            rows = [[self.labels[s], self.labels[t], w] for s, t, w in weights if Fraction(w)]
+            one = Oracle({"graph": {"nodes": self.labels, "edges": rows}, "structure": said}, {})
+            one.structure()
+            pieces, closed = nx.number_weakly_connected_components(one.digraph), one.closed
+            row = 0 if len(closed) == 1 and len(closed[0]) == self.n else 1 if len(closed) == 1 else 2
+            kind = "disconnected" if pieces > 1 else ("strong", "quasi-strong", "weak")[row]
+            self.require(said["connectivity"] == kind, "connectivity")
+            self.false += one.false
+
+    def closed_components(self, number_of_mode: int, nodes: list[int]) -> int:
+        L, graph = self.members[number_of_mode][0], nx.DiGraph()
+        graph.add_nodes_from(nodes)
+        graph.add_edges_from((t, s) for t in nodes for s in nodes if s != t and L[t][s])
+        return sum(1 for _ in nx.attracting_components(graph))
+
+    def behaviour(self, nodes: list[int]) -> str:
+        basis = self.common_kernel(nodes)
+        if basis is None:
+            return "depends on the signal"
+        if not basis:
+            return "stability"
+        if len(basis) == 1 and len(set(map(abs, basis[0]))) == 1:
+            return "bipartite consensus"
+        single = all(self.closed_components(k, nodes) == 1 for k in range(len(self.modes)))
+        return "interval bipartite consensus" if single else "bipartite containment"
+
+    def behaviours(self) -> None:
+        told = [
+            {"theorem": "common kernel", "behaviour": self.behaviour(nodes), "signal": "any"} for nodes in self.pieces
+        ]
+        if len(told) == 1:
+            self.require(self.data["claim"] == told[0] and "components" not in self.data, "claim")
+        else:
+            names = [[self.labels[v] for v in nodes] for nodes in self.pieces]
+            found = [{"nodes": x, "claim": claim} for x, claim in zip(names, told, strict=True)]
+            self.require(self.data["claim"] is None and self.data["components"] == found, "claims of components")
+        self.require(self.data["verdict"] == "certified", "verdict")
+        empty = ("paper", "rates", "overshoot", "sliding_variable", "influence", "reaching_time")
+        self.require(all(self.data[key] is None for key in empty), "parts that families do not have")
+
+    # ------------------------------------------------------------------ Lyapunov functions
+
+    def functions(self) -> None:
+        steps = {x["of"]: x for x in self.data["proof"] if x["kind"] == "family-rate"}
+        for number_of, said in enumerate(self.data["lyapunov"]["functions"]):
+            nodes = self.pieces[said["component"]]
+            basis = self.common_kernel(nodes)
+            if basis is None:
+                self.require(False, "a function without a common kernel")
+                continue
+            free = [self.index[label] for label in said["nodes"]]
+            pivots = [v for v in nodes if v not in free]
+            self.require(len(pivots) == len(basis) and free == sorted(free), "nodes of a function")
+            P = self.symmetric(said["lower_triangle"])
+            self.require(self.definite(P), "P is not definite")
+            to_zero = self.lift(basis, nodes, free, pivots)
+            constants = [number(x) for x in said["inputs"].values()]
+            self.require(list(said["inputs"]) == [self.labels[v] for v in nodes], "inputs by agent")
+            rates = [
+                number(steps[f"lyapunov.functions[{number_of}].modes[{k}]"]["numbers"]["b"])
+                for k in range(len(self.modes))
+            ]
+            self.require(min(rates) == number(said["rate"]), "the least rate")
+            G = inverse(P)
+            for some, rate in zip(self.members, rates, strict=True):
+                for L in some:
+                    A = times(
+                        to_zero, [[self.part(L, nodes)[i][nodes.index(v)] for v in free] for i in range(len(nodes))]
+                    )
+                    PA = times(P, A)
+                    S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
+                    self.require(semidefinite(S), "a rate")
+                    for v, c in zip(nodes, constants, strict=True):
+                        y = [L[v][u] for u in free]
+                        self.require(self.form(G, y) <= c, "the constant of an input")
+            self.require(list(said["coordinates"]) == said["nodes"], "coordinates by agent")
+            for i, c in enumerate(said["coordinates"].values()):
+                self.require(G[i][i] <= number(c), "the constant of a coordinate")
+
+    def lift(self, basis: Matrix, nodes: list[int], free: list[int], pivots: list[int]) -> Matrix:
+        """The matrix ``C``: ``xi = x_free - B_free B_piv^-1 x_piv``, by rows, columns numbered as the nodes."""
+        place = {v: i for i, v in enumerate(nodes)}
+        C = [[Fraction(int(v == u)) for u in nodes] for v in free]
+        if pivots:
+            upper = inverse([[b[place[p]] for b in basis] for p in pivots])
+            shares = times([[b[place[v]] for b in basis] for v in free], upper)
+            for row, share in zip(C, shares, strict=True):
+                for p, x in zip(pivots, share, strict=True):
+                    row[place[p]] -= x
+        return C
+
+    @staticmethod
+    def form(G: Matrix, y: Vector) -> Fraction:
+        return sum((a * g * b for a, row in zip(y, G, strict=True) for g, b in zip(row, y, strict=True)), Fraction(0))
+
+    @staticmethod
+    def symmetric(lower: list[list[str]]) -> Matrix:
+        return [[number(lower[max(i, j)][min(i, j)]) for j in range(len(lower))] for i in range(len(lower))]
+
+    @staticmethod
+    def definite(P: Matrix) -> bool:
+        return semidefinite(P) and not kernel(P)
+
+    # ------------------------------------------------------------------ where agents end, and their inputs
+
+    @cached_property
+    def start(self) -> Vector | None:
+        said = self.data["initial_state"]
+        return None if said is None else [number(said[label]) for label in self.labels]
+
+    @cached_property
+    def gain(self) -> tuple[Fraction, Fraction, Fraction]:
+        T, rho1, rho2, kappa = (number(self.data["protocol"][key]) for key in ("T", "rho1", "rho2", "kappa"))
+        self.require(min(T, rho1, rho2, kappa) > 0, "the protocol")
+        return T, rho1, rho2 * kappa
+
+    def depends(self, nodes: list[int]) -> bool:
+        return self.common_kernel(nodes) is None
+
+    def finals(self) -> None:
+        said = self.data["final_state"]
+        self.require((said is None) == (self.start is None), "final states without a state, or the other way round")
+        if said is None or self.start is None:
+            return
+        self.require(list(said) == self.labels, "final states by agent")
+        for nodes in self.pieces:
+            ends = [said[self.labels[v]] for v in nodes]
+            if self.depends(nodes):
+                self.require(not any(x is not None for x in ends), "a final state that depends on the signal")
+                continue
+            self.require(None not in ends, "no final state")
+            for some in self.members:
+                for L in some:
+                    end = self.limit(self.part(L, nodes), [self.start[v] for v in nodes])
+                    self.require(all(Oracle.holds(x, y) for x, y in zip(ends, end, strict=True)), "a final state")
+            for x in self.switched(nodes):
+                for entry, y in zip(ends, x, strict=True):
+                    mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
+                    radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
+                    size = max(1.0, *(abs(float(z)) for z in self.start))
+                    self.require(abs(y - float(mid)) <= float(radius) + 1e-7 * size, "a final state by switches")
+
+    @staticmethod
+    def limit(L: Matrix, x: Vector) -> Vector:
+        """Where ``X' = -L X`` ends."""
+        right, left = kernel(L), kernel(transposed(L))
+        if not right:
+            return [Fraction(0)] * len(x)
+        within = times(inverse(times(left, transposed(right))), times(left, [[y] for y in x]))
+        return [y for (y,) in times(transposed(right), within)]
+
+    def switched(self, nodes: list[int]) -> Iterator[np.ndarray]:
+        """Where the agents end under signals that switch some times, and then keep one member."""
+        assert self.start is not None
+        flat = [(k, L) for k, some in enumerate(self.members) for L in some]
+        size = max(float(x) for _, L in flat for row in L for x in row)
+        for _ in range(SIGNALS if size else 0):
+            x = np.array([float(self.start[v]) for v in nodes])
+            for _ in range(5):
+                L = np.array(self.part(self.draw.choice(flat)[1], nodes), dtype=float)
+                x = expm(-L * self.draw.choice((0.1, 1, 3)) / size) @ x
+            last = self.part(self.draw.choice(flat)[1], nodes)
+            yield np.array([float(y) for y in self.limit(last, [Fraction(float(y)) for y in x])])
+
+    def inputs(self) -> None:
+        said = self.data["input"]
+        T, rho1, pole = self.gain
+        if said["bounded"] is None:
+            self.require(said["peaks"] is None, "peaks of an input that is not bounded")
+            return
+        self.require(said["bounded"] is True and (said["peaks"] is None) == (self.start is None), "bounded")
+        for nodes in self.pieces:
+            self.require(not self.depends(nodes), "an input that depends on the signal is bounded")
+            for some in self.members:
+                for L in some:
+                    values = np.linalg.eigvals(np.array(self.part(L, nodes), dtype=float))
+                    least = min((z.real for z in values if abs(z) > 1e-6 * max(abs(values))), default=np.inf)
+                    self.require(least * float(pole) >= 1 - 1e-6, "an eigenvalue that makes the input unbounded")
+        if said["peaks"] is None or self.start is None:
+            return
+        self.require(list(said["peaks"]) == self.labels, "peaks by agent")
+        bounds = [number(x) for x in said["peaks"].values()]
+        first = rho1 + pole / T
+        for some in self.members:
+            for L in some:
+                size = [abs(sum((a * x for a, x in zip(row, self.start, strict=True)), Fraction(0))) for row in L]
+                self.require(all(first * x <= b for x, b in zip(size, bounds, strict=True)), "a peak at the beginning")
+                self.later(np.array(L, dtype=float), np.array(bounds, dtype=float))
+
+    def later(self, L: np.ndarray, bounds: np.ndarray) -> None:
+        T, rho1, pole = map(float, self.gain)
+        for z in (0.01, 0.1, 0.5, 1.0, 2.0):
+            s = rho1 * T * (1 - np.exp(-z)) + pole * z
+            if s * abs(L).max() < 300:
+                u = (rho1 + pole / T * np.exp(z)) * L @ expm(-L * s) @ np.array([float(x) for x in self.start or ()])
+                self.require((abs(u) <= bounds * (1 + SLACK) + 1e-9 * bounds.max(initial=0)).all(), "a later peak")
