@@ -27,7 +27,7 @@ from ptcc_certify.theorems.family_behaviour import decide
 #: How random weights lie in their intervals.
 WEIGHTS = ("both", "ends", "between")
 #: What :func:`as_signal` takes as a word.
-WORDS = ("random", "worst-case")
+WORDS = ("random", "worst-case", "constant")
 # The largest entry is imitated by the sum of this power: only the largest entries weigh in its gradient.
 _POWER = 15
 # Steps of the worst-case search for the time in which agents move.
@@ -347,7 +347,8 @@ def as_signal(signal: Any, seed: int = 0) -> Signal:
     Parameters
     ----------
     signal : Signal, str, path, file object or sequence of rows
-        ``"random"``, ``"worst-case"``, a table as :meth:`TableSignal.read` reads it, or its rows over time.
+        ``"random"``, ``"worst-case"``, ``"constant"`` (the first mode, its weights in the middle), a table as
+        :meth:`TableSignal.read` reads it, or its rows over time.
     seed : int
         Of the random one.
 
@@ -367,6 +368,8 @@ def as_signal(signal: Any, seed: int = 0) -> Signal:
         return RandomSignal(seed)
     if signal == "worst-case":
         return WorstCaseSignal()
+    if signal == "constant":
+        return ConstantSignal()
     if isinstance(signal, list | tuple):
         return TableSignal(signal)
     try:

@@ -54,8 +54,8 @@ def worst_ratios(rng, families, count, steps=(3,), **options):
 
 def test_no_signal_exceeds_what_is_proved():
     rng = np.random.default_rng(11)
-    worst, runs = worst_ratios(rng, [drawn_family(rng, n) for n in (3, 4, 5)], 12, samples=30, remaining=1e-6)
-    assert runs >= 36
+    worst, runs = worst_ratios(rng, [drawn_family(rng, n) for n in (3, 4)], 12, samples=30, remaining=1e-6)
+    assert runs >= 24
     assert worst["lyapunov_ratio"] > 0.9  # the bound is sharp somewhere
     assert all(0 < worst[name] <= 1.000001 for name in RATIOS)
 

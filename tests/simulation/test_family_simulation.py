@@ -84,7 +84,7 @@ def test_weights_lie_in_their_intervals_and_tied_ones_are_equal_and_pairs_of_sig
     for tied in (False, True):
         family = Family.from_intervals(rows, undirected=tied)
         members, mode = Members(family), family.modes[0]
-        run = simulate_family(family, PROTOCOL, [1, -2, 4], RandomSignal(4), samples=5, past=0)
+        run = simulate_family(family, PROTOCOL, [1, -2, 4], RandomSignal(4), times=[0, "9/5"])
         assert len({choice.levels for choice in run.choices}) > 20
         for choice in run.choices:
             sizes = members.arrays[0].sizes(choice.levels)
