@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify import NominalProtocol, read_graph
-from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.graphs.family import Family
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -95,11 +95,13 @@ def published_part(folder: Path, limit: float) -> None:
         for share in UNCERTAIN:
             certificate, took = certified(Family.from_graph(graph, uncertainty=share), limit)
             parts = [part for part in certificate.parts if part.component.nodes.size > 1]
-            told = [
-                f"{float(p.rate / p.upper_bound.value) if p.rate and p.upper_bound else 0.0:.4f} {p.component.behaviour}"
-                for p in parts
-            ]
+            told = [_told(part) for part in parts]
             print(f"{name:<18}{graph.n_nodes:>6}{graph.n_edges:>6}{'+-' + share:>6}{took:>9.1f}  {', '.join(told)}")
+
+
+def _told(part: ComponentProof) -> str:
+    share = part.rate / part.upper_bound.value if part.rate and part.upper_bound else None
+    return f"{'none' if share is None else format(float(share), '.4f')} {part.component.behaviour}"
 
 
 def main() -> None:
