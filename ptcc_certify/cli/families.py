@@ -42,14 +42,19 @@ def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[st
 
 
 def family_options(command: Any) -> Any:
+    """Add the options that make a family of graphs, and tell for which signals it is asked."""
+    signal = click.option(
+        "--signal",
+        type=click.Choice(["any", "constant"]),
+        default="any",
+        help="Families: mode and weights change at any instants, or are fixed and unknown.",
+    )
+    return mode_options(signal(command))
+
+
+def mode_options(command: Any) -> Any:
     """Add the options that make a family of graphs."""
     for option in (
-        click.option(
-            "--signal",
-            type=click.Choice(["any", "constant"]),
-            default="any",
-            help="Families: mode and weights change at any instants, or are fixed and unknown.",
-        ),
         click.option(
             "--optional",
             multiple=True,
@@ -169,7 +174,7 @@ def certify_family(
     from ptcc_certify.report.family_screen import family_lines, family_summary
     from ptcc_certify.theorems.family_behaviour import decide
 
-    _refuse_options(options)
+    refuse_options(options)
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
@@ -208,11 +213,11 @@ def certify_family(
     return assessment.exit_code
 
 
-def _refuse_options(options: shared.Options) -> None:
+def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
     if options["kind"] != "nominal":
-        raise ParameterError("--protocol: families are certified under the nominal protocol alone; leave it out")
+        raise ParameterError("--protocol: families are for the nominal protocol alone; leave it out")
     for name in _NOT_OF_FAMILIES:
         if source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP) and options[name] not in (
             None,
