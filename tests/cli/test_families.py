@@ -149,7 +149,7 @@ def test_what_is_not_decided_says_what_to_try_and_writes_nothing():
     assert run.code == 4 and "undecided: " in run.out and not Path("c.json").exists()
 
 
-@pytest.mark.parametrize("command", ["plot", "simulate", "design", "explore"])
+@pytest.mark.parametrize("command", ["plot", "design", "explore"])
 def test_commands_about_one_graph_say_so(command: str):
     needs = ("--max-input", "1", "--initial-bound", "1", "--deadline", "1") if command == "design" else ()
     for words in (("day.csv", "night.csv"), ("unsure.csv",), ("day.csv", "--switching")):
