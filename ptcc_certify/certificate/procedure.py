@@ -169,8 +169,8 @@ def certify(
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``origins`` and
-        ``progress``.
+        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``scenario``,
+        ``origins`` and ``progress``.
 
     Raises
     ------
@@ -213,7 +213,8 @@ def certify(
     if uncertainty or is_family(graph):
         family = _family(graph, orientation, uncertainty, options)
         asked: dict[str, Any] = {"time_limit": time_limit, "expectations": expectations}
-        asked |= {"origins": origins_of(graph, x0, None) | dict(origins or {}), "progress": progress}
+        asked |= {"origins": origins_of(graph, x0, None) | dict(origins or {}), "scenario": scenario}
+        asked |= {"progress": progress}
         return certify_family(family, protocol, x0, **asked)
     limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}

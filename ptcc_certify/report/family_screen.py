@@ -149,7 +149,7 @@ def family_text(family: Family, name: str) -> str:
         return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
     names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
     rest = f"{counted(len(names), 'mode')} on {rest}"
-    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 20))}: {rest}"
+    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 30))}: {rest}"
 
 
 def _family_entries(family: Family, name: str, origins: Mapping[str, str]) -> list[tuple[str, str]]:

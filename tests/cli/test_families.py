@@ -94,6 +94,7 @@ def test_a_scenario_lists_the_graphs_of_a_family():
     assert ptcc("certify", *BOTH, "--uncertainty", "5%", "--kappa", "3", "-o", "d.json").code == 0
     one, other = (json.loads(Path(name).read_text()) for name in ("c.json", "d.json"))
     assert one["digest"] == other["digest"]
+    assert one["unverified"]["scenario"]["graph"]["file"] == ["day.csv", "night.csv"]
     assert "4 uncertain" not in ptcc("classify", "s.toml", "--uncertainty", "0").out
 
 
