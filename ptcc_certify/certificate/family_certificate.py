@@ -125,6 +125,8 @@ class FamilyCertificate(Shown):
         The file that it was read from.
     origins : mapping of str to str
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
+    scenario : mapping or None
+        The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
 
     References
     ----------
@@ -148,6 +150,7 @@ class FamilyCertificate(Shown):
     notes: tuple[str, ...] = ()
     source: Source | None = None
     origins: Mapping[str, str] = field(default_factory=dict)
+    scenario: Mapping[str, Any] | None = None
 
     @property
     def common(self) -> bool:
@@ -353,6 +356,7 @@ def certify_family(
     *,
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
+    scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FamilyCertificate:
@@ -368,7 +372,7 @@ def certify_family(
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
     expectations : Expectations or str, optional
-    origins : mapping of str to str, optional
+    scenario, origins : mapping, optional
         See :func:`ptcc_certify.certify`.
     progress : callable
         Is told each step as it begins.
@@ -405,9 +409,8 @@ def certify_family(
             parts.append(_prove(component, notes, progress))
     progress(STEPS[3])
     told = origins_of(None, x0, None) | dict(origins or {})
-    return FamilyCertificate(
-        family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), origins=told
-    )
+    kept: dict[str, Any] = {"origins": told, "scenario": scenario}
+    return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
 
 
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:

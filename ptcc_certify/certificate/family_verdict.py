@@ -86,7 +86,7 @@ def _judge_rate(certificate: FamilyCertificate, least: Fraction) -> Answer:
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
         return Answer(MET, what)
     if not certificate.common:
-        return Answer(REFUTED, what, "no rate holds for every signal: it depends on the signal")
+        return Answer(REFUTED, what, "no rate holds for every signal")
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"

@@ -108,6 +108,8 @@ def _unverified(certificate: FamilyCertificate) -> dict[str, Any]:
     return {
         "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
         "asked": {"behaviour": expectations.behaviour},
+        "origins": dict(certificate.origins),
+        "scenario": certificate.scenario,
         "notes": list(certificate.notes),
     }
 

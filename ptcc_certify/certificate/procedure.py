@@ -78,6 +78,8 @@ STEPS = (
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
+#: Options of :func:`certify` that families take, too.
+_OF_FAMILIES = ("time_limit", "expectations", "scenario", "origins", "progress")
 #: Instants of a simulated run where the graph is large.
 FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
@@ -169,8 +171,8 @@ def certify(
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``origins`` and
-        ``progress``.
+        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``scenario``,
+        ``origins`` and ``progress``.
 
     Raises
     ------
@@ -202,26 +204,18 @@ def certify(
     >>> certify(g, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), uncertainty="10%")
     FamilyCertificate(bipartite consensus for every signal, rate 3.59999, certified)
     """
-    options: dict[str, Any] = {
-        "simulation": simulation,
-        "method": method,
-        "at": at,
-        "initial_set": initial_set,
-        "limits": limits,
-    }
-    options |= {"delta": delta, "noise": noise, "sigma0": sigma0, "disturbance": disturbance}
-    if uncertainty or is_family(graph):
-        family = _family(graph, orientation, uncertainty, options)
-        asked: dict[str, Any] = {"time_limit": time_limit, "expectations": expectations}
-        asked |= {"origins": origins_of(graph, x0, None) | dict(origins or {}), "progress": progress}
-        return certify_family(family, protocol, x0, **asked)
-    limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
-    options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
+    options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
+    options |= {"noise": noise, "time_limit": time_limit, "expectations": expectations, "scenario": scenario}
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
+    if uncertainty or is_family(graph):
+        options |= {"simulation": simulation, "sigma0": sigma0, "disturbance": disturbance, "progress": progress}
+        family = _family(graph, orientation, uncertainty, options)
+        return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
+    limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
+    options["limits"] = limits
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
-    options |= {"time_limit": time_limit, "expectations": expectations, "scenario": scenario}
     request = read_request(structure, protocol, options)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
@@ -268,7 +262,7 @@ def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapp
     """Return a family, or refuse what it does not take: what is set, but for ``simulation=False``."""
     unset = {None, False, "best", ()}
     for name, value in options.items():
-        if not isinstance(value, Hashable) or value not in unset:
+        if name not in _OF_FAMILIES and (not isinstance(value, Hashable) or value not in unset):
             raise ParameterError(f"{name} is not for families of graphs yet; leave it out, or certify one graph")
     return as_family(graph, orientation, uncertainty=uncertainty)
 

@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.scenario import is_scenario, read_scenario
+from ptcc_certify.cli.scenario import is_scenario, read_scenario, scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
@@ -195,7 +195,7 @@ def certify_family(
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **drawn}
-        limit = {"time_limit": options["time_limit"], "expectations": asked}
+        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)

@@ -362,9 +362,9 @@ def takes_one_graph(name: str | None) -> str:
     Examples
     --------
     >>> takes_one_graph("plot")
-    'ptcc plot takes one graph; a family (several graphs, uncertain weights) goes to ptcc classify and ptcc certify'
+    'ptcc plot takes one graph; a family (several graphs, uncertain weights) goes to ptcc classify, certify or simulate'
     """
-    where = "a family (several graphs, uncertain weights) goes to ptcc classify and ptcc certify"
+    where = "a family (several graphs, uncertain weights) goes to ptcc classify, certify or simulate"
     return f"ptcc {name} takes one graph; {where}"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -148,7 +149,7 @@ def family_text(family: Family, name: str) -> str:
         return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
     names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
     rest = f"{counted(len(names), 'mode')} on {rest}"
-    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 20))}: {rest}"
+    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 30))}: {rest}"
 
 
 def _family_entries(family: Family, name: str, origins: Mapping[str, str]) -> list[tuple[str, str]]:
@@ -322,8 +323,9 @@ def _function_entries(certificate: FamilyCertificate) -> Lines:
     for part in certificate.parts:
         names = [mode_name(certificate.family, k) for k in range(len(certificate.family.modes))]
         for V in part.functions:
-            rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, V.rates, strict=True))
-            alone = f"; of each mode: {rates}" if len(names) > 1 else ""
+            own = V.rates if isinstance(V, FamilyFunction) and len(names) > 1 else ()
+            rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
+            alone = f"; of each mode: {rates}" * bool(own)
             yield "function", f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
         if part.upper_bound is not None:
             kinds = {
