@@ -567,6 +567,31 @@ def with_long_weights(n: int) -> Json:
     return hostile(n, [("h", f"v{i}", 1, 1 + Fraction(x)) for i, x in enumerate(long_numbers(n))])
 
 
+def with_many_rows(followers: int, leaders: int, modes: int) -> Json:
+    """Uncertain edges between agents with the same long rows of the kernel."""
+    draw = random.Random(0)
+    first = [(f"l{i}", "f0", 1 + draw.randrange(9), 0) for i in range(leaders)]
+    known: Any = [(s, t, w, w) for s, t, w, _ in first]
+    known += [("f0", f"f{k}", 1, 2) for k in range(1, followers)]
+    pairs = [(f"f{i}", f"f{k}", 0, 1) for i in range(1, followers) for k in range(1, followers) if i != k]
+    family = Family.switching([Family.from_intervals(known + pairs)] * modes)
+    return family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+
+
+def with_many_functions(leaders: int, modes: int) -> Json:
+    """Functions of one agent that hears very many, each with its rates in all modes."""
+    edges = [(f"l{i}", "f", 1, 1) for i in range(leaders)]
+    family = Family.switching([Family.from_intervals(edges)] * modes)
+    data = document(family, state=False)
+    one = data["lyapunov"]["functions"][0]
+    proof = data["proof"]
+    own = [x for x in proof if x["of"].startswith("lyapunov.functions[0]")]
+    rest = [x for x in proof if not x["of"].startswith("lyapunov")]
+    place = next(k for k, x in enumerate(rest) if x["kind"] == "family-claim") + 1
+    many = [{**x, "of": x["of"].replace("[0]", f"[{k}]", 1)} for k in range(100) for x in own]
+    return {**data, "lyapunov": {"functions": [one] * 100}, "proof": rest[:place] + many + rest[place:]}
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -576,6 +601,8 @@ def with_long_weights(n: int) -> Json:
         lambda: hostile(60, multiplier=long_numbers(1)[0]),
         lambda: hostile(30, [(f"v{i}", f"v{j}", 1, 2) for i in range(31) for j in range(31) if i != j]),
         lambda: hostile(40, modes=50),
+        lambda: with_many_rows(8, 400, 10),
+        lambda: with_many_functions(60, 4),
     ],
 )
 def test_long_numbers_and_many_weights_are_answered_soon(make: Any):
