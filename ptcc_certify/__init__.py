@@ -13,7 +13,7 @@ The names at the top, by topic:
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
-- Runs: ``simulate``, ``Trajectory``
+- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
@@ -63,6 +63,7 @@ _EXPORTS = {
     "GainLimits": "protocols.gain_limits",
     # Runs
     "simulate": "simulation.run",
+    "simulate_family": "simulation.family_run",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",

@@ -16,7 +16,7 @@ from typing import Protocol
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
-from ptcc_certify.checker.family_function import FamilyFunction
+from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
@@ -131,7 +131,7 @@ def final_states(
 
 
 def check_family_bounds(
-    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], gains: Gains, x: Sequence[Fraction] | None
 ) -> None:
     """Verify final states and inputs."""
     labels = family.labels
@@ -152,7 +152,7 @@ def check_family_bounds(
 
 
 def _check_input(
-    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], gains: Gains, x: Sequence[Fraction] | None
 ) -> None:
     section = fields(doc.section("input"), ("bounded", "peaks"), "input")
     if section["bounded"] is None:

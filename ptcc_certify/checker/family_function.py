@@ -26,8 +26,6 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, 
 
 Vector = dict[int, Fraction]
 Whole = dict[int, int]
-#: Lyapunov functions that are read.
-MANY_FUNCTIONS = 100
 KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates")
 
 
@@ -97,22 +95,11 @@ class FamilyFunction:
         return Fraction(total, self.scale * (unit * scale) ** 2)
 
 
-def check_family_functions(doc: Document, family: Family) -> list[FamilyFunction]:
-    """Verify every function, its rates and constants."""
-    section = fields(doc.section("lyapunov"), ("functions",), "lyapunov")
-    items = entries(section["functions"], "functions")
-    need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
-    return [_function(doc, family, entry, f"lyapunov.functions[{k}]") for k, entry in enumerate(items)]
-
-
-def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunction:
+def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
+    """Verify a quadratic form of a component, or of a part of one that hears nobody else."""
     doc.at = of
     fields(entry, KEYS, "a Lyapunov function")
     need(entry["class"] in ("full", "diagonal", "undirected"), "an unknown class")
-    number = entry["component"]
-    need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
-    component = family.components[number]
-    need(not component.depends, "a Lyapunov function where there is no common kernel")
     graph = family.modes[0].structure.graph
     nodes = positions(doc, graph, entry["nodes"], "nodes of a function")
     pivots = set(component.pivots.values())
