@@ -31,6 +31,7 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -47,6 +48,14 @@ def certificate(family: Family, seed: int = 0, state: bool = True) -> Any:
 
 def document(family: Family, seed: int = 0, state: bool = True) -> Json:
     return {**certificate(family, seed, state).to_dict(), "unverified": {}}
+
+
+def document_of_rows(family: Family) -> Json:
+    """The same with functions of followers alone."""
+    parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
+    assert all(part.functions for part in parts)
+    state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
+    return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
 
 
 @cache
@@ -66,6 +75,10 @@ def cases() -> list[tuple[str, Json]]:
     found.append(("one node", document(Family.from_intervals([], nodes=["a"]))))
     apart = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("c", "d", -1, -1), ("d", "c", 1, 1)])
     found.append(("two components", document(apart)))
+    led = [("a", "b", 1, 2), ("b", "a", -1, -1), ("a", "c", -1, -1), ("c", "d", 1, 3), ("b", "d", "-1/2", 0)]
+    found.append(("rows", document_of_rows(Family.from_intervals(led))))
+    heard = [("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 3), ("a", "d", 1, 1), ("c", "d", 1, 2)]
+    found.append(("rows of camps", document_of_rows(Family.from_intervals(heard))))
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
