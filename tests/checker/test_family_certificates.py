@@ -647,6 +647,22 @@ def test_what_is_read_back_says_the_same(tmp_path: Path):
         assert read_certificate(made.to_dict()).final_states == made.final_states
 
 
+def test_functions_of_rows_are_read_back():
+    for name, data in cases():
+        if name.startswith("rows"):
+            saved = read_certificate(resealed(data))
+            assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["lyapunov"]["functions"]]
+            for told, ends in zip(data["final_state"].values(), saved.final_states, strict=True):
+                middle, radius = (Fraction(told[k]) for k in ("mid", "radius")) if isinstance(told, dict) else (told, 0)
+                middle = Fraction(middle)
+                assert middle - radius <= ends[0] <= ends[1] <= middle + radius
+            peaks = map(Fraction, data["input"]["peaks"].values())
+            assert all(
+                0 < own <= told < own * (1 + Fraction(1, 10**9))
+                for told, own in zip(peaks, saved.input_peaks, strict=True)
+            )
+
+
 def test_a_file_that_is_rejected_is_not_read(tmp_path: Path):
     data = next(data for name, data in cases() if name == "uncertain consensus")
     (tmp_path / "c.json").write_text(json.dumps(resealed({**data, "verdict": "undecided"})), encoding="utf-8")
