@@ -192,6 +192,9 @@ class FamilyOracle:
     def functions(self) -> None:
         steps = {x["of"]: x for x in self.data["proof"] if x["kind"] == "family-rate"}
         for number_of, said in enumerate(self.data["lyapunov"]["functions"]):
+            if said["class"] == "rows":
+                self.rows(said)
+                continue
             nodes = self.pieces[said["component"]]
             basis = self.common_kernel(nodes)
             if basis is None:
@@ -225,6 +228,47 @@ class FamilyOracle:
             self.require(list(said["coordinates"]) == said["nodes"], "coordinates by agent")
             for i, c in enumerate(said["coordinates"].values()):
                 self.require(G[i][i] <= number(c), "the constant of a coordinate")
+
+    def rows(self, said: Json) -> None:
+        """A function of rows, by the motion under single members from random states: ``W^2 <= e^(-rate s) W(0)^2``."""
+        nodes = self.pieces[said["component"]]
+        basis = self.common_kernel(nodes)
+        if basis is None:
+            self.require(False, "a function without a common kernel")
+            return
+        first = [c[0] for c in self.balanced_first(nodes)]
+        free = [v for v in nodes if v not in first]
+        C = np.array(self.lift(basis, nodes, free, first), dtype=float).reshape(len(free), len(nodes))
+        led = [self.index[label] for part in said["parts"] for label in part["nodes"]]
+        followers = [v for v in free if v not in led]
+        d = [float(number(x)) for x in said["vector"]]
+        self.require(len(d) == len(followers) and min(d) > 0 and len(set(led)) == len(led), "agents of a function")
+        self.require(all(part["function"]["component"] == said["component"] for part in said["parts"]), "a part")
+
+        def value(x: np.ndarray) -> float:
+            xi = dict(zip(free, C @ x, strict=True))
+            squares = [(xi[v] / s) ** 2 for v, s in zip(followers, d, strict=True)]
+            for part in said["parts"]:
+                z = np.array([xi[self.index[label]] for label in part["function"]["nodes"]])
+                P = np.array(self.symmetric(part["function"]["lower_triangle"]), dtype=float)
+                squares.append(float(z @ P @ z) / float(number(part["times"])) ** 2)
+            return max(squares)
+
+        rate, draw = float(number(said["rate"])), np.random.default_rng(0)
+        for some in self.members:
+            for L in some:
+                M = np.array(self.part(L, nodes), dtype=float)
+                size = max(float(abs(M).max()), 1e-300)
+                for _ in range(6):
+                    x = draw.choice([-1.0, 1.0], len(nodes)) * draw.choice([1.0, draw.random()], len(nodes))
+                    for s in (1e-3 / size, 0.1 / size, 1 / size):
+                        later = value(expm(-M * s) @ x)
+                        self.require(later <= np.exp(-rate * s) * value(x) * (1 + 1e-7) + 1e-12, "a rate of rows")
+
+    def balanced_first(self, nodes: list[int]) -> list[list[int]]:
+        said = self.data["structure"]["modes"][0]["closed_components"]
+        groups = [[self.index[label] for label in c["nodes"]] for c in said if c["balanced"]]
+        return [group for group in groups if group[0] in nodes]
 
     def lift(self, basis: Matrix, nodes: list[int], free: list[int], pivots: list[int]) -> Matrix:
         """The matrix ``C``: ``xi = x_free - B_free B_piv^-1 x_piv``, by rows, columns numbered as the nodes."""

@@ -126,6 +126,11 @@ class Component:
         return self.behaviour == DEPENDS
 
     @cached_property
+    def size(self) -> int:
+        """The number of its nodes and of the entries of the basis."""
+        return len(self.nodes) + sum(map(len, self.kernel.values()))
+
+    @cached_property
     def whole(self) -> tuple[dict[int, dict[int, int]], int]:
         """The rows of the basis in integers, and what divides them."""
         return _whole(self.kernel)
@@ -338,7 +343,8 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any
     for mode, edges in zip(modes, part.edges, strict=True):
         graph = mode.structure.graph
         count = sum(len(whole[u]) for v in part.nodes for u in graph.row(v))
-        spend(count, graph.bits, bits, "rows of kernels")
+        count += sum(len(whole[s]) + len(whole[t]) for s, t, _, low, high in edges if low < high)
+        spend(2 * count, graph.bits, bits, "rows of kernels")
         for v in part.nodes:
             need(not _row_product(graph.row(v), whole), "a column of the kernel is not at rest")
         for s, t, sign, low, high in edges:

@@ -1,6 +1,6 @@
 """Verifies the Lyapunov functions of a family: quadratic forms, and functions of followers by one pass over the rows.
 
-Section 15 of the format. A function of rows belongs to a component with common states at rest, in which the followers
+Section 19 of the format. A function of rows belongs to a component with common states at rest, in which the followers
 ``F`` are heard by nobody else. Parts ``j`` of the others have forms ``V_j`` of rates ``r_j``; agents in no part hear
 nobody. With positive ``d`` and ``t_j``, bounds ``e_l^2 >= t_j^2 coordinates_l`` and ``q_p^2 >= t_j^2 inputs_p`` of
 pivots ``p``, the square of ``W = max(max_F |xi_k| / d_k, max_j sqrt(V_j) / t_j)`` decays at the rate ``b`` if ``b`` is
@@ -22,11 +22,11 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.family import Component, Family, Part
 from ptcc_certify.checker.family_function import FamilyFunction, check_form
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import entries, exact, fields, need, same
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
@@ -76,7 +76,7 @@ class FollowerFunction:
         (kernel, unit), pivots = self.component.whole, self.component.pivots
         (whole,), scale = integers([[x[v] for v in self.component.nodes]])
         state = dict(zip(self.component.nodes, whole, strict=True))
-        spend(2 * len(self.vector), longest(whole), unit.bit_length() + 64, "a Lyapunov function")
+        spend(2 * self.component.size, longest(whole), unit.bit_length() + 64, "a Lyapunov function")
         top, bottom = 0, 1
         for v, d in self.vector.items():
             xi = abs(unit * state[v] - sum(b * state[pivots[j]] for j, b in kernel[v].items()))
@@ -113,14 +113,15 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     fields(entry, KEYS, "a Lyapunov function")
     items = entries(entry["parts"], "parts of a function")
     need(len(items) <= MANY_FUNCTIONS, "too many parts of a function")
-    parts = [_part(doc, family, component, item, f"{of}.parts[{j}]") for j, item in enumerate(items)]
+    number = entry["component"]
+    parts = [_part(doc, family, component, item, f"{of}.parts[{j}]", number) for j, item in enumerate(items)]
     led = [v for part in parts for v in part.bounds]
     need(len(led) == len(set(led)), "parts of a function share an agent")
     resting = set(component.pivots.values()).difference(led)
     outside = resting.union(led)
     followers = [v for v in component.nodes if v not in outside]
     need(bool(followers), "no followers")
-    _closed(family, component, [set(part.bounds) for part in parts], resting)
+    _closed(component, [set(part.bounds) for part in parts], resting)
     numbers = doc.open("family-rows", of, ["b"])
     rate = exact(entry["rate"])
     need(numbers["b"] == rate, "b is not the rate")
@@ -145,7 +146,7 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     return FollowerFunction(component, only, scale * common, parts, rate, inputs, coordinates)
 
 
-def _part(doc: Document, family: Family, component: Component, entry: Any, of: str) -> LeadingPart:
+def _part(doc: Document, family: Family, component: Component, entry: Any, of: str, number: int) -> LeadingPart:
     fields(entry, ("nodes", "function", "times", "bounds"), "a part of a function")
     nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a part")
     inside = set(nodes)
@@ -153,8 +154,11 @@ def _part(doc: Document, family: Family, component: Component, entry: Any, of: s
     kernel = {v: component.kernel[v] for v in nodes}
     pivots = {j: v for j, v in component.pivots.items() if v in inside}
     need(all(j in pivots for row in kernel.values() for j in row), "a part that hears others")
-    own = Component(nodes, None, component.behaviour, kernel, pivots)
+    spend(sum(map(len, component.part.edges)), what="parts of a function")
+    edges = [[edge for edge in some if edge[1] in inside] for some in component.part.edges]
+    own = Component(Part(nodes, None, edges, component.part.closed), component.behaviour, kernel, pivots)
     function = check_form(doc, family, own, entry["function"], of)
+    need(same(entry["function"]["component"], number), "another component of a part")
     times = exact(entry["times"])
     need(times > 0, "times is not positive")
     texts = entries(entry["bounds"], "bounds", len(nodes))
@@ -166,11 +170,11 @@ def _part(doc: Document, family: Family, component: Component, entry: Any, of: s
     return LeadingPart(function, times, bounds)
 
 
-def _closed(family: Family, component: Component, parts: Sequence[set[int]], resting: set[int]) -> None:
+def _closed(component: Component, parts: Sequence[set[int]], resting: set[int]) -> None:
     """Verify that agents of a part hear that part alone, and agents at rest nobody."""
     home = dict.fromkeys(resting, -1) | {v: j for j, part in enumerate(parts) for v in part}
-    for mode in family.modes:
-        for s, t, *_ in mode.edges:
+    for edges in component.part.edges:
+        for s, t, *_ in edges:
             if t in home:
                 need(home[t] >= 0 and home.get(s) == home[t], "an agent that is no follower hears others")
 
@@ -187,17 +191,18 @@ def _rows(
     rate, scale = aim
     kernel, unit = component.whole
     drifts = dict.fromkeys(followers, 0)
+    spend(2 * component.size, unit.bit_length() + 64, longest(speeds.values()), "rows of a family")
     if any(speeds.values()):
         moving = {j: speeds.get(v, 0) for j, v in component.pivots.items()}
         drifts = {v: sum(abs(b) * moving[j] for j, b in kernel[v].items()) for v in followers}
     own, most = dict.fromkeys(followers, True), dict.fromkeys(followers, Fraction(0))
     p, q = rate.as_integer_ratio()
-    for mode in family.modes:
-        bits = longest(edge[4] for edge in mode.edges)
-        spend(4 * len(mode.edges), bits, longest(sizes.values()), "rows of a family")
+    for mode, edges in zip(family.modes, component.part.edges, strict=True):
+        bits = longest(edge[4] for edge in edges)
+        spend(4 * (len(edges) + len(followers)), bits, longest(sizes.values()), "rows of a family")
         sized(2 * len(followers), bits + longest(sizes.values()) + 64, "rows of a family")
         pull, push = dict.fromkeys(followers, 0), dict.fromkeys(followers, 0)
-        for s, t, _, low, high in mode.edges:
+        for s, t, _, low, high in edges:
             if t in own:
                 d, other = sizes[t], sizes[s]
                 gap = d - other

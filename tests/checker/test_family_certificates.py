@@ -31,6 +31,7 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -47,6 +48,14 @@ def certificate(family: Family, seed: int = 0, state: bool = True) -> Any:
 
 def document(family: Family, seed: int = 0, state: bool = True) -> Json:
     return {**certificate(family, seed, state).to_dict(), "unverified": {}}
+
+
+def document_of_rows(family: Family) -> Json:
+    """The same with functions of followers alone."""
+    parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
+    assert all(part.functions for part in parts)
+    state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
+    return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
 
 
 @cache
@@ -66,6 +75,10 @@ def cases() -> list[tuple[str, Json]]:
     found.append(("one node", document(Family.from_intervals([], nodes=["a"]))))
     apart = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("c", "d", -1, -1), ("d", "c", 1, 1)])
     found.append(("two components", document(apart)))
+    led = [("a", "b", 1, 2), ("b", "a", -1, -1), ("a", "c", -1, -1), ("c", "d", 1, 3), ("b", "d", "-1/2", 0)]
+    found.append(("rows", document_of_rows(Family.from_intervals(led))))
+    heard = [("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 3), ("a", "d", 1, 1), ("c", "d", 1, 2)]
+    found.append(("rows of camps", document_of_rows(Family.from_intervals(heard))))
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
@@ -567,6 +580,31 @@ def with_long_weights(n: int) -> Json:
     return hostile(n, [("h", f"v{i}", 1, 1 + Fraction(x)) for i, x in enumerate(long_numbers(n))])
 
 
+def with_many_rows(followers: int, leaders: int, modes: int) -> Json:
+    """Uncertain edges between agents with the same long rows of the kernel."""
+    draw = random.Random(0)
+    first = [(f"l{i}", "f0", 1 + draw.randrange(9), 0) for i in range(leaders)]
+    known: Any = [(s, t, w, w) for s, t, w, _ in first]
+    known += [("f0", f"f{k}", 1, 2) for k in range(1, followers)]
+    pairs = [(f"f{i}", f"f{k}", 0, 1) for i in range(1, followers) for k in range(1, followers) if i != k]
+    family = Family.switching([Family.from_intervals(known + pairs)] * modes)
+    return family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+
+
+def with_many_functions(leaders: int, modes: int) -> Json:
+    """Functions of one agent that hears very many, each with its rates in all modes."""
+    edges = [(f"l{i}", "f", 1, 1) for i in range(leaders)]
+    family = Family.switching([Family.from_intervals(edges)] * modes)
+    data = document(family, state=False)
+    one = data["lyapunov"]["functions"][0]
+    proof = data["proof"]
+    own = [x for x in proof if x["of"].startswith("lyapunov.functions[0]")]
+    rest = [x for x in proof if not x["of"].startswith("lyapunov")]
+    place = next(k for k, x in enumerate(rest) if x["kind"] == "family-claim") + 1
+    many = [{**x, "of": x["of"].replace("[0]", f"[{k}]", 1)} for k in range(100) for x in own]
+    return {**data, "lyapunov": {"functions": [one] * 100}, "proof": rest[:place] + many + rest[place:]}
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -576,6 +614,8 @@ def with_long_weights(n: int) -> Json:
         lambda: hostile(60, multiplier=long_numbers(1)[0]),
         lambda: hostile(30, [(f"v{i}", f"v{j}", 1, 2) for i in range(31) for j in range(31) if i != j]),
         lambda: hostile(40, modes=50),
+        lambda: with_many_rows(8, 400, 10),
+        lambda: with_many_functions(60, 4),
     ],
 )
 def test_long_numbers_and_many_weights_are_answered_soon(make: Any):
@@ -605,6 +645,22 @@ def test_what_is_read_back_says_the_same(tmp_path: Path):
         saved.save(tmp_path / "again.json")
         assert (tmp_path / "again.json").read_bytes() == (tmp_path / f"{k}.json").read_bytes()
         assert read_certificate(made.to_dict()).final_states == made.final_states
+
+
+def test_functions_of_rows_are_read_back():
+    for name, data in cases():
+        if name.startswith("rows"):
+            saved = read_certificate(resealed(data))
+            assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["lyapunov"]["functions"]]
+            for told, ends in zip(data["final_state"].values(), saved.final_states, strict=True):
+                middle, radius = (Fraction(told[k]) for k in ("mid", "radius")) if isinstance(told, dict) else (told, 0)
+                middle = Fraction(middle)
+                assert middle - radius <= ends[0] <= ends[1] <= middle + radius
+            peaks = map(Fraction, data["input"]["peaks"].values())
+            assert all(
+                0 < own <= told < own * (1 + Fraction(1, 10**9))
+                for told, own in zip(peaks, saved.input_peaks, strict=True)
+            )
 
 
 def test_a_file_that_is_rejected_is_not_read(tmp_path: Path):
