@@ -44,6 +44,7 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analys
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
+from ptcc_certify.lyapunov.follower_function import FollowerFunction, follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
@@ -71,7 +72,7 @@ class ComponentProof:
     """
 
     component: FamilyComponent
-    functions: tuple[FamilyFunction, ...] = ()
+    functions: tuple[FamilyFunction | FollowerFunction, ...] = ()
     upper_bound: FamilyRateBound | None = None
 
     @property
@@ -190,11 +191,11 @@ class FamilyCertificate(Shown):
 
     # ------------------------------------------------------------------ bounds
 
-    def _bound_functions(self, part: ComponentProof) -> list[BoundFunction]:
-        if not part.functions:
-            return []
-        quotient = Quotient.of(part.component)
-        return [BoundFunction(quotient, V) for V in part.functions]
+    def _bound_functions(self, part: ComponentProof) -> list[BoundFunction | FollowerFunction]:
+        result: list[BoundFunction | FollowerFunction] = []
+        for V in part.functions:
+            result.append(BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V)
+        return result
 
     @cached_property
     def final_states(self) -> tuple[Interval | None, ...] | None:
@@ -411,6 +412,11 @@ def certify_family(
 
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
     if component.kernel is None or component.nodes.size == 1:
+        return ComponentProof(component)
+    if component.nodes.size > EXACT_NODES:
+        progress(STEPS[2])
+        with share_of_time(1.0, STEPS[2], notes):
+            return ComponentProof(component, tuple(follower_functions(component, notes=notes)))
         return ComponentProof(component)
     quotient = Quotient.of(component)
     bound, search = None, FamilySearch()

@@ -37,8 +37,8 @@ from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckRepo
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
 from ptcc_certify.checker.side_files import beside
-from ptcc_certify.errors import FormatError, one_line
-from ptcc_certify.graphs.rationals import format_exact, shorten
+from ptcc_certify.errors import one_line
+from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
 from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound
@@ -83,9 +83,6 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
 
 def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
-    if "modes" in document["graph"]:
-        what = "is the certificate of a family of graphs; ptcc check tells it"
-        raise FormatError(f"{shorten(str(path), 200)}: {what}, pages and figures are of one graph")
     graph = certificate_graph(document, path.parent)
     structure, protocol, data = analyse(graph), read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
     proof = tuple(_read_obligation(step) for step in document["proof"])

@@ -11,6 +11,7 @@ import numpy as np
 
 from lmi.exact.numbers import longest
 from ptcc_certify.certificate.format import producer
+from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
@@ -21,7 +22,6 @@ from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
-from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def family_document(certificate: FamilyCertificate, files: bool = False) -> tupl
         **family_sections(family, components, out),
         "protocol": certificate.protocol.to_dict(),
         **dict.fromkeys(NOT_OF_FAMILIES),
-        "lyapunov": {"functions": [_function(family, components[k], k, V) for k, V in functions]},
+        "lyapunov": {"functions": [_function(family, components[k], k, V, out) for k, V in functions]},
         "initial_state": out.state("start", certificate.initial_state),
         "final_state": None
         if finals is None
@@ -59,17 +59,9 @@ def family_document(certificate: FamilyCertificate, files: bool = False) -> tupl
     return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
 
 
-def _function(family: Family, component: FamilyComponent, number: int, V: FamilyFunction) -> dict[str, Any]:
+def _function(family: Family, component: FamilyComponent, number: int, V: Any, out: Writer) -> dict[str, Any]:
     labels = [family.labels[v] for v in component.nodes.tolist()]
-    return {
-        "class": V.kind,
-        "component": number,
-        "nodes": [labels[v] for v in V.nodes],
-        "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
-        "rate": format_exact(V.rate),
-        "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
-        "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
-    }
+    return rows_entry(labels, number, V, out) if V.kind == "rows" else form_entry(labels, number, V)
 
 
 def _up(x: Fraction) -> str:
@@ -93,18 +85,14 @@ def _enclosed(low: Fraction, high: Fraction) -> Any:
 def _proof(
     certificate: FamilyCertificate,
     components: Sequence[FamilyComponent],
-    functions: Sequence[tuple[int, FamilyFunction]],
+    functions: Sequence[tuple[int, Any]],
 ) -> list[dict[str, Any]]:
     family = certificate.family
     steps = [_step("structure", f"graph.modes[{k}]") for k in range(len(family.modes))]
     steps.append(_step("family-claim", "graph", claim_witnesses(family, components)))
     for k, (_, V) in enumerate(functions):
-        for mode, rate in enumerate(V.rates):
-            multipliers = V.multipliers[mode] if V.multipliers else ()
-            witness = {"multipliers": [format_exact(x) for x in multipliers]} if V.kind != "undirected" else None
-            of = f"lyapunov.functions[{k}].modes[{mode}]"
-            steps.append(_step("family-rate", of, witness, b=format_exact(rate)))
-        steps.append(_step("family-constants", f"lyapunov.functions[{k}]"))
+        own = (rows_steps if V.kind == "rows" else form_steps)(f"lyapunov.functions[{k}]", V)
+        steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
     steps += [_step("family-final-state", "final_state")] * (certificate.final_states is not None)
     return steps + [_step("family-input", "input")] * (certificate.bounded is not None)
 
@@ -155,14 +143,14 @@ def _edges(mode: Mode, out: Writer) -> Any:
     return {"count": mode.n_edges, "source": source, "target": target, **ends}
 
 
-def read_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
+def certificate_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
     """Return the family of an accepted certificate; ``folder`` holds its side files.
 
     Examples
     --------
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
-    >>> read_family(family_sections(family, decide(family))["graph"]) == family
+    >>> certificate_family(family_sections(family, decide(family))["graph"]) == family
     True
     """
     labels, modes, files = tuple(section["nodes"]), [], SideFiles(folder, None)

@@ -24,7 +24,7 @@ from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
-from ptcc_certify.checker.family_function import check_family_functions
+from ptcc_certify.checker.family_rows import check_family_functions
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input

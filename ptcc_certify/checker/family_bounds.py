@@ -15,7 +15,7 @@ from typing import Protocol
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
-from ptcc_certify.checker.family_function import FamilyFunction
+from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
@@ -86,13 +86,13 @@ def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) ->
 
 def deciding_nodes(family: Family, component: Component) -> list[int]:
     """Return the nodes that may have a say in the consensus: what reaches a closed component through any edges."""
-    inside = set(component.nodes)
-    heard: dict[int, set[int]] = {v: set() for v in inside}
-    found = [v for mode in family.modes for group in mode.structure.closed if group[0] in inside for v in group]
-    for mode in family.modes:
-        for s, t, _, _, _ in mode.edges:
-            if t in inside:
-                heard[t].add(s)
+    part = component.part
+    heard: dict[int, set[int]] = {v: set() for v in part.nodes}
+    pairs = zip(family.modes, part.closed, strict=True)
+    found = [v for mode, numbers in pairs for k in numbers for v in mode.structure.closed[k]]
+    for edges in part.edges:
+        for s, t, _, _, _ in edges:
+            heard[t].add(s)
     seen = set(found)
     for v in found:
         new = heard[v] - seen
@@ -112,7 +112,7 @@ def final_states(
         return dict.fromkeys(component.nodes)
     moves = deviations(functions, False, x)
     if component.behaviour == CONSENSUS:
-        camps = component.camps or {}
+        camps = component.part.camps or {}
         return dict(final_interval(component.nodes, camps, deciding_nodes(family, component), moves, x))
     largest = max(abs(x[v]) for v in component.nodes)
     result: dict[int, Interval | None] = {}
@@ -126,7 +126,7 @@ def final_states(
 
 
 def check_family_bounds(
-    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], gains: Gains, x: Sequence[Fraction] | None
 ) -> None:
     """Verify final states and inputs."""
     labels = family.labels
@@ -147,7 +147,7 @@ def check_family_bounds(
 
 
 def _check_input(
-    doc: Document, family: Family, functions: Sequence[FamilyFunction], gains: Gains, x: Sequence[Fraction] | None
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], gains: Gains, x: Sequence[Fraction] | None
 ) -> None:
     section = fields(doc.section("input"), ("bounded", "peaks"), "input")
     if section["bounded"] is None:

@@ -1,6 +1,6 @@
 """Verifies the Lyapunov functions of a family: one quadratic form for every signal, and what it says of agents.
 
-Section 15 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
+Section 19 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
 make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``,
 ``|delta_e| <= radius_e``.
 """
@@ -26,8 +26,6 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, 
 
 Vector = dict[int, Fraction]
 Whole = dict[int, int]
-#: Lyapunov functions that are read.
-MANY_FUNCTIONS = 100
 KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates")
 
 
@@ -97,22 +95,11 @@ class FamilyFunction:
         return Fraction(total, self.scale * (unit * scale) ** 2)
 
 
-def check_family_functions(doc: Document, family: Family) -> list[FamilyFunction]:
-    """Verify every function, its rates and constants."""
-    section = fields(doc.section("lyapunov"), ("functions",), "lyapunov")
-    items = entries(section["functions"], "functions")
-    need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
-    return [_function(doc, family, entry, f"lyapunov.functions[{k}]") for k, entry in enumerate(items)]
-
-
-def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunction:
+def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
+    """Verify a quadratic form of a component, or of a part of one that hears nobody else."""
     doc.at = of
     fields(entry, KEYS, "a Lyapunov function")
     need(entry["class"] in ("full", "diagonal", "undirected"), "an unknown class")
-    number = entry["component"]
-    need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
-    component = family.components[number]
-    need(not component.depends, "a Lyapunov function where there is no common kernel")
     graph = family.modes[0].structure.graph
     nodes = positions(doc, graph, entry["nodes"], "nodes of a function")
     pivots = set(component.pivots.values())
@@ -145,9 +132,9 @@ def _function(doc: Document, family: Family, entry: Any, of: str) -> FamilyFunct
 
 def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
-    mode, place, inside = family.modes[number], {v: i for i, v in enumerate(nodes)}, set(component.nodes)
+    mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
     kernel, scale = component.whole
-    edges = [edge for edge in mode.edges if edge[1] in inside]
+    spend(len(edges) + len(component.nodes), mode.unit.bit_length(), what="a quotient")
     rows: dict[int, Whole] = {v: {} for v in component.nodes}
     for s, t, sign, low, high in edges:
         for v, weight in ((t, low + high), (s, -sign * (low + high))):

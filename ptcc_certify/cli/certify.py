@@ -9,13 +9,15 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.families import certify_family, family_options, read_family
+from ptcc_certify.cli.families import certify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols import Protocol
 
 
 @click.command()
@@ -53,20 +55,29 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     Prints 8 lines, 10 or so where the answers take more; -v tells rates, the Lyapunov functions searched and used,
     proof obligations and the simulated run. Exit code 0: certified, and everything asked holds.
     """
+    from ptcc_certify.graphs.family import Family
+
     refuse_output(output)
-    if (family := read_family(graph, options)) is not None:
-        return certify_family(graph, family, output, as_json, screen, options)
-    return _certify_graph(graph[0], output, as_json, screen, options)
+    protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
+    if isinstance(given, Family):
+        return certify_family(graph, given, output, as_json, screen, options)
+    return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)
 
 
-def _certify_graph(graph: str, output: str | None, as_json: bool, screen: Screen, options: shared.Options) -> int:
+def _certify_graph(
+    graph: str,
+    signed: SignedDigraph,
+    protocol: Protocol,
+    output: str | None,
+    as_json: bool,
+    screen: Screen,
+    options: shared.Options,
+) -> int:
     """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
-    protocol = shared.protocol_of(options)
-    signed = shared.read(graph, options)
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     if options["x0"] == "random" and options["initial_bound"] is not None:

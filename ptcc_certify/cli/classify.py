@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.families import classify_family, family_options, read_family
-from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, read, reading_options
+from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
+from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, screen_options
 from ptcc_certify.errors import ExitCode
 
@@ -25,12 +25,14 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - tell what it does
     for every signal, or why that depends on the signal.
     """
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse
     from ptcc_certify.report.screen import structure_lines, structure_summary
 
-    if (family := read_family(graph, options)) is not None:
-        return classify_family(graph, family, expect, as_json, screen, options)
-    structure = analyse(read(graph[0], options))
+    given = read_graph_or_family(graph, options)
+    if isinstance(given, Family):
+        return classify_family(graph, given, expect, as_json, screen, options)
+    structure = analyse(given)
     if as_json:
         from ptcc_certify.certificate.format_graph import structure_document
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
@@ -71,9 +73,9 @@ def mode_options(command: Any) -> Any:
     return command
 
 
-def read_family(graphs: tuple[str, ...], options: shared.Options) -> Family | None:
-    """Return the family that files and options make; None where it is one graph with known weights."""
-    from ptcc_certify.graphs.io import read_family as run
+def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
+    """Return what files and options make: a family, or the graph where there is one, with known weights."""
+    from ptcc_certify.graphs.io import read_family
     from ptcc_certify.graphs.io.family_files import is_family_file
 
     if len(graphs) > 1 and not options["switching"]:
@@ -82,14 +84,25 @@ def read_family(graphs: tuple[str, ...], options: shared.Options) -> Family | No
         raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
     if graphs.count("-") > 1:
         raise ParameterError("- stands for standard input, which is one graph; name files for the others")
-    files = [shared.graph_file(graph) for graph in graphs]
+    files = [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
-        return None
+        return shared.read(files[0], options)
     how = {name: options[name] for name in shared.READING if name != "edges"}
     more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
-    family = run(files, orientation=options["edges"], **more, **how)
-    return None if family.graph is not None else family
+    family = read_family(files, orientation=options["edges"], **more, **how)
+    if family.graph is None:
+        return family
+    return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
+
+
+def _standard_input() -> BytesIO:
+    """Return standard input as a file that is read more than once."""
+    from ptcc_certify.graphs.io.files import read_bytes
+
+    file = BytesIO(read_bytes(shared.graph_file("-"), "standard input"))
+    file.name = "standard input"  # type: ignore[attr-defined]
+    return file
 
 
 def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
@@ -225,7 +238,7 @@ def same_family(
     """Compare the family of an accepted certificate with that of files; return the report, and how these were read."""
     from dataclasses import replace
 
-    from ptcc_certify.certificate.format_family import read_family as family_of
+    from ptcc_certify.certificate.format_family import certificate_family
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.family_difference import family_difference
 
@@ -233,10 +246,11 @@ def same_family(
         scenario = read_scenario(graphs[0])
         given = {name: value for name, value in scenario.options.items() if name in options}
         graphs, options = scenario.graphs, {**options, **given, "switching": len(scenario.graphs) > 1}
-    family = read_family(graphs, options) or Family.from_graph(shared.read(graphs[0], options))
+    read_back = read_graph_or_family(graphs, options)
+    family = read_back if isinstance(read_back, Family) else Family.from_graph(read_back)
     name, read = _names(graphs, family, options)
     how = {"graph_read": f"{name}, {read}"}
     if family.sha256 == report.sha256:
         return report, how
-    reason = f"another family than {name}: {family_difference(family_of(document['graph']), family)}"
+    reason = f"another family than {name}: {family_difference(certificate_family(document['graph']), family)}"
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how

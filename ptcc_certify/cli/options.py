@@ -267,12 +267,13 @@ def graph_file(graph: str) -> Any:
     return graph
 
 
-def read(graph: str, options: Options) -> SignedDigraph:
-    """Read GRAPH as the options say."""
+def read(graph: Any, options: Options) -> SignedDigraph:
+    """Read GRAPH, or a file object, as the options say."""
     from ptcc_certify.graphs.io import read_graph
 
     how = {name: options[name] for name in READING if name != "edges"}
-    return read_graph(graph_file(graph), orientation=options["edges"], **how)
+    file = graph_file(graph) if isinstance(graph, str) else graph
+    return read_graph(file, orientation=options["edges"], **how)
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

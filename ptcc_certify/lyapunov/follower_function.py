@@ -21,6 +21,7 @@ docs/theory/families.md, "Rows".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -33,7 +34,7 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
-from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above, rounded_up
+from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above
 from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.lyapunov.family_search import search_family
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
@@ -41,8 +42,11 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.family_kernel import Kernel, TooLarge
 
-#: Shares of the rate of the followers that the agents they follow may take: the larger, the smaller is ``W(0)``.
-LOSSES = (0.01, 0.3)
+#: Shares of the rate of the followers that the agents they follow may take: the larger, the smaller is ``W(0)``. Above
+#: ``MANY_FOLLOWERS`` there is one function alone.
+LOSSES, MANY_FOLLOWERS = (0.01, 0.3), 5000
+#: Bits of constants and values, which are rounded up; the check rounds likewise.
+CONSTANT_BITS = 64
 #: Bits of the least ``e``.
 _BITS = 24
 #: Agents of a part of ``R``, beyond which no function is searched for it.
@@ -74,6 +78,11 @@ class LeadingPart:
         """``t sqrt(c_l)``, rounded up, of the agents that are no pivots, by their numbers in the component."""
         pairs = zip(self.function.nodes, self.function.coordinate_constants, strict=True)
         return {int(self.agents[v]): self.times * root_above(c) for v, c in pairs}
+
+    @property
+    def ends(self) -> dict[int, Fraction]:
+        """``e_l``: the bounds as the rows take them, integers."""
+        return {v: Fraction(-(-bound // 1)) for v, bound in self.bounds.items()}
 
     @property
     def speeds(self) -> dict[int, Fraction]:
@@ -133,10 +142,10 @@ class FollowerFunction:
         sums = rows.largest_sums(np.concatenate([self.vector, self.outside]))
         result = dict.fromkeys(range(self.family.n_nodes), Fraction(0))
         for k, total in zip(self.followers.tolist(), sums.tolist(), strict=True):
-            result[k] = rounded_up((total * rows.unit) ** 2)
+            result[k] = rounded((total * rows.unit) ** 2, CONSTANT_BITS, up=True)
         for part in self.parts:
             for v, c in zip(part.agents.tolist(), part.function.input_constants, strict=True):
-                result[v] = rounded_up(c * part.times**2)
+                result[v] = rounded(c * part.times**2, CONSTANT_BITS, up=True)
         return result
 
     @cached_property
@@ -145,23 +154,30 @@ class FollowerFunction:
         return {k: Fraction(int(size)) ** 2 for k, size in enumerate(self._sizes.tolist()) if size}
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``W^2`` of a state of the component."""
+        """Return ``W^2`` of a state of the component, rounded up to 64 bits."""
         pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
-        largest = Fraction(0)
+        scale = math.lcm(*{y.denominator for y in x})
+        whole = [y.numerator * (scale // y.denominator) for y in x]
+        rest = [whole[p] for p in pivots]
+        top, bottom = Fraction(0), 1
         for k, d in zip(self.followers.tolist(), self.vector.tolist(), strict=True):
-            rest = sum((b * x[p] for b, p in zip(self.kernel.row(k), pivots, strict=True) if b), Fraction(0))
-            largest = max(largest, abs(x[k] - rest) / d)
-        squares = [largest**2]
+            xi = abs(whole[k] - sum(b * y for b, y in zip(self.kernel.row(k), rest, strict=True) if b))
+            if xi * bottom > top * d:
+                top, bottom = xi, d
+        squares = [(Fraction(top) / (bottom * scale)) ** 2]
         for part in self.parts:
-            xi = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
-            squares.append(part.function.value(xi) / part.times**2)
-        return max(squares)
+            own = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
+            squares.append(part.function.value(own) / part.times**2)
+        return rounded(max(squares), CONSTANT_BITS, up=True)
 
 
-def follower_functions(component: FamilyComponent, losses: Sequence[float] = LOSSES) -> Iterator[FollowerFunction]:
+def follower_functions(
+    component: FamilyComponent, losses: Sequence[float] = LOSSES, notes: list[str] | None = None
+) -> Iterator[FollowerFunction]:
     """Search and prove functions of a component that has followers and common states at rest; from the fastest.
 
-    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear.
+    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear;
+    ``notes`` is told which.
 
     Examples
     --------
@@ -176,10 +192,16 @@ def follower_functions(component: FamilyComponent, losses: Sequence[float] = LOS
         return
     parts = _leading_parts(family, followers)
     if parts is None:
+        if notes is not None:
+            notes.append("no function was found of the agents that lead")
         return
+    found, losses = False, losses if followers.size <= MANY_FOLLOWERS else losses[:1]
     for loss, decay in zip(losses, follower_decays(family, followers, [loss / 2 for loss in losses]), strict=False):
         if (function := _compose(component, decay, parts, loss)) is not None:
+            found = True
             yield function
+    if not found and notes is not None:
+        notes.append("the rows of the followers prove no rate")
 
 
 def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] | None:
@@ -237,8 +259,8 @@ def _compose(
         d, times = d << up, times * 2**up
         parts = [LeadingPart(p.agents, p.quotient, p.function, times) for p in parts]
         for part in parts:
-            for v, bound in part.bounds.items():
-                outside[place[v]] = -(-bound // 1)
+            for v, end in part.ends.items():
+                outside[place[v]] = int(end)
     gamma = composite_rate(rows, d, outside, _drifts(component.kernel, decay.nodes, parts))
     rate = min([rounded(2 * gamma, 53), *(part.function.rate for part in parts)])
     if rate <= 0:

@@ -207,7 +207,7 @@ class IntervalRows:
         on = (self.mode == policy.mode[self.target]) & (weights > 0)
         target, source, weights = self.target[on], self.source[on], weights[on]
         inside = source < self.n
-        diagonal = np.bincount(target, weights, self.n)
+        diagonal = np.bincount(target, weights, self.n).astype(float)  # of no edges they are integers
         M = sparse.csr_array(
             (-weights[inside], (target[inside], source[inside])), shape=(self.n, self.n)
         ) + sparse.diags_array(diagonal)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.format_family import read_family
-from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.structure_text import Lines, structure_text
@@ -129,52 +126,6 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
     return format_lines([*entries, ("verdict", certificate.assessment.text)])
 
 
-def family_check_lines(document: Mapping[str, Any]) -> list[str]:
-    r"""Return what ``ptcc check`` tells of the accepted certificate of a family, from its file alone.
-
-    Examples
-    --------
-    >>> unsure = Family.from_intervals([("a", "b", "0.9", "1.1")], undirected=True)
-    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1))
-    >>> print("\n".join(family_check_lines(cert.to_dict())))
-    family     the graph: 2 nodes, 2 edges, 2 uncertain
-    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1
-    claim      bipartite consensus at T = 1 for every signal
-    rate       3.59999, proved
-    input      bounded for every signal and every initial state
-    """
-    family, gains = read_family(document["graph"]), document["protocol"]
-    parts = document.get("components") or [{"nodes": family.labels, "claim": document["claim"]}]
-    entries = [("family", family_text(family, mode_name(family, 0)))]
-    told = ", ".join(f"{key}={near(exact(value), 12)}" for key, value in gains.items() if key != "kind")
-    entries.append(("protocol", f"{gains['kind']}: {told}"))
-    counts = Counter(part["claim"]["behaviour"] for part in parts)
-    for behaviour, count in counts.items():
-        whatever = "" if behaviour == DEPENDS else f" at T = {near(exact(gains['T']))} {WHATEVER['any']}"
-        entries.append(
-            ("claim", f"{behaviour}{whatever}" + f" in {count} of {len(parts)} components" * (len(parts) > 1))
-        )
-    rates: dict[int, Fraction] = {}
-    for V in document["lyapunov"]["functions"]:
-        rates[V["component"]] = max(rates.get(V["component"], Fraction(0)), exact(V["rate"]))
-    moving = {k for k, part in enumerate(parts) if len(part["nodes"]) > 1}
-    if moving and moving <= set(rates) and min(rates.values()) > 0:
-        entries.append(("rate", f"{down(min(rates.values()))}, proved"))
-    if document["final_state"] is not None:
-        ends = {label: None if entry is None else _ends(entry) for label, entry in document["final_state"].items()}
-        entries += _interval_entries([*ends], [*ends.values()], 2 * TEXT - 20)
-    if document["input"]["bounded"]:
-        entries += _peak_entries(family.labels, [exact(x) for x in (document["input"]["peaks"] or {}).values()])
-    return format_lines(entries)
-
-
-def _ends(entry: Any) -> tuple[Fraction, Fraction]:
-    if isinstance(entry, str):
-        return exact(entry), exact(entry)
-    middle, radius = exact(entry["mid"]), exact(entry["radius"])
-    return middle - radius, middle + radius
-
-
 # ---------------------------------------------------------------------- the family
 
 
@@ -184,15 +135,15 @@ def family_text(family: Family, name: str) -> str:
     Examples
     --------
     >>> family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair")
-    'pair: 2 nodes, 1 edge, 1 uncertain, all of them optional'
+    'pair: 2 nodes, 1 edge, 1 optional'
     """
     several = len(family.modes) > 1
     edges = sum(mode.n_edges for mode in family.modes)
     uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
     optional = sum(int(mode.optional.sum()) for mode in family.modes)
     rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
-    rest += f", {uncertain} uncertain" * bool(uncertain)
-    rest += f", {'all' if optional == uncertain else optional} of them optional" * bool(optional)
+    rest += f", {uncertain} uncertain" * (uncertain > optional)
+    rest += f", {optional}{' of them' * (uncertain > optional)} optional" * bool(optional)
     if not several:
         return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
     names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
@@ -274,7 +225,8 @@ def _claim_text(component: FamilyComponent, when: str, every: bool) -> str:
         return "not decided"
     if component.behaviour == DEPENDS:
         return DEPENDS if component.signal == "any" else "depends on which graph it is"
-    text = f"{sharpest(component)}{when} {WHATEVER[component.signal]}"
+    whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
+    text = f"{sharpest(component)}{when} {whatever}"
     sides = [_names(component, side.tolist(), TEXT if every else 20) for side in camps(component)]
     if component.behaviour == STABILITY or len(sides) < 2:
         return text

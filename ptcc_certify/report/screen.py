@@ -17,7 +17,7 @@ from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.family_screen import family_check_lines
+from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -42,6 +42,7 @@ from ptcc_certify.report.text_layout import (
     wrap_text,
 )
 from ptcc_certify.theorems.claims import Claim
+from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state import FinalState
@@ -129,23 +130,39 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
 
     Without a path, and where a number is beyond float64, nothing but the claim itself.
     """
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.format import read_document
-
     lines = []
     if report.accepted:
         claims = [part["claim"] for part in document.get("components") or [document]]
-        texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
+        texts = sorted({_file_claim(claim) for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
-    if report.accepted and "modes" in document["graph"]:
-        lines = family_check_lines(document)
-    elif report.accepted and path:
+    if report.accepted and path:
         with suppress(PTCCError):
-            certificate = Certificate(**read_document(Path(path), document, "", report))
-            told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
+            told = _file_summary(path, document, report)
             answers = dropwhile(lambda line: not line.startswith("protocol"), told)
             lines = list(takewhile(lambda line: not line.startswith("verdict"), answers))
     return wrap_lines([*lines, report.lines()[-1]])
+
+
+def _file_claim(claim: Mapping[str, str]) -> str:
+    """Tell a claim of a file in a few words."""
+    if "signal" not in claim:
+        return f"{claim['behaviour']} (Theorem {claim['theorem']})"
+    return claim["behaviour"] + f" {WHATEVER['any']}" * (claim["behaviour"] != DEPENDS)
+
+
+def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
+    """Return the short screen of an accepted certificate, of a graph or a family, as its file says it."""
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.certificate_data import Source
+    from ptcc_certify.certificate.format import read_document
+    from ptcc_certify.certificate.read_family_certificate import read_family_certificate
+
+    origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
+    if "modes" in document["graph"]:
+        return family_summary(
+            read_family_certificate(Source(Path(path), "", document, report, None, ())), path, origins
+        )
+    return summary_lines(Certificate(**read_document(Path(path), document, "", report)), path, origins)
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:

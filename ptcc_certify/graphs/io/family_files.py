@@ -181,6 +181,8 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
         return None
     if low is None and ends[2] is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
+    if low is not None and share:
+        raise FormatError(f"{name}: gives intervals itself; leave out the uncertainty, or write those of all files")
     if orientation != "information":
         ends = ends[1], ends[0], ends[2]
     nodes: dict[str, None] = {}
@@ -198,6 +200,8 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
                 f"{where}: second row for edge {_text(edge)} (the first is line {rows[edge[:2]][0]}); {mend}"
             )
         rows[edge[:2]] = number, edge
+    if not nodes:
+        raise FormatError(f"{name}: no edge and no node below the header; give rows")
     return list(nodes), [row for _, row in rows.values()]
 
 

@@ -1,0 +1,75 @@
+"""Functions of followers in the file of a family's certificate, and their obligations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
+
+#: Bits of integers that floats hold.
+_FLOAT_BITS = 53
+
+
+def form_entry(labels: list[str], number: int, V: FamilyFunction) -> dict[str, Any]:
+    """Return a quadratic form of the agents ``labels``."""
+    return {
+        "class": V.kind,
+        "component": number,
+        "nodes": [labels[v] for v in V.nodes],
+        "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
+        "rate": format_exact(V.rate),
+        "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
+        "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
+    }
+
+
+def rows_entry(labels: list[str], number: int, V: FollowerFunction, out: Writer) -> dict[str, Any]:
+    """Return a function of the followers of a component of the agents ``labels``."""
+    return {
+        "class": V.kind,
+        "component": number,
+        "vector": _vector(V.vector, out),
+        "parts": [_part(labels, number, part) for part in V.parts],
+        "rate": format_exact(V.rate),
+    }
+
+
+def _vector(d: np.ndarray, out: Writer) -> Any:
+    """Write positive integers; a long vector as floats, which hold what was rounded to their bits."""
+    odd = max((int(x).bit_length() - (int(x) & -int(x)).bit_length() for x in d.tolist()), default=0)
+    if out.aside(d.size) and odd < _FLOAT_BITS and int(d.max()).bit_length() < 1000:
+        return out.floats("vector", d.astype(float))
+    return [str(x) for x in d.tolist()]
+
+
+def _part(labels: list[str], number: int, part: LeadingPart) -> dict[str, Any]:
+    own = [labels[v] for v in part.agents.tolist()]
+    bounds = part.ends | part.speeds
+    return {
+        "nodes": own,
+        "function": form_entry(own, number, part.function),
+        "times": format_exact(part.times),
+        "bounds": [format_exact(bounds[v]) for v in part.agents.tolist()],
+    }
+
+
+def form_steps(of: str, V: FamilyFunction) -> Iterator[tuple[str, str, Any, dict[str, str]]]:
+    """Yield kind, place, witness and numbers of the obligations of a quadratic form."""
+    for mode, rate in enumerate(V.rates):
+        multipliers = V.multipliers[mode] if V.multipliers else ()
+        witness = {"multipliers": [format_exact(x) for x in multipliers]} if V.kind != "undirected" else None
+        yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
+    yield "family-constants", of, None, {}
+
+
+def rows_steps(of: str, V: FollowerFunction) -> Iterator[tuple[str, str, Any, dict[str, str]]]:
+    """Yield the same of a function of followers: of its parts, then of its rows."""
+    for j, part in enumerate(V.parts):
+        yield from form_steps(f"{of}.parts[{j}]", part.function)
+    yield "family-rows", of, None, {"b": format_exact(V.rate)}

@@ -1,0 +1,211 @@
+"""Verifies the Lyapunov functions of a family: quadratic forms, and functions of followers by one pass over the rows.
+
+Section 15 of the format. A function of rows belongs to a component with common states at rest, in which the followers
+``F`` are heard by nobody else. Parts ``j`` of the others have forms ``V_j`` of rates ``r_j``; agents in no part hear
+nobody. With positive ``d`` and ``t_j``, bounds ``e_l^2 >= t_j^2 coordinates_l`` and ``q_p^2 >= t_j^2 inputs_p`` of
+pivots ``p``, the square of ``W = max(max_F |xi_k| / d_k, max_j sqrt(V_j) / t_j)`` decays at the rate ``b`` if ``b`` is
+at most every ``r_j`` and for every row of ``F`` in every mode
+
+    2 sum_(l in F) |w| (d_k - d_l) + 2 sum_(l not in F) |w| (d_k - e_l) - 2 sum_p |B_kp| q_p  >=  b d_k
+
+at ``w+`` where the bracket is negative, at ``w-`` elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.family_function import FamilyFunction, check_form
+from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import entries, exact, fields, need
+
+#: Lyapunov functions that are read.
+MANY_FUNCTIONS = 100
+#: Bits of constants and values, which are rounded up.
+BITS = 64
+KEYS = ("class", "component", "vector", "parts", "rate")
+
+
+@dataclass(frozen=True)
+class LeadingPart:
+    """A part that the followers hear: its form, ``t``, and bounds of its agents, speeds of pivots, times ``W``."""
+
+    function: FamilyFunction
+    times: Fraction
+    bounds: dict[int, Fraction]
+
+
+@dataclass(frozen=True)
+class FollowerFunction:
+    """A function of rows that was verified: ``W^2 <= e^(-rate s) W(0)^2`` for every signal.
+
+    Attributes
+    ----------
+    component : Component
+    vector : dict of int to int
+        ``d`` of every follower,
+    scale : int
+        over this.
+    parts : list of LeadingPart
+    rate : Fraction
+    inputs : dict of int to Fraction
+        ``|(L X)_k|^2 <= inputs[k] W^2`` for every member.
+    coordinates : dict of int to Fraction
+        ``xi_k^2 <= coordinates[k] W^2``.
+    """
+
+    component: Component
+    vector: dict[int, int]
+    scale: int
+    parts: list[LeadingPart]
+    rate: Fraction
+    inputs: dict[int, Fraction]
+    coordinates: dict[int, Fraction]
+
+    def value(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``W^2`` of a state, rounded up."""
+        (kernel, unit), pivots = self.component.whole, self.component.pivots
+        (whole,), scale = integers([[x[v] for v in self.component.nodes]])
+        state = dict(zip(self.component.nodes, whole, strict=True))
+        spend(2 * len(self.vector), longest(whole), unit.bit_length() + 64, "a Lyapunov function")
+        top, bottom = 0, 1
+        for v, d in self.vector.items():
+            xi = abs(unit * state[v] - sum(b * state[pivots[j]] for j, b in kernel[v].items()))
+            if xi * bottom > top * d:
+                top, bottom = xi, d
+        squares = [Fraction(top * self.scale, bottom * unit * scale) ** 2]
+        squares += [part.function.value(x) / part.times**2 for part in self.parts]
+        return rounded(max(squares), BITS, up=True)
+
+
+Function = FamilyFunction | FollowerFunction
+
+
+def check_family_functions(doc: Document, family: Family) -> list[Function]:
+    """Verify every function, its rates and constants."""
+    section = fields(doc.section("lyapunov"), ("functions",), "lyapunov")
+    items = entries(section["functions"], "functions")
+    need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
+    result: list[Function] = []
+    for k, entry in enumerate(items):
+        doc.at = of = f"lyapunov.functions[{k}]"
+        need(isinstance(entry, dict) and "component" in entry and "class" in entry, "a Lyapunov function")
+        number = entry["component"]
+        need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
+        component = family.components[number]
+        need(not component.depends, "a Lyapunov function where there is no common kernel")
+        check = check_rows if entry["class"] == "rows" else check_form
+        result.append(check(doc, family, component, entry, of))
+    return result
+
+
+def check_rows(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FollowerFunction:
+    """Verify a function of rows."""
+    fields(entry, KEYS, "a Lyapunov function")
+    items = entries(entry["parts"], "parts of a function")
+    need(len(items) <= MANY_FUNCTIONS, "too many parts of a function")
+    parts = [_part(doc, family, component, item, f"{of}.parts[{j}]") for j, item in enumerate(items)]
+    led = [v for part in parts for v in part.bounds]
+    need(len(led) == len(set(led)), "parts of a function share an agent")
+    resting = set(component.pivots.values()).difference(led)
+    outside = resting.union(led)
+    followers = [v for v in component.nodes if v not in outside]
+    need(bool(followers), "no followers")
+    _closed(family, component, [set(part.bounds) for part in parts], resting)
+    numbers = doc.open("family-rows", of, ["b"])
+    rate = exact(entry["rate"])
+    need(numbers["b"] == rate, "b is not the rate")
+    need(all(rate <= part.function.rate for part in parts), "a part that the followers hear is slower")
+    vector = doc.files.numbers(entry["vector"], "vector", len(followers))
+    need(vector.positive(), "the vector is not positive")
+    own, scale = vector.over(range(len(followers)))
+    pivots = set(component.pivots.values())
+    (bounds,), common = integers([[part.bounds[v] for part in parts for v in part.bounds]])
+    sized(2 * len(followers), longest(own) + common.bit_length() + scale.bit_length(), "the vector")
+    sizes = {v: d * common for v, d in zip(followers, own, strict=True)}
+    others = {v: b * scale for v, b in zip(led, bounds, strict=True)}
+    speeds = {v: b for v, b in others.items() if v in pivots}
+    sizes |= {v: 0 if v in pivots else b for v, b in others.items()} | dict.fromkeys(resting, 0)
+    inputs = _rows(family, component, followers, sizes, speeds, (rate, scale * common))
+    doc.done(f"b = {down(rate)}, {len(followers)} rows")
+    for part in parts:
+        inputs |= {v: rounded(c * part.times**2, BITS, up=True) for v, c in part.function.inputs.items()}
+    inputs |= dict.fromkeys(resting, Fraction(0))
+    coordinates = {v: Fraction(size, scale * common) ** 2 for v, size in sizes.items() if size}
+    only = {v: sizes[v] for v in followers}
+    return FollowerFunction(component, only, scale * common, parts, rate, inputs, coordinates)
+
+
+def _part(doc: Document, family: Family, component: Component, entry: Any, of: str) -> LeadingPart:
+    fields(entry, ("nodes", "function", "times", "bounds"), "a part of a function")
+    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a part")
+    inside = set(nodes)
+    need(nodes == [v for v in component.nodes if v in inside] and bool(nodes), "nodes of a part")
+    kernel = {v: component.kernel[v] for v in nodes}
+    pivots = {j: v for j, v in component.pivots.items() if v in inside}
+    need(all(j in pivots for row in kernel.values() for j in row), "a part that hears others")
+    own = Component(nodes, None, component.behaviour, kernel, pivots)
+    function = check_form(doc, family, own, entry["function"], of)
+    times = exact(entry["times"])
+    need(times > 0, "times is not positive")
+    texts = entries(entry["bounds"], "bounds", len(nodes))
+    bounds = dict(zip(nodes, map(exact, texts), strict=True))
+    leading = set(pivots.values())
+    for v, bound in bounds.items():
+        c = function.inputs[v] if v in leading else function.coordinates[v]
+        need(bound >= 0 and bound**2 >= times**2 * c, "the bound of an agent of a part is not proved")
+    return LeadingPart(function, times, bounds)
+
+
+def _closed(family: Family, component: Component, parts: Sequence[set[int]], resting: set[int]) -> None:
+    """Verify that agents of a part hear that part alone, and agents at rest nobody."""
+    home = dict.fromkeys(resting, -1) | {v: j for j, part in enumerate(parts) for v in part}
+    for mode in family.modes:
+        for s, t, *_ in mode.edges:
+            if t in home:
+                need(home[t] >= 0 and home.get(s) == home[t], "an agent that is no follower hears others")
+
+
+def _rows(
+    family: Family,
+    component: Component,
+    followers: Sequence[int],
+    sizes: dict[int, int],
+    speeds: dict[int, int],
+    aim: tuple[Fraction, int],
+) -> dict[int, Fraction]:
+    """Verify all rows at the rate ``aim[0]``; return the constants of inputs. Sizes and speeds are over ``aim[1]``."""
+    rate, scale = aim
+    kernel, unit = component.whole
+    drifts = dict.fromkeys(followers, 0)
+    if any(speeds.values()):
+        moving = {j: speeds.get(v, 0) for j, v in component.pivots.items()}
+        drifts = {v: sum(abs(b) * moving[j] for j, b in kernel[v].items()) for v in followers}
+    own, most = dict.fromkeys(followers, True), dict.fromkeys(followers, Fraction(0))
+    p, q = rate.as_integer_ratio()
+    for mode in family.modes:
+        bits = longest(edge[4] for edge in mode.edges)
+        spend(4 * len(mode.edges), bits, longest(sizes.values()), "rows of a family")
+        sized(2 * len(followers), bits + longest(sizes.values()) + 64, "rows of a family")
+        pull, push = dict.fromkeys(followers, 0), dict.fromkeys(followers, 0)
+        for s, t, _, low, high in mode.edges:
+            if t in own:
+                d, other = sizes[t], sizes[s]
+                gap = d - other
+                pull[t] += (high if gap < 0 else low) * gap
+                push[t] += high * (d + other)
+        for v in followers:
+            lost = drifts[v] * mode.unit
+            need(2 * q * (unit * pull[v] - lost) >= p * mode.unit * unit * sizes[v], "a row does not decay fast enough")
+        for v, total in push.items():
+            most[v] = max(most[v], Fraction(total, mode.unit * scale))
+    return {v: rounded(x**2, BITS, up=True) for v, x in most.items()}
