@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.families import mode_options, read_family, refuse_options
+from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.terminal import FIGURES, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -90,15 +90,16 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
 
 def _run(graphs: tuple[str, ...], protocol: Protocol, options: shared.Options) -> Trajectory:
     """Return the run of a graph, or of a family under a signal."""
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.simulation.run import simulate as run
 
     steps = options["steps"]
     times = None if steps is None else [protocol.T * k / steps for k in range(steps + 1)]
-    if (family := read_family(graphs, options)) is not None:
-        return _run_family(family, protocol, times, options)
+    signed = read_graph_or_family(graphs, options)
+    if isinstance(signed, Family):
+        return _run_family(signed, protocol, times, options)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families (--switching, --uncertainty, intervals); this is one graph")
-    signed = shared.read(graphs[0], options)
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         more |= {"noise": "telegraph", "noise_bound": options["noise"]}
