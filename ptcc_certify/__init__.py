@@ -18,8 +18,8 @@ The names at the top, by topic:
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
-  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``save_figure``,
-  ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
+  ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -93,6 +93,8 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
+    "plot_family": "report.plots.family",
+    "plot_family_decay": "report.plots.family",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",

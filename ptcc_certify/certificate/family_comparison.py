@@ -40,7 +40,7 @@ class FamilyComparison:
     input_ratio : float or None
         ``max |u_k(t)|`` over the proved peak.
     lyapunov_ratio : float or None
-        ``max sqrt(V(s) / (e^(-r s) V(0)))`` for ``s > 0``, over all Lyapunov functions.
+        ``max sqrt(V(s) / (e^(-r s) V(0)))`` for ``s > 0``, over all quadratic Lyapunov functions.
     mode_ratio : float or None
         The same with ``sum_i r_i s_i`` instead of ``r s``, ``s_i`` the clock spent in mode ``i``.
     floor : float
@@ -125,7 +125,7 @@ def compare(certificate: FamilyCertificate, run: FamilyTrajectory) -> FamilyComp
 
 
 def worst_case_signals(certificate: FamilyCertificate, step: float | None = None) -> list[WorstCaseSignal]:
-    """Return the worst-case searches against every Lyapunov function of a certificate, and against the largest state.
+    """Return the searches for worst cases: against every quadratic Lyapunov function, and against the largest state.
 
     Parameters
     ----------
@@ -139,10 +139,11 @@ def worst_case_signals(certificate: FamilyCertificate, step: float | None = None
 
 
 def functions_of(certificate: FamilyCertificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
-    """Yield every Lyapunov function with the nodes of its component and the coordinates it is in."""
+    """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
     for part in certificate.parts:
-        quotient = Quotient.of(part.component) if part.functions else None
-        for V in part.functions:
+        quadratic = [V for V in part.functions if isinstance(V, FamilyFunction)]
+        quotient = Quotient.of(part.component) if quadratic else None
+        for V in quadratic:
             assert quotient is not None
             yield part.component.nodes, quotient, V
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.io import as_states
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.io import as_family, as_states
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -215,7 +214,7 @@ class _Course:
 
 @gated
 def simulate_family(
-    family: Family,
+    family: Any,
     protocol: Protocol,
     x0: Any,
     signal: Any = "random",
@@ -231,7 +230,8 @@ def simulate_family(
 
     Parameters
     ----------
-    family : Family
+    family : family-like
+        Whatever :func:`ptcc_certify.as_family` takes: a Family, graphs by name, edges with intervals.
     protocol : NominalProtocol
     x0 : state-like
         N numbers in the order of ``family.labels``, or by label.
@@ -251,7 +251,7 @@ def simulate_family(
     Raises
     ------
     ParameterError
-        No family, another protocol than the nominal one, an initial state, option or signal that does not fit.
+        Another protocol than the nominal one, an initial state, option or signal that does not fit.
     SimulationError
         The integrator failed, or the signal switches too often.
 
@@ -261,15 +261,13 @@ def simulate_family(
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.family import Family
-    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
+    >>> unsure = [("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")]
     >>> run = simulate_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2], "worst-case")
     >>> run.signal, run.deadline_resolved, run.final_state.round(9) + 0
     ('worst case', True, array([0., 0.]))
     """
     begin, tolerances = time.perf_counter(), Tolerances(rtol, atol)
-    if not isinstance(family, Family):
-        raise ParameterError(f"{shorten(repr(family))} is no family; simulate runs one graph")
+    family = as_family(family)
     refuse_no_protocol(protocol)
     if protocol.reaching is not None:
         raise ParameterError("families run under the nominal protocol; give NominalProtocol(..)")

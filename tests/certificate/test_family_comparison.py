@@ -1,5 +1,6 @@
 """Facts about runs of families against their certificates: no signal exceeds what is proved for every signal."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -78,8 +79,6 @@ def test_a_certificate_that_claims_too_much_is_found_out():
     family = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
     certificate = certify_family(family, PROTOCOL, [1, 2])
     part = certificate.parts[0]
-    from dataclasses import replace
-
     boast = [replace(V, rates=tuple(r * Fraction(11, 10) for r in V.rates)) for V in part.functions]
     wrong = replace(certificate, parts=(replace(part, functions=tuple(boast)),))
     seen = [

@@ -73,6 +73,7 @@ def test_a_run_is_a_product_of_exponentials_of_its_members(family):
 def test_a_family_of_one_graph_runs_like_the_graph():
     one, x0 = Family.from_graph(DAY), [3, -1, 2]
     run, known = simulate_family(one, PROTOCOL, x0, ConstantSignal()), simulate(DAY, PROTOCOL, x0)
+    assert simulate_family(DAY, PROTOCOL, x0) == simulate_family(one, PROTOCOL, x0)
     assert np.abs(run.states - known.states).max() < 1e-8
     assert run.deadline_resolved
     shown = run.remaining > 1e-4
@@ -152,7 +153,7 @@ def test_equal_seeds_give_equal_runs_and_others_do_not():
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: simulate_family(DAY, PROTOCOL, [1, 2, 3]), "is no family"),
+        (lambda: simulate_family(PAIR, PROTOCOL.T, [1, 2, 3]), "rotocol"),
         (lambda: simulate_family(PAIR, PROTOCOL, [1, 2, 3], "dusk.csv"), "one of random, worst-case"),
         (lambda: simulate_family(PAIR, PROTOCOL, [1, 2, 3], [(0, "dusk")]), "no mode dusk; it has day, night"),
         (lambda: simulate_family(PAIR, PROTOCOL, np.ones((3, 2))), "one initial state at a time"),
