@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
@@ -15,6 +17,8 @@ from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 
@@ -30,12 +34,14 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])
         for component, claim in zip(decide(family), claims, strict=True)
     ]
-    functions: list[list[FamilyFunction]] = [[] for _ in components]
+    reader = Reader(family.labels, source.path.parent)
+    functions: list[list[FamilyFunction | FollowerFunction]] = [[] for _ in components]
     for k, section in enumerate(document["lyapunov"]["functions"]):
         number = section["component"]
-        functions[number].append(_read_function(k, section, components[number], document["proof"]))
+        of = f"lyapunov.functions[{k}]"
+        functions[number].append(_read_function(of, section, components[number], document, reader))
     parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
-    state = Reader(family.labels, source.path.parent).state(document["initial_state"])
+    state = reader.state(document["initial_state"])
     expectations = _read_expectations(document["unverified"].get("asked"))
     return FamilyCertificate(family, read_protocol(document["protocol"]), parts, state, expectations, source=source)
 
@@ -48,12 +54,43 @@ def _read_expectations(asked: Any) -> Expectations:
         return Expectations()
 
 
-def _read_function(number: int, section: Mapping[str, Any], component: FamilyComponent, proof: Any) -> FamilyFunction:
-    labels = component.family.labels
+def _read_function(
+    of: str, section: Mapping[str, Any], component: FamilyComponent, document: Mapping[str, Any], reader: Reader
+) -> FamilyFunction | FollowerFunction:
+    if section["class"] == "rows":
+        return _read_rows(of, section, component, document, reader)
+    return _read_form(of, section, component.family.labels, document["proof"])
+
+
+def _read_rows(
+    of: str, section: Mapping[str, Any], component: FamilyComponent, document: Mapping[str, Any], reader: Reader
+) -> FollowerFunction:
+    family, kernel = component.family, component.kernel
+    assert kernel is not None, "the check has verified that there is a common kernel"
+    index = {label: v for v, label in enumerate(family.labels)}
+    outside = {c.nodes[0]: 0 for c in kernel.structure.closed_components if c.balanced}
+    parts = []
+    for j, entry in enumerate(section["parts"]):
+        agents = np.array([index[label] for label in entry["nodes"]], dtype=np.int64)
+        quotient = Quotient.of(decide(family.restricted(agents))[0])
+        labels = quotient.family.labels
+        function = _read_form(f"{of}.parts[{j}]", entry["function"], labels, document["proof"])
+        parts.append(LeadingPart(agents, quotient, function, exact(entry["times"])))
+        pivots = {int(agents[v]) for v in quotient.pivots}
+        bounds = zip(agents.tolist(), map(exact, entry["bounds"]), strict=True)
+        outside |= {v: 0 if v in pivots else int(bound) for v, bound in bounds}
+    followers = np.setdiff1d(np.arange(family.n_nodes), list(outside))
+    d = reader.files.numbers(section["vector"], "vector", followers.size)
+    vector = np.array([int(x) for x in d], dtype=object)
+    ends = np.array([outside[v] for v in sorted(outside)], dtype=object)
+    return FollowerFunction(family, kernel, followers, vector, ends, tuple(parts), exact(section["rate"]))
+
+
+def _read_form(of: str, section: Mapping[str, Any], labels: Sequence[str], proof: Any) -> FamilyFunction:
     index = {label: v for v, label in enumerate(labels)}
     nodes = tuple(index[label] for label in section["nodes"])
     matrix = triangle(section["lower_triangle"], len(nodes))
-    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"lyapunov.functions[{number}].")]
+    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes")]
     witnesses = [step["witness"] for step in steps if step["witness"] is not None]
     ends = prove_ends(matrix)
     assert ends is not None, "the check has proved it definite"
