@@ -2,8 +2,8 @@
 
     OPENBLAS_NUM_THREADS=1 python benchmarks/families.py [--nodes 10000 100000] [--uncertainty 10%]
 
-A ring of ten agents leads; every other agent listens to six random ones, a fifth of them to one of the ring; weights 1/2
-to 2, known up to the uncertainty; two camps.
+A ring of ten agents leads; every other agent listens to six random ones, a fifth of them to one of the ring; two camps,
+weights 1/2 to 2, known up to the uncertainty.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def one(n: int, uncertainty: str) -> None:
     protocol = NominalProtocol(T=1, rho1=1, rho2=30, kappa=3)
     start = time.process_time()
     certificate = certify_family(family, protocol, [k % 7 for k in range(n)])
-    document, files = certificate.for_check()
+    _, files = certificate.for_check()
     made, memory = time.process_time() - start, megabytes()
     start = time.process_time()
     report = certificate.checked
