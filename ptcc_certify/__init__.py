@@ -10,9 +10,10 @@ cert.save("certificate.json")
 The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
+- Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
-- Runs: ``simulate``, ``Trajectory``
+- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
@@ -47,6 +48,11 @@ _EXPORTS = {
     "write_graph": "graphs.io",
     "analyse": "graphs.structure",
     "Structure": "graphs.structure",
+    # Families of graphs
+    "Family": "graphs.family",
+    "as_family": "graphs.io",
+    "read_family": "graphs.io",
+    "decide": "theorems.family_behaviour",
     # Protocols, disturbances, actuators
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
@@ -57,6 +63,7 @@ _EXPORTS = {
     "GainLimits": "protocols.gain_limits",
     # Runs
     "simulate": "simulation.run",
+    "simulate_family": "simulation.family_run",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
@@ -98,7 +105,13 @@ _EXPORTS = {
 }
 __all__ = [*_EXPORTS, "__version__"]
 #: What others call a public name.
-_ALSO_CALLED = {"analyze": "analyse", "classify": "analyse", "load_certificate": "read_certificate"}
+_ALSO_CALLED = {
+    "analyze": "analyse",
+    "classify": "analyse",
+    "load_certificate": "read_certificate",
+    "plot_states": "plot_trajectory",
+    "load_graph": "as_graph",
+}
 
 
 class Room(ModuleType):

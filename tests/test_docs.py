@@ -89,8 +89,19 @@ NO_SOURCE = {
     },
     "a time limit is what its definition says": {"time_limit"},
     "BibTeX is the source": {"cite"},
+    "families are new here: their page is docs/theory/families.md": {"Family", "decide"},
     "files and numbers are converted": {
-        *("as_graph", "as_state", "read_graph", "write_graph", "read_state", "dyadic_integers", "round_to_bits")
+        *(
+            "as_family",
+            "read_family",
+            "as_graph",
+            "as_state",
+            "read_graph",
+            "write_graph",
+            "read_state",
+            "dyadic_integers",
+            "round_to_bits",
+        )
     },
     "figures, pages and tables show what was computed elsewhere": of_modules("plots", "report", "explorer", "batch"),
     "certificates that are read back state what was proved before": {"read_certificate", "RejectedCertificate"},

@@ -20,18 +20,27 @@ from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
+from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.certificate.format_vectors import side_files
-from ptcc_certify.certificate.request import Expectations, read_initial_state
+from ptcc_certify.certificate.request import (
+    Expectations,
+    listener,
+    origins_of,
+    read_expectations,
+    read_initial_state,
+    read_seconds,
+)
+from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.display_hook import Shown, family_summary
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse, behaviour_name
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
@@ -114,6 +123,8 @@ class FamilyCertificate(Shown):
     notes : tuple of str
     source : Source or None
         The file that it was read from.
+    origins : mapping of str to str
+        What ``"graph"`` is called, and where ``"x(0)"`` comes from.
 
     References
     ----------
@@ -136,6 +147,31 @@ class FamilyCertificate(Shown):
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
     source: Source | None = None
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def common(self) -> bool:
+        """Whether every component keeps one kernel, so that every signal brings all agents to rest."""
+        return all(part.component.behaviour not in (None, DEPENDS) for part in self.parts)
+
+    @property
+    def unbounded(self) -> bool:
+        """Whether the input is proved to grow without limit for some signal and some initial state.
+
+        Where rest states differ, or where the upper bound of the rate times ``rho2 kappa / 2`` is below 1.
+        """
+        pole, bounds = self.protocol.gain.pole, [part.upper_bound for part in self.parts]
+        slow = any(bound is not None and bound.value * pole < 2 for bound in bounds)
+        return slow or any(part.component.behaviour == DEPENDS for part in self.parts)
+
+    @cached_property
+    def assessment(self) -> Assessment:
+        """The graded verdict: what became of what was asked, whether the bound is useful, and the exit code."""
+        return assess_family(self)
+
+    def summary(self) -> str:
+        """Return what ``ptcc certify`` prints of it."""
+        return family_summary(self)
 
     @property
     def behaviours(self) -> tuple[str, ...]:
@@ -315,9 +351,10 @@ def certify_family(
     protocol: Protocol,
     x0: Any = None,
     *,
-    time_limit: float = 60,
+    time_limit: float | None = None,
     expectations: Expectations | str | None = None,
-    progress: Callable[[str], None] = lambda step: None,
+    origins: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> FamilyCertificate:
     """Certify what the nominal protocol does on a family of graphs, whatever the signal.
 
@@ -328,9 +365,11 @@ def certify_family(
         With ``rho2 > 0``.
     x0 : state-like, optional
         The initial state; without it no final states and no peaks.
-    time_limit : float
-        Seconds of wall time for the searches.
+    time_limit : float, optional
+        Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
     expectations : Expectations or str, optional
+    origins : mapping of str to str, optional
+        See :func:`ptcc_certify.certify`.
     progress : callable
         Is told each step as it begins.
 
@@ -356,17 +395,18 @@ def certify_family(
         raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
-    if isinstance(expectations, str):
-        expectations = Expectations(behaviour_name(expectations))
+    asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
+    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
     components = decide(family)
-    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     parts, notes = [], list(family.notes)
-    with deadline.time_limit(time_limit):
+    with deadline.time_limit(seconds):
         for component in components:
             parts.append(_prove(component, notes, progress))
+    progress(STEPS[3])
+    told = origins_of(None, x0, None) | dict(origins or {})
     return FamilyCertificate(
-        family, protocol, tuple(parts), initial_state, expectations or Expectations(), tuple(dict.fromkeys(notes))
+        family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), origins=told
     )
 
 

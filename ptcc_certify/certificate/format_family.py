@@ -143,14 +143,14 @@ def _edges(mode: Mode, out: Writer) -> Any:
     return {"count": mode.n_edges, "source": source, "target": target, **ends}
 
 
-def read_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
+def certificate_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
     """Return the family of an accepted certificate; ``folder`` holds its side files.
 
     Examples
     --------
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
-    >>> read_family(family_sections(family, decide(family))["graph"]) == family
+    >>> certificate_family(family_sections(family, decide(family))["graph"]) == family
     True
     """
     labels, modes, files = tuple(section["nodes"]), [], SideFiles(folder, None)

@@ -8,11 +8,11 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from ptcc_certify.bounds.final_state import (
 )
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
+from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,
@@ -44,9 +45,11 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import HypothesisError, SimulationError, gated
+from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.io import as_family, as_graph
+from ptcc_certify.graphs.io.family_conversion import is_family
 from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
@@ -81,13 +84,20 @@ FEW_SAMPLES = 51
 SETTLED = 1e-6
 
 
-@gated
+@overload
+def certify(graph: Family, protocol: Protocol, x0: Any = None, **options: Any) -> FamilyCertificate: ...
+@overload
+def certify(graph: Any, protocol: Protocol, x0: Any = None, **options: Any) -> Certificate: ...
+
+
+@gated  # type: ignore[misc]  # it takes the options below, no others
 def certify(
     graph: Any,
     protocol: Protocol,
     x0: Any = None,
     *,
     orientation: str | None = None,
+    uncertainty: Any = 0,
     sigma0: Any = None,
     disturbance: Any = None,
     simulation: bool | None = None,
@@ -102,13 +112,14 @@ def certify(
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
-) -> Certificate:
-    """Certify what a protocol does on a signed digraph.
+) -> Certificate | FamilyCertificate:
+    """Certify what a protocol does on a signed digraph, or on a family of these whatever the signal.
 
     Parameters
     ----------
     graph : graph-like
-        Any signed digraph, disconnected ones included, in whatever form :func:`ptcc_certify.as_graph` takes.
+        Any signed digraph, disconnected ones included, in whatever form :func:`ptcc_certify.as_graph` takes; or a
+        family, as :func:`ptcc_certify.as_family` takes it, such as ``{"day": day, "night": night}``.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
     x0 : state-like, optional
@@ -116,6 +127,8 @@ def certify(
         takes. Without it there is no final state and no simulation.
     orientation : {"information", "listens"}, optional
         Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+    uncertainty : number or str
+        Of every weight, as a share of it, such as "10%": then the graph is a family.
     sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
         final state.
@@ -155,14 +168,16 @@ def certify(
 
     Returns
     -------
-    Certificate
+    Certificate or FamilyCertificate
+        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``origins`` and
+        ``progress``.
 
     Raises
     ------
     ParameterError
-        No protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive, an initial state of the wrong
-        length, with other labels than the nodes, beyond 1e300 or of thousands of digits, or a disturbance beyond
-        ``delta``.
+        An option that families do not take, no protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive,
+        an initial state of the wrong length, with other labels than the nodes, beyond 1e300 or of thousands of digits,
+        or a disturbance beyond ``delta``.
 
     References
     ----------
@@ -184,7 +199,22 @@ def certify(
     (ReachingTime(0.43409, 0.565 before T_r), ReachingTime(0, 1 before T_r))
     >>> cert.final_state
     FinalState(1=-1.5, 2=1.5)
+    >>> certify(g, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), uncertainty="10%")
+    FamilyCertificate(bipartite consensus for every signal, rate 3.59999, certified)
     """
+    options: dict[str, Any] = {
+        "simulation": simulation,
+        "method": method,
+        "at": at,
+        "initial_set": initial_set,
+        "limits": limits,
+    }
+    options |= {"delta": delta, "noise": noise, "sigma0": sigma0, "disturbance": disturbance}
+    if uncertainty or is_family(graph):
+        family = _family(graph, orientation, uncertainty, options)
+        asked: dict[str, Any] = {"time_limit": time_limit, "expectations": expectations}
+        asked |= {"origins": origins_of(graph, x0, None) | dict(origins or {}), "progress": progress}
+        return certify_family(family, protocol, x0, **asked)
     limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta, "noise": noise}
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
@@ -232,6 +262,15 @@ def certify(
     )
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapping[str, Any]) -> Family:
+    """Return a family, or refuse what it does not take: what is set, but for ``simulation=False``."""
+    unset = {None, False, "best", ()}
+    for name, value in options.items():
+        if not isinstance(value, Hashable) or value not in unset:
+            raise ParameterError(f"{name} is not for families of graphs yet; leave it out, or certify one graph")
+    return as_family(graph, orientation, uncertainty=uncertainty)
 
 
 def _with_word_of_check(certificate: Certificate) -> Certificate:

@@ -11,7 +11,7 @@ import numpy as np
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
 from ptcc_certify.certificate.format import read_protocol
-from ptcc_certify.certificate.format_family import read_family
+from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.certificate.format_vectors import Reader
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
@@ -28,7 +28,7 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     The decision is made anew; no upper bound on the rate is taken from the file, which does not prove it.
     """
     document = source.document
-    family = read_family(document["graph"], source.path.parent)
+    family = certificate_family(document["graph"], source.path.parent)
     claims = [document["claim"]] if document["claim"] is not None else [c["claim"] for c in document["components"]]
     components = [
         component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -154,25 +154,21 @@ def refuse(
 
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
-    seconds, n = arguments["time_limit"], structure.graph.n_nodes
     if not isinstance(scenario := arguments["scenario"], Mapping | None):
         raise ParameterError(
             f"scenario = {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
         )
-    request = Request(
+    return Request(
         method=arguments["method"],
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
-        time_limit=60 + n // 1000 if seconds is None else _seconds(seconds),
-        expectations=_expectations(arguments["expectations"]),
+        time_limit=read_seconds(arguments["time_limit"], structure.graph),
+        expectations=read_expectations(arguments["expectations"]),
         scenario=scenario,
         origins=arguments["origins"],
         **{name: None if arguments[name] is None else parameter(name, arguments[name]) for name in ("delta", "noise")},
     )
-    if not request.time_limit > 0:
-        raise ParameterError(f"time_limit = {request.time_limit} is outside its domain; it must be > 0, in seconds")
-    return request
 
 
 def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
@@ -182,14 +178,31 @@ def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
     return progress or (lambda *_: None)
 
 
-def _seconds(time_limit: Any) -> float:
+def read_seconds(time_limit: Any, graph: Sized) -> float:
+    """Return the seconds of a time limit; None: 60, and 1 more for every 1,000 nodes.
+
+    Examples
+    --------
+    >>> read_seconds(None, range(2000)), read_seconds("5", [])
+    (62.0, 5.0)
+    """
     try:
-        return float(time_limit)
+        seconds = float(60 + len(graph) // 1000 if time_limit is None else time_limit)
     except (TypeError, ValueError):
         raise ParameterError(f"time_limit = {shorten(repr(time_limit))} is not a number of seconds") from None
+    if not seconds > 0:
+        raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
+    return seconds
 
 
-def _expectations(asked: Any) -> Expectations:
+def read_expectations(asked: Any) -> Expectations:
+    """Return what is asked besides; a text names a behaviour.
+
+    Examples
+    --------
+    >>> read_expectations("bipartite-consensus").behaviour
+    'bipartite consensus'
+    """
     if asked is None or isinstance(asked, str):
         return Expectations(asked)
     if not isinstance(asked, Expectations):

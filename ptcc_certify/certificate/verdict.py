@@ -427,7 +427,7 @@ def _next_step(certificate: Content, report: CheckReport | None) -> str:
         return f"the independent check rejects {report.rejected}; please report this graph"
     method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes
     if certificate.cut_off:
-        return f"{certificate.time_limit:g} s ended {certificate.cut_off[0]}; raise --time-limit"
+        return f"{certificate.cut_off[0]} took its share of {certificate.time_limit:g} s; raise --time-limit"
     if certificate.rate is None:
         if method != "best":
             return f"--method {method} proves no rate; try --method best"

@@ -1,14 +1,14 @@
 """Verifies a family: its modes, the structure of every mandatory graph, and what it does under every signal.
 
 In a mode every edge has one sign, and its size lies in an interval; the mandatory graph has the edges whose interval
-does not reach 0, at the least size. Section 14 of the format tells the rules.
+does not reach 0, at the least size. Section 18 of the format tells the rules.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -18,7 +18,7 @@ from typing import Any
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import EDGE_BYTES, NODE_BYTES, positions
+from ptcc_certify.checker.graph import NODE_BYTES, positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -26,6 +26,8 @@ from ptcc_certify.checker.structure import CONNECTIVITY, Structure, check_struct
 
 #: Modes that are read.
 MANY_MODES = 1000
+#: Bytes that an edge takes beside its text, at most about.
+EDGE_BYTES = 500
 THEOREM = "common kernel"
 TOO_LARGE = "a family that may take more memory than is allowed; allow more by --memory"
 STABILITY, CONSENSUS, DEPENDS = "stability", "bipartite consensus", "depends on the signal"
@@ -55,11 +57,6 @@ class Mode:
     tied: bool
     structure: Structure
 
-    @property
-    def uncertain(self) -> Iterator[Edge]:
-        """The edges whose size is not known."""
-        return (edge for edge in self.edges if edge[3] < edge[4])
-
 
 @dataclass(frozen=True, eq=False)
 class Family:
@@ -78,13 +75,33 @@ class Family:
 
 
 @dataclass(frozen=True, eq=False)
-class Component:
-    """A weak component of all edges of all modes: its nodes, camps that keep all its edges, what it does.
+class Part:
+    """A weak component of all edges of all modes.
 
     Attributes
     ----------
     nodes : list of int
     camps : dict of int to +1/-1, or None
+        Those that keep all its edges.
+    edges : list of (list of Edge)
+        Of every mode.
+    closed : list of (list of int)
+        The numbers of its closed components in every mode.
+    """
+
+    nodes: list[int]
+    camps: dict[int, int] | None
+    edges: list[list[Edge]]
+    closed: list[list[int]]
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A weak component of all edges of all modes, and what it does.
+
+    Attributes
+    ----------
+    part : Part
     behaviour : str
     kernel : dict of int to (dict of int to Fraction)
         The rows of the basis of the common kernel, without zeros, by the numbers of the balanced closed components of
@@ -93,16 +110,25 @@ class Component:
         The first node of each of these.
     """
 
-    nodes: list[int]
-    camps: dict[int, int] | None
+    part: Part
     behaviour: str
     kernel: dict[int, Row]
     pivots: dict[int, int]
 
     @property
+    def nodes(self) -> list[int]:
+        """Its nodes."""
+        return self.part.nodes
+
+    @property
     def depends(self) -> bool:
         """Whether there is no common kernel."""
         return self.behaviour == DEPENDS
+
+    @cached_property
+    def size(self) -> int:
+        """The number of its nodes and of the entries of the basis."""
+        return len(self.nodes) + sum(map(len, self.kernel.values()))
 
     @cached_property
     def whole(self) -> tuple[dict[int, dict[int, int]], int]:
@@ -164,13 +190,13 @@ def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[list[Edg
         section = fields(section, ("count", "source", "target", "least", "largest"), "edges")
         count = section["count"]
         need(type(count) is int and 0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
-        need(keeps((EDGE_BYTES[0] + EDGE_BYTES[1]) * count), TOO_LARGE)
+        need(keeps(EDGE_BYTES * count), TOO_LARGE)
         need(all(beside(section[key]) for key in section if key != "count"), "edges: not in side files")
         source, target = (doc.files.integers(section[key], key, count) for key in ("source", "target"))
         need(all(0 <= v < len(index) for end in (source, target) for v in end), "an edge of an unknown node")
         least, largest = (doc.files.numbers(section[key], key, count) for key in ("least", "largest"))
     else:
-        need(keeps(EDGE_BYTES[1] * len(entries(section, "edges"))), TOO_LARGE)
+        need(keeps(EDGE_BYTES * len(entries(section, "edges"))), TOO_LARGE)
         rows = [entries(row, "an edge") for row in section]
         need(all(len(row) in (3, 4) for row in rows), "an edge has not 3 or 4 entries")
         need(all(isinstance(x, str) and x in index for row in rows for x in row[:2]), "an edge of an unknown node")
@@ -233,70 +259,74 @@ def _check_claims(doc: Document, labels: list[str], modes: list[Mode]) -> list[C
     """Verify the behaviour of every component; the one with a common kernel by its basis, one without by a witness."""
     numbers = doc.open("family-claim", "graph", witness=True)
     parts = _parts(len(labels), modes)
+    names = [[labels[v] for v in part.nodes] for part in parts]
     single = len(parts) == 1
     section = [doc.data["claim"]] if single else entries(doc.data.get("components"), "components", len(parts))
     need(not single or "components" not in doc.data, "components of a connected family")
     need(single or doc.data["claim"] is None, "the family is disconnected")
     witnesses = entries(numbers["witness"], "the witness", len(parts))
     result = []
-    for entry, (nodes, camps), witness in zip(section, parts, witnesses, strict=True):
-        component = _component(doc, modes, nodes, camps, witness)
+    for entry, part, nodes, witness in zip(section, parts, names, witnesses, strict=True):
+        component = _component(doc, modes, part, witness)
         claim = {"theorem": THEOREM, "behaviour": component.behaviour, "signal": "any"}
-        expected = claim if single else {"nodes": [labels[v] for v in nodes], "claim": claim}
+        expected = claim if single else {"nodes": nodes, "claim": claim}
         need(same(entry, expected), f"what follows is {component.behaviour}")
         result.append(component)
     doc.done(", ".join(dict.fromkeys(component.behaviour for component in result)))
     return result
 
 
-def _parts(n: int, modes: Sequence[Mode]) -> list[tuple[list[int], dict[int, int] | None]]:
+def _parts(n: int, modes: Sequence[Mode]) -> list[Part]:
     """Return the weak components of all edges, each with the camps that keep all its edges, or None."""
     near: list[list[tuple[int, int]]] = [[] for _ in range(n)]
     for mode in modes:
         for s, t, sign, _, _ in mode.edges:
             near[s].append((t, sign))
             near[t].append((s, sign))
-    camp = [0] * n
-    parts = []
+    camp, home = [0] * n, [0] * n
+    parts: list[Part] = []
     for root in range(n):
         if camp[root]:
             continue
         camp[root], found, fit = 1, [root], True
         for v in found:
+            home[v] = len(parts)
             for u, sign in near[v]:
                 if not camp[u]:
                     camp[u] = sign * camp[v]
                     found.append(u)
                 fit &= camp[u] == sign * camp[v]
         found.sort()
-        parts.append((found, {v: camp[v] for v in found} if fit else None))
+        camps = {v: camp[v] for v in found} if fit else None
+        parts.append(Part(found, camps, [[] for _ in modes], [[] for _ in modes]))
+    for number, mode in enumerate(modes):
+        for edge in mode.edges:
+            parts[home[edge[0]]].edges[number].append(edge)
+        for k, group in enumerate(mode.structure.closed):
+            parts[home[group[0]]].closed[number].append(k)
     return parts
 
 
-def _component(
-    doc: Document, modes: Sequence[Mode], nodes: list[int], camps: dict[int, int] | None, witness: Any
-) -> Component:
-    inside = set(nodes)
-    groups = [[k for k, group in enumerate(m.structure.closed) if group[0] in inside] for m in modes]
-    balanced = [
-        sum(m.structure.gauges[k] is not None for k in numbers) for m, numbers in zip(modes, groups, strict=True)
-    ]
-    pivots = {k: group[0] for k, group, _ in modes[0].structure.balanced if group[0] in inside}
-    one_group = all(len(numbers) == 1 for numbers in groups)
+def _component(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> Component:
+    first, camps = modes[0].structure, part.camps
+    pairs = zip(modes, part.closed, strict=True)
+    balanced = [sum(m.structure.gauges[k] is not None for k in numbers) for m, numbers in pairs]
+    pivots = {k + 1: first.closed[k][0] for k in part.closed[0] if first.gauges[k] is not None}
+    one_group = all(len(numbers) == 1 for numbers in part.closed)
+    kernel: dict[int, Row]
     if camps is not None and one_group and all(balanced):
         ((number, pivot),) = pivots.items()
-        behaviour, kernel = CONSENSUS, {v: {number: Fraction(camps[v] * camps[pivot])} for v in nodes}
+        behaviour, kernel = CONSENSUS, {v: {number: Fraction(camps[v] * camps[pivot])} for v in part.nodes}
     elif len(set(balanced)) == 1 and any(balanced):
-        kernel = _check_kernel(doc, modes, inside, witness)
-        behaviour = DEPENDS if not kernel else INTERVAL if one_group else CONTAINMENT
-        return Component(nodes, camps, behaviour, kernel, pivots)
+        kernel = _check_kernel(doc, modes, part, witness)
+        return Component(part, DEPENDS if not kernel else INTERVAL if one_group else CONTAINMENT, kernel, pivots)
     else:
-        behaviour, kernel = (DEPENDS, {}) if any(balanced) else (STABILITY, {v: {} for v in nodes})
+        behaviour, kernel = (DEPENDS, {}) if any(balanced) else (STABILITY, {v: {} for v in part.nodes})
     need(witness is None, "a witness that nothing asks for")
-    return Component(nodes, camps, behaviour, kernel, pivots)
+    return Component(part, behaviour, kernel, pivots)
 
 
-def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witness: Any) -> dict[int, Row]:
+def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> dict[int, Row]:
     """Verify that all members share a kernel, by the rows of its basis, or that they do not, by a state at rest.
 
     Returns
@@ -305,19 +335,20 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], inside: set[int], witnes
         The basis; empty if they do not.
     """
     if not (isinstance(witness, dict) and "rows" in witness):
-        _check_counterexample(doc, modes, inside, witness)
+        _check_counterexample(doc, modes, part, witness)
         return {}
-    rows = _basis(doc, modes[0].structure, inside, fields(witness, ("rows",), "a kernel")["rows"])
+    rows = _basis(doc, modes[0].structure, part, fields(witness, ("rows",), "a kernel")["rows"])
     whole, _ = _whole(rows)
     bits = longest(x for row in whole.values() for x in row.values())
-    for mode in modes:
+    for mode, edges in zip(modes, part.edges, strict=True):
         graph = mode.structure.graph
-        count = sum(len(whole[u]) for v in inside for u in graph.row(v))
-        spend(count, graph.bits, bits, "rows of kernels")
-        for v in inside:
+        count = sum(len(whole[u]) for v in part.nodes for u in graph.row(v))
+        count += sum(len(whole[s]) + len(whole[t]) for s, t, _, low, high in edges if low < high)
+        spend(2 * count, graph.bits, bits, "rows of kernels")
+        for v in part.nodes:
             need(not _row_product(graph.row(v), whole), "a column of the kernel is not at rest")
-        for s, t, sign, _, _ in mode.uncertain:
-            agrees = s not in inside or whole[t] == {j: sign * x for j, x in whole[s].items()}
+        for s, t, sign, low, high in edges:
+            agrees = low == high or whole[t] == {j: sign * x for j, x in whole[s].items()}
             need(agrees, "an uncertain edge does not agree with the kernel")
     return rows
 
@@ -329,7 +360,7 @@ def _whole(rows: dict[int, Row]) -> tuple[dict[int, dict[int, int]], int]:
     return {v: dict(zip(row, some, strict=True)) for (v, row), some in pairs}, scale
 
 
-def _check_counterexample(doc: Document, modes: Sequence[Mode], inside: set[int], witness: Any) -> None:
+def _check_counterexample(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> None:
     """Verify that a state is at rest in the mandatory graph of one mode, and moves in a member of another.
 
     The state is enclosed: of every agent its middle is told, and a radius, which is 0 but for followers. A state at
@@ -341,6 +372,7 @@ def _check_counterexample(doc: Document, modes: Sequence[Mode], inside: set[int]
     numbers = witness["mode"], witness["other"]
     need(all(type(k) is int and 0 <= k < len(modes) for k in numbers), "an unknown mode")
     mode, other = (modes[k] for k in numbers)
+    inside = set(part.nodes)
     middle, radius = _state(doc, mode.structure, inside, witness["state"])
     bits = longest([*middle.values(), *radius.values()])
     for m in (mode, other):
@@ -355,9 +387,9 @@ def _check_counterexample(doc: Document, modes: Sequence[Mode], inside: set[int]
         need(any(_moves(row, middle, radius) for row in rows), "the state is at rest in both")
         return
     s, t = positions(doc, other.structure.graph, entries(edge, "an edge", 3)[:2], "an edge")
-    sign = edge[2]
-    need(type(sign) is int and (s, t, sign) in {e[:3] for e in other.uncertain}, "a known edge")
-    need(s in inside and _moves({t: 1, s: -sign}, middle, radius), "the state is at rest in both")
+    sign, uncertain = edge[2], {e[:3] for e in part.edges[numbers[1]] if e[3] < e[4]}
+    need(type(sign) is int and (s, t, sign) in uncertain, "a known edge")
+    need(_moves({t: 1, s: -sign}, middle, radius), "the state is at rest in both")
     # Row t of one of two members differs: with this edge at w-, and at w+.
 
 
@@ -370,16 +402,16 @@ def _moves(row: dict[int, int], middle: dict[int, int], radius: dict[int, int]) 
     return abs(_dot(row, middle)) > _dot({u: abs(x) for u, x in row.items()}, radius)
 
 
-def _basis(doc: Document, structure: Structure, inside: set[int], entry: Any) -> dict[int, Row]:
+def _basis(doc: Document, structure: Structure, part: Part, entry: Any) -> dict[int, Row]:
     """Return the rows of the basis, without zeros: camps of leaders, and what is told of followers."""
-    rows: dict[int, Row] = {v: {} for v in inside}
+    rows: dict[int, Row] = {v: {} for v in part.nodes}
     numbers = set()
-    for number, nodes, gauge in structure.balanced:
-        if nodes[0] in inside:
-            numbers.add(number)
-            rows |= {v: {number: Fraction(g)} for v, g in zip(nodes, gauge, strict=True)}
+    for k in part.closed[0]:
+        if (gauge := structure.gauges[k]) is not None:
+            numbers.add(k + 1)
+            rows |= {v: {k + 1: Fraction(g)} for v, g in zip(structure.closed[k], gauge, strict=True)}
     need(isinstance(entry, dict), "rows of a kernel are no object")
-    followers = {v for v in inside if structure.number[v] < 0}
+    followers = {v for v in part.nodes if structure.number[v] < 0}
     nodes = positions(doc, structure.graph, list(entry), "rows of a kernel")
     keys = set(map(str, numbers))
     for v, row in zip(nodes, entry.values(), strict=True):

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.work import spend
 from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
@@ -22,6 +23,8 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import Interval, exact, fields, interval, need
 
 Gains = Mapping[str, Fraction]
+#: Products of short integers that a root costs, about.
+EACH_ROOT = 300
 
 
 class Function(Protocol):
@@ -49,6 +52,7 @@ def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction
     for V in functions:
         if V.rate <= 0:
             continue
+        spend(EACH_ROOT * len(V.inputs), what="bounds of many agents")
         value = rounded(V.value(x), BITS, up=True)
         bounds = {k: 2 * root_above(c * value) / V.rate for k, c in V.inputs.items()}
         for k, c in V.coordinates.items() if stable else ():
@@ -78,6 +82,7 @@ def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) ->
     first, least = gains["rho1"] + pole / gains["T"], dict[int, Fraction]()
     for V in functions:
         if V.rate * pole >= 2:
+            spend(EACH_ROOT * len(V.inputs), what="bounds of many agents")
             value = rounded(V.value(x), BITS, up=True)
             bounds = {k: first * root_above(c * value) for k, c in V.inputs.items()}
             least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
@@ -86,13 +91,13 @@ def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) ->
 
 def deciding_nodes(family: Family, component: Component) -> list[int]:
     """Return the nodes that may have a say in the consensus: what reaches a closed component through any edges."""
-    inside = set(component.nodes)
-    heard: dict[int, set[int]] = {v: set() for v in inside}
-    found = [v for mode in family.modes for group in mode.structure.closed if group[0] in inside for v in group]
-    for mode in family.modes:
-        for s, t, _, _, _ in mode.edges:
-            if t in inside:
-                heard[t].add(s)
+    part = component.part
+    heard: dict[int, set[int]] = {v: set() for v in part.nodes}
+    pairs = zip(family.modes, part.closed, strict=True)
+    found = [v for mode, numbers in pairs for k in numbers for v in mode.structure.closed[k]]
+    for edges in part.edges:
+        for s, t, _, _, _ in edges:
+            heard[t].add(s)
     seen = set(found)
     for v in found:
         new = heard[v] - seen
@@ -112,7 +117,7 @@ def final_states(
         return dict.fromkeys(component.nodes)
     moves = deviations(functions, False, x)
     if component.behaviour == CONSENSUS:
-        camps = component.camps or {}
+        camps = component.part.camps or {}
         return dict(final_interval(component.nodes, camps, deciding_nodes(family, component), moves, x))
     largest = max(abs(x[v]) for v in component.nodes)
     result: dict[int, Interval | None] = {}

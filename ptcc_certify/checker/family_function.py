@@ -1,6 +1,6 @@
 """Verifies the Lyapunov functions of a family: one quadratic form for every signal, and what it says of agents.
 
-Section 15 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
+Section 19 of the format: ``xi = C X`` are the states of all nodes of a component but its pivots, minus what the pivots
 make of them at rest; in every mode ``xi' = -gain A xi`` with ``A = A_0 + sum_e delta_e f_e h_e'``,
 ``|delta_e| <= radius_e``.
 """
@@ -132,9 +132,9 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
 
 def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
-    mode, place, inside = family.modes[number], {v: i for i, v in enumerate(nodes)}, set(component.nodes)
+    mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
     kernel, scale = component.whole
-    edges = [edge for edge in mode.edges if edge[1] in inside]
+    spend(8 * (len(edges) + component.size), mode.unit.bit_length(), what="a quotient")
     rows: dict[int, Whole] = {v: {} for v in component.nodes}
     for s, t, sign, low, high in edges:
         for v, weight in ((t, low + high), (s, -sign * (low + high))):
@@ -142,10 +142,12 @@ def _quotient(family: Family, number: int, component: Component, nodes: list[int
                 rows[t][place[v]] = rows[t].get(place[v], 0) + weight
     uncertain = [edge for edge in edges if edge[3] < edge[4] and not (mode.tied and edge[0] > edge[1])]
     columns = _columns(component, nodes, place)
-    sized(sum(len(columns[v]) for edge in uncertain for v in edge[:2]), 64, "the uncertain weights of a family")
+    longest_entry = max(64, scale.bit_length(), longest(b for v in nodes for b in kernel[v].values()))
+    entries_of_f = sum(len(columns[v]) for edge in uncertain for v in edge[:2])
+    sized(entries_of_f + 8 * len(uncertain), longest_entry, "the uncertain weights of a family")
     parts = [_part(columns, place, edge, mode.tied) for edge in uncertain]
     bits = longest(x for row in rows.values() for x in row.values())
-    own = longest(b for v in nodes for b in kernel[v].values()) + scale.bit_length()
+    own = longest_entry + scale.bit_length()
     pulls = sum(len(rows[component.pivots[j]]) for v in nodes for j in kernel[v])
     spend(sum(len(rows[v]) for v in nodes) + pulls, bits, own, "a quotient")
     sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + pulls), bits + own + len(nodes), "a quotient")
@@ -292,7 +294,7 @@ def _constants(
         raise RejectedError("P is not proved definite")
     squares = [x * scale for x in above]
     norms = [root_above(x) if x else Fraction(0) for x in squares]
-    spend(sum(len(some) for _, _, some in sums), 128, 2 * max(mode.unit for mode in modes).bit_length())
+    spend(80 * sum(len(some) for _, _, some in sums), 128, 2 * max(mode.unit for mode in modes).bit_length())
     for k, unit, some in sums:
         total = sum((factor * norms[place] for factor, place in some), Fraction(0)) / unit
         need(total**2 <= inputs[k], "the constant of an input is not proved")

@@ -22,7 +22,7 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.family import Component, Family, Part
 from ptcc_certify.checker.family_function import FamilyFunction, check_form
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
@@ -120,7 +120,7 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     outside = resting.union(led)
     followers = [v for v in component.nodes if v not in outside]
     need(bool(followers), "no followers")
-    _closed(family, component, [set(part.bounds) for part in parts], resting)
+    _closed(component, [set(part.bounds) for part in parts], resting)
     numbers = doc.open("family-rows", of, ["b"])
     rate = exact(entry["rate"])
     need(numbers["b"] == rate, "b is not the rate")
@@ -153,7 +153,8 @@ def _part(doc: Document, family: Family, component: Component, entry: Any, of: s
     kernel = {v: component.kernel[v] for v in nodes}
     pivots = {j: v for j, v in component.pivots.items() if v in inside}
     need(all(j in pivots for row in kernel.values() for j in row), "a part that hears others")
-    own = Component(nodes, None, component.behaviour, kernel, pivots)
+    edges = [[edge for edge in some if edge[1] in inside] for some in component.part.edges]
+    own = Component(Part(nodes, None, edges, []), component.behaviour, kernel, pivots)
     function = check_form(doc, family, own, entry["function"], of)
     times = exact(entry["times"])
     need(times > 0, "times is not positive")
@@ -166,11 +167,11 @@ def _part(doc: Document, family: Family, component: Component, entry: Any, of: s
     return LeadingPart(function, times, bounds)
 
 
-def _closed(family: Family, component: Component, parts: Sequence[set[int]], resting: set[int]) -> None:
+def _closed(component: Component, parts: Sequence[set[int]], resting: set[int]) -> None:
     """Verify that agents of a part hear that part alone, and agents at rest nobody."""
     home = dict.fromkeys(resting, -1) | {v: j for j, part in enumerate(parts) for v in part}
-    for mode in family.modes:
-        for s, t, *_ in mode.edges:
+    for edges in component.part.edges:
+        for s, t, *_ in edges:
             if t in home:
                 need(home[t] >= 0 and home.get(s) == home[t], "an agent that is no follower hears others")
 
@@ -192,12 +193,12 @@ def _rows(
         drifts = {v: sum(abs(b) * moving[j] for j, b in kernel[v].items()) for v in followers}
     own, most = dict.fromkeys(followers, True), dict.fromkeys(followers, Fraction(0))
     p, q = rate.as_integer_ratio()
-    for mode in family.modes:
-        bits = longest(edge[4] for edge in mode.edges)
-        spend(4 * len(mode.edges), bits, longest(sizes.values()), "rows of a family")
+    for mode, edges in zip(family.modes, component.part.edges, strict=True):
+        bits = longest(edge[4] for edge in edges)
+        spend(4 * len(edges), bits, longest(sizes.values()), "rows of a family")
         sized(2 * len(followers), bits + longest(sizes.values()) + 64, "rows of a family")
         pull, push = dict.fromkeys(followers, 0), dict.fromkeys(followers, 0)
-        for s, t, _, low, high in mode.edges:
+        for s, t, _, low, high in edges:
             if t in own:
                 d, other = sizes[t], sizes[s]
                 gap = d - other

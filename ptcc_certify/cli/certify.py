@@ -9,21 +9,25 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.families import certify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols import Protocol
 
 
 @click.command()
-@shared.graph_argument
+@shared.graphs_argument
 @shared.protocol_options
 @shared.output_option
 @shared.json_option
 @screen_options
 @shared.reading_options
+@family_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @shared.number_option(
     "--min-rate", metavar="R", help="Ask for a proved decay rate of at least R per unit of the stretched clock."
@@ -42,19 +46,38 @@ if TYPE_CHECKING:
     "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
 )
 @shared.time_limit_option
-def certify(graph: str, output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
+def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
+
+    Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - it certifies what
+    holds for every signal.
 
     Prints 8 lines, 10 or so where the answers take more; -v tells rates, the Lyapunov functions searched and used,
     proof obligations and the simulated run. Exit code 0: certified, and everything asked holds.
     """
+    from ptcc_certify.graphs.family import Family
+
+    refuse_output(output)
+    protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
+    if isinstance(given, Family):
+        return certify_family(graph, given, output, as_json, screen, options)
+    return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)
+
+
+def _certify_graph(
+    graph: str,
+    signed: SignedDigraph,
+    protocol: Protocol,
+    output: str | None,
+    as_json: bool,
+    screen: Screen,
+    options: shared.Options,
+) -> int:
+    """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
-    refuse_output(output)
-    protocol = shared.protocol_of(options)
-    signed = shared.read(graph, options)
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     if options["x0"] == "random" and options["initial_bound"] is not None:

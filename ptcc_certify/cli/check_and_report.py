@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.families import family_options, same_family
 from ptcc_certify.cli.terminal import Screen, print_json, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -20,19 +21,21 @@ if TYPE_CHECKING:
 
 @click.command()
 @shared.certificate_argument
-@click.argument("graph", required=False, shell_complete=complete(GRAPHS, PACKAGED))
+@click.argument("graph", nargs=-1, shell_complete=complete(GRAPHS, PACKAGED))
 @shared.reading_options
+@family_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
 @shared.memory_option
 @shared.json_option
 @screen_options
 def check(
-    certificate: str, graph: str | None, stdlib: bool, memory: float, as_json: bool, screen: Screen, **options: Any
+    certificate: str, graph: tuple[str, ...], stdlib: bool, memory: float, as_json: bool, screen: Screen, **options: Any
 ) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
-    certificate says that it was read, which is printed; the options about reading override that. Prints claim and
+    certificate says that it was read, which is printed; the options about reading override that. Of a family name all
+    its graphs, with the options that made it. Prints claim and
     verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected,
     4 if the certificate itself says undecided. `python -m ptcc_certify.checker` does the same, without other packages.
     """
@@ -40,14 +43,19 @@ def check(
     from ptcc_certify.report.screen import check_summary
     from ptcc_certify.report.text_layout import wrap_lines
 
-    if certificate == graph == "-":
+    if certificate == "-" and "-" in graph:
         raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")
         document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
     how: dict[str, str] = {}
-    if graph is not None and report.accepted:
-        report, how = _same_graph(certificate, document, report, graph, options)
+    if graph and report.accepted:
+        if "modes" in document["graph"]:
+            report, how = same_family(report, document, graph, options)
+        elif len(graph) > 1:
+            raise ParameterError("this certificate is of one graph; name one")
+        else:
+            report, how = _same_graph(certificate, document, report, graph[0], options)
     if as_json:
         print_json(report.to_dict() | how)
     else:

@@ -6,29 +6,39 @@ from typing import Any
 
 import click
 
-from ptcc_certify.cli.options import expect_option, graph_argument, json_option, read, reading_options
+from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
+from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, screen_options
 from ptcc_certify.errors import ExitCode
 
 
 @click.command()
-@graph_argument
+@graphs_argument
 @expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @json_option
 @screen_options
 @reading_options
-def classify(graph: str, expect: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
-    """Tell the structure of GRAPH and the theorem that applies; no computation in floating point."""
+@family_options
+def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
+    """Tell the structure of GRAPH and the theorem that applies; no computation in floating point.
+
+    Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - tell what it does
+    for every signal, or why that depends on the signal.
+    """
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse
     from ptcc_certify.report.screen import structure_lines, structure_summary
 
-    structure = analyse(read(graph, options))
+    given = read_graph_or_family(graph, options)
+    if isinstance(given, Family):
+        return classify_family(graph, given, expect, as_json, screen, options)
+    structure = analyse(given)
     if as_json:
         from ptcc_certify.certificate.format_graph import structure_document
 
         print_json(structure_document(structure))
     else:
-        screen.show(lambda: structure_summary(structure, graph), lambda: structure_lines(structure, graph))
+        screen.show(lambda: structure_summary(structure, graph[0]), lambda: structure_lines(structure, graph[0]))
     if expect is None:
         return ExitCode.OK
     from ptcc_certify.certificate.verdict import MET, judge_behaviour

@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.options import (
+    OneGraph,
     Options,
     flag_of,
     graph_argument,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 _EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadline"
 
 
-@click.command()
+@click.command(cls=OneGraph)
 @graph_argument
 @number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
 @number_option("--initial-bound", metavar="R", help="Needed. All initial states with |x_k(0)| <= R.")

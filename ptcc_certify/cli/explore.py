@@ -15,7 +15,7 @@ from ptcc_certify.cli import options as shared
 from ptcc_certify.errors import ExitCode, ParameterError
 
 
-@click.command()
+@click.command(cls=shared.OneGraph)
 @click.argument("graph", default="fig3a")
 @shared.reading_options
 @click.option("--port", type=click.IntRange(1, 65535), default=8730, help="Where to listen; the next one, if taken.")

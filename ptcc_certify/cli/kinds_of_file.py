@@ -134,6 +134,8 @@ def refuse_as_certificate(path: str) -> None:
         raise FormatError(f"{name}: is a scenario, not a certificate; {made}")
     if kind:
         raise FormatError(f"{name}: is {kind}, not a certificate; name the file that ptcc certify -o wrote")
+    if path.lower().endswith(".json.gz"):
+        raise FormatError(f"{name}: is packed; unpack it first (gunzip)")
     if Path(path).suffix.lower() != ".json":
         raise FormatError(f"{name}: not a readable certificate; if it is a graph, {made}")
 

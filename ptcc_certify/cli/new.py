@@ -93,7 +93,10 @@ def template(options: Mapping[str, click.Parameter], graph: str | None = None, l
 def _meaning(option: click.Parameter | None) -> str:
     """Return what an option means, its values and its default."""
     if not isinstance(option, click.Option):
-        return "A file, relative to the folder of this one, or a packaged graph: fig1a .. fig5b."
+        return (
+            "A file, relative to the folder of this one, or a packaged graph: fig1a .. fig5b. "
+            'A list, ["day.csv", "night.csv"], is a family: any of them may act at any time.'
+        )
     text, _, default = (option.help or "").partition("  [default: ")
     if isinstance(option.type, click.Choice) and len(option.type.choices) > 1:
         text += f" One of {', '.join(map(str, option.type.choices))}."

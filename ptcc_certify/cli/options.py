@@ -16,7 +16,14 @@ import click
 
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.cli.scenario import FOREIGN, graph_of, is_scenario, kind_of_protocol, read_scenario
+from ptcc_certify.cli.scenario import (
+    FOREIGN,
+    graph_of,
+    is_scenario,
+    kind_of_protocol,
+    read_scenario,
+    takes_one_graph,
+)
 from ptcc_certify.errors import ParameterError, PTCCError
 
 if TYPE_CHECKING:
@@ -142,6 +149,16 @@ reading_options = _options(
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED)
 )
+#: The same where several graphs are the modes of a family.
+graphs_argument = click.argument(
+    "graph",
+    nargs=-1,
+    required=True,
+    metavar="GRAPH..|SCENARIO.toml",
+    is_eager=True,
+    callback=graph_of,
+    shell_complete=complete(GRAPHS, PACKAGED),
+)
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
 protocol_options = _options(
     click.option(
@@ -214,6 +231,18 @@ output_option = click.option(
 )
 
 
+class OneGraph(click.Command):
+    """A command about one graph, which says so if it is given several."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Return what is left of the arguments: nothing."""
+        ctx.allow_extra_args = True
+        rest = super().parse_args(ctx, args)
+        if rest and not ctx.resilient_parsing:
+            raise ParameterError(takes_one_graph(self.name))
+        return rest
+
+
 def written(certificate: Certificate, output: str) -> str:
     """Return what is said of a certificate that was saved, with its side files."""
     count = len(certificate.for_check()[1])
@@ -238,12 +267,13 @@ def graph_file(graph: str) -> Any:
     return graph
 
 
-def read(graph: str, options: Options) -> SignedDigraph:
-    """Read GRAPH as the options say."""
+def read(graph: Any, options: Options) -> SignedDigraph:
+    """Read GRAPH, or a file object, as the options say."""
     from ptcc_certify.graphs.io import read_graph
 
     how = {name: options[name] for name in READING if name != "edges"}
-    return read_graph(graph_file(graph), orientation=options["edges"], **how)
+    file = graph_file(graph) if isinstance(graph, str) else graph
+    return read_graph(file, orientation=options["edges"], **how)
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

@@ -27,7 +27,7 @@ _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x
 OF_A_RUN = ("states", "input", "decay")
 
 
-@click.command()
+@click.command(cls=shared.OneGraph)
 @click.argument(
     "graph",
     metavar="CERT|GRAPH",

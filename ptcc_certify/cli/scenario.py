@@ -40,6 +40,9 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "duplicates": ("duplicates", '"refuse"'),
             "drop_self_loops": ("drop_self_loops", "false"),
             "undirected": ("undirected", "false"),
+            "uncertainty": ("uncertainty", '"10%"'),
+            "optional": ("optional", '["a,b"]'),
+            "signal": ("signal", '"any"'),
         },
     ),
     "protocol": (
@@ -111,6 +114,8 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     ),
 }
 _STATES = ("x0", "sigma0")
+#: Keys that make a family of a graph.
+OF_FAMILIES = ("uncertainty", "optional")
 #: Options of the other protocol: a flag that chooses the protocol leaves such keys out.
 FOREIGN = {
     "nominal": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
@@ -129,7 +134,7 @@ class Scenario:
     sections : mapping
         As the file has them: numbers that are no integers are texts.
     options : mapping of str to Any
-        What it gives, by the names of the commands' parameters; ``graph`` is found from here.
+        What it gives, by the names of the commands' parameters; ``graph`` is found from here, a list of several.
     """
 
     path: str
@@ -138,8 +143,14 @@ class Scenario:
 
     @property
     def graph(self) -> str:
-        """The graph, as a command takes it."""
-        return str(self.options["graph"])
+        """The graph, as a command takes it; the first of several."""
+        return self.graphs[0]
+
+    @property
+    def graphs(self) -> tuple[str, ...]:
+        """The graphs, as commands take them: several are the modes of a family."""
+        files = self.options["graph"]
+        return (files,) if isinstance(files, str) else tuple(files)
 
     def place(self, option: str) -> str:
         """Return where an option stands in the file: ``scenario.toml: [protocol] T``."""
@@ -192,12 +203,18 @@ def read_scenario(path: str) -> Scenario:
             if key not in known:
                 raise ParameterError(f"{place}: no such key{_where(key) or did_you_mean(key, known)}")
             option = known[key][0]
-            options[option] = _state(value, folder, place) if option in _STATES else _value(value, known[key][1], place)
-    if not isinstance(options.get("graph"), str):
+            if option in _STATES:
+                options[option] = _state(value, folder, place)
+            elif option == "graph" and isinstance(value, list):
+                options[option] = _texts_of(value, place, '["day.csv", "night.csv"]') or None
+            else:
+                options[option] = _value(value, known[key][1], place)
+    files = options.get("graph")
+    if not isinstance(files, str | list):
         raise ParameterError(
             f'{name}: [graph] file: names no graph; write file = "graph.csv" or a packaged one, "fig1a"'
         )
-    options["graph"] = _beside(options["graph"], folder)
+    options["graph"] = _beside(files, folder) if isinstance(files, str) else [_beside(one, folder) for one in files]
     return Scenario(name, sections, options)
 
 
@@ -243,8 +260,17 @@ def _where(key: str) -> str:
     return f"; it belongs to [{homes[0]}]" if homes else ""
 
 
+def _texts_of(value: list[Any], place: str, example: str) -> list[str]:
+    """Return a list of texts."""
+    if not all(isinstance(text, str) for text in value):
+        raise ParameterError(f"{place}: write a list of texts, such as {example}")
+    return value
+
+
 def _value(value: Any, example: str, place: str) -> Any:
     """Return a value as an option takes it: true or false, or a text."""
+    if example.startswith("["):
+        return _texts_of(value if isinstance(value, list) else [value], place, example)
     wanted = example in ("true", "false")
     if isinstance(value, bool) != wanted or not isinstance(value, bool | int | str):
         kind = "true or false" if wanted else "a text" if example.startswith('"') else "a number"
@@ -288,31 +314,58 @@ def is_scenario(graph: str) -> bool:
     return graph.lower().endswith(".toml")
 
 
-def graph_of(context: click.Context, parameter: click.Parameter, graph: str) -> str:
-    """Return the graph of a command; of a scenario its graph, after the command has the options that it gives.
+def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> Any:
+    """Return the graph of a command, or its graphs; of a scenario those, after the command has the options it gives.
 
     The callback of every GRAPH; these are eager, so that options find their defaults here.
     """
-    if context.resilient_parsing or not is_scenario(graph):
+    given = graph if isinstance(graph, tuple) else (graph,)
+    named = [one for one in given if is_scenario(one)]
+    if context.resilient_parsing or not named:
         return graph
-    from ptcc_certify.graphs.io.packaged import GRAPHS
-
-    if kind_of(graph) not in TOML:
-        refuse_as_graph(graph)
-    scenario = read_scenario(graph)
-    if scenario.graph not in ("-", *GRAPHS):
-        try:
-            refuse_as_graph(scenario.graph)
-        except FormatError as error:
-            raise FormatError(f"{scenario.place('graph')}: {error}") from None
-    context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: graph})
+    if len(given) > 1:
+        raise ParameterError(f"{shorten(named[0], 200)}: a scenario stands alone; let its key file list the graphs")
+    scenario = _scenario_of(named[0])
+    context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: named[0]})
     own = {parameter.name for parameter in context.command.params}
     if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
         raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")
+    families = [*["graph"] * (len(scenario.graphs) > 1), *(key for key in OF_FAMILIES if key in scenario.options)]
+    if families and "switching" not in own:
+        raise ParameterError(f"{scenario.place(families[0])}: {takes_one_graph(context.command.name)}")
     context.default_map = {name: value for name, value in scenario.options.items() if name in own}
+    context.default_map |= {"switching": True} if len(scenario.graphs) > 1 else {}
     kind_of_protocol(context, None, context.params.get("kind"))
-    return scenario.graph
+    return scenario.graphs if isinstance(graph, tuple) else scenario.graph
+
+
+def _scenario_of(path: str) -> Scenario:
+    """Return the scenario of a file, or refuse it, or a graph that it names."""
+    from ptcc_certify.graphs.io.packaged import GRAPHS
+
+    if kind_of(path) not in TOML:
+        refuse_as_graph(path)
+    scenario = read_scenario(path)
+    for one in scenario.graphs:
+        if one not in ("-", *GRAPHS):
+            try:
+                refuse_as_graph(one)
+            except FormatError as error:
+                raise FormatError(f"{scenario.place('graph')}: {error}") from None
+    return scenario
+
+
+def takes_one_graph(name: str | None) -> str:
+    """Return what a command says to a family of graphs.
+
+    Examples
+    --------
+    >>> takes_one_graph("plot")
+    'ptcc plot takes one graph; a family (several graphs, uncertain weights) goes to ptcc classify and ptcc certify'
+    """
+    where = "a family (several graphs, uncertain weights) goes to ptcc classify and ptcc certify"
+    return f"ptcc {name} takes one graph; {where}"
 
 
 def kind_of_protocol(context: click.Context, parameter: click.Parameter | None, kind: str | None) -> str | None:

@@ -4,22 +4,39 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.families import mode_options, read_family, refuse_options
 from ptcc_certify.cli.terminal import FIGURES, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from ptcc_certify.graphs.family import Family
+    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.simulation.family_run import FamilyTrajectory
+    from ptcc_certify.simulation.trajectory import Trajectory
 
 _TABLES = ("", ".csv", ".txt")
 
 
 @click.command()
-@shared.graph_argument
+@shared.graphs_argument
 @shared.reading_options
 @shared.protocol_options
 @shared.limit_options
+@mode_options
+@click.option(
+    "--signal",
+    metavar="SIGNAL",
+    default="random",
+    help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
+)
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
 @click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
@@ -28,7 +45,7 @@ _TABLES = ("", ".csv", ".txt")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
 @shared.time_unit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
-def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **options: Any) -> int:
+def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | None, **options: Any) -> int:
     """Integrate the closed loop with CVODES up to the deadline and past it; print CSV or draw a figure.
 
     The columns are t, remaining (1 - t/T, accurate near the deadline), the state of every agent headed by its label,
@@ -37,9 +54,11 @@ def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **optio
 
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
+
+    Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
+    signal, with a column mode: the number of the graph that acts.
     """
     from ptcc_certify.graphs.io import write_atomically
-    from ptcc_certify.simulation.run import simulate as run
 
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
     if suffix not in (*FIGURES, *_TABLES):
@@ -50,13 +69,7 @@ def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **optio
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
     if vectors and options["kind"] != "nominal":
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
-    signed = shared.read(graph, options)
-    more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
-    if options["noise"] is not None:
-        more |= {"noise": "telegraph", "noise_bound": options["noise"]}
-    if (steps := options["steps"]) is not None:
-        more["times"] = [protocol.T * k / steps for k in range(steps + 1)]
-    trajectory = run(signed, protocol, shared.read_initial_states(options, signed), **more)
+    trajectory = _run(graph, protocol, options)
     if output and suffix in FIGURES:
         from ptcc_certify.report.plots.style import save_figure
         from ptcc_certify.report.plots.trajectory import plot_run
@@ -73,3 +86,37 @@ def simulate(graph: str, wide: bool, time_unit: str, output: str | None, **optio
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK
+
+
+def _run(graphs: tuple[str, ...], protocol: Protocol, options: shared.Options) -> Trajectory:
+    """Return the run of a graph, or of a family under a signal."""
+    from ptcc_certify.simulation.run import simulate as run
+
+    steps = options["steps"]
+    times = None if steps is None else [protocol.T * k / steps for k in range(steps + 1)]
+    if (family := read_family(graphs, options)) is not None:
+        return _run_family(family, protocol, times, options)
+    if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
+        raise ParameterError("--signal: is for families (--switching, --uncertainty, intervals); this is one graph")
+    signed = shared.read(graphs[0], options)
+    more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
+    if options["noise"] is not None:
+        more |= {"noise": "telegraph", "noise_bound": options["noise"]}
+    return run(signed, protocol, shared.read_initial_states(options, signed), times=times, **more)
+
+
+def _run_family(
+    family: Family, protocol: Protocol, times: list[Fraction] | None, options: shared.Options
+) -> FamilyTrajectory:
+    """Return the run of a family under a signal."""
+    from ptcc_certify.simulation.family_run import simulate_family
+    from ptcc_certify.simulation.signals import as_signal
+
+    refuse_options(options)
+    if options["dimension"] > 1 or options["boundary_layer"] is not None:
+        flag = "--dimension" if options["dimension"] > 1 else "--boundary-layer"
+        raise ParameterError(f"{flag}: is for one graph, not for families yet; leave it out")
+    signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
+    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    played = as_signal(signal, options["seed"])
+    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"])

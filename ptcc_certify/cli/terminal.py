@@ -99,7 +99,10 @@ def refuse_output(output: str | None) -> None:
 def _refuse_input(path: str, place: str) -> None:
     """Refuse to write to a file that the command reads: graph, certificate, states, scenario."""
     context = click.get_current_context()
-    texts = [text for name, text in context.params.items() if name not in WRITTEN and isinstance(text, str)]
+    given = [value for name, value in context.params.items() if name not in WRITTEN]
+    texts = [
+        text for value in given for text in (value if isinstance(value, tuple) else (value,)) if isinstance(text, str)
+    ]
     for text in (*texts, context.meta.get(SCENARIO)):
         if text and (path == text or (os.path.isfile(path) and os.path.isfile(text) and os.path.samefile(path, text))):  # noqa: PTH113, PTH121 - Path.is_file may raise
             raise ParameterError(f"{place}: is read by the command itself; name another file")

@@ -184,7 +184,7 @@ class SignedDigraph(ReadOnly, Shown):
         for bad, message in (
             (source == target, "self-loop at node {0}; remove it"),
             (again, "two edges {0} -> {1}; keep one"),
-            (table == 0, "weight 0 of edge {0} -> {1}: an unknown sign is not an edge; remove it or give a weight"),
+            (table == 0, "weight 0 of edge {0} -> {1}: neither ally nor opponent; remove it or give a weight"),
             (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),
             (odd, "weight of edge {0} -> {1} is outside the range of float64; rescale the weights"),
         ):
@@ -244,7 +244,8 @@ class SignedDigraph(ReadOnly, Shown):
             try:
                 first, second, weight = edge
             except (TypeError, ValueError):
-                raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight)") from None
+                mend = "; as_graph takes tables of pandas" * hasattr(edges, "columns")
+                raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight){mend}") from None
             heads.append(number(first))
             tails.append(number(second))
             try:

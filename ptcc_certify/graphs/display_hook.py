@@ -76,3 +76,9 @@ def summary(subject: Any) -> str:
     origins = subject.request.origins
     lines = import_module("ptcc_certify.report.screen").summary_lines(subject, origins.get("graph", "graph"), origins)
     return "\n".join(lines)
+
+
+def family_summary(subject: Any) -> str:
+    """Return what the command line prints of a family's certificate."""
+    lines = import_module("ptcc_certify.report.family_screen").family_summary
+    return "\n".join(lines(subject, subject.origins.get("graph", "family"), subject.origins))

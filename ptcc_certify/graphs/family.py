@@ -264,6 +264,9 @@ class Family(Shown):
         >>> Family.from_graph(SignedDigraph.from_edges([("a", "b", 3)])).graph.edges
         (('a', 'b', Fraction(3, 1)),)
         """
+        if not isinstance(graph, SignedDigraph):
+            mend = "ptcc_certify.as_graph and as_family take other forms"
+            raise GraphError(f"{shorten(repr(graph))} is no SignedDigraph; {mend}")
         share = read_share(uncertainty)
         tied = bool(graph.read.get("undirected"))
         off = np.zeros(graph.n_edges, dtype=bool)
@@ -307,9 +310,10 @@ class Family(Shown):
         Examples
         --------
         >>> unsure = Family.from_intervals([("a", "b", -1, 2)])
-        >>> unsure, unsure.notes
-        (Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional), ('1 weight of unknown sign was read as two \
-edges that may fail, one of each sign',))
+        >>> unsure
+        Family(2 nodes, 2 of 2 weights uncertain, 2 edges optional)
+        >>> print(unsure.notes[0])
+        1 weight of unknown sign was read as two edges that may fail, one of each sign
         """
         refuse_unknown_orientation(orientation)
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []

@@ -33,7 +33,8 @@ TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic
 _MINUS = "\N{MINUS SIGN}"
 #: Units of a formula's drawing in the size of its letters.
 _EM = 200
-_LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4"}
+_LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4", "Omega": "\u03a9", "Theta": "\u0398"}
+_LETTERS |= {"Xi": "\u039e", "Xit": "\u039e\u0303", "Phi": "\u03a6", "Psi": "\u03a8", "Pi": "\u03a0"}
 
 # ---------------------------------------------------------------------- texts of the file
 
@@ -130,6 +131,17 @@ def symbol(name: str) -> Markup:
     letters, index = re.fullmatch(r"([A-Za-z]+?)_?([0-9rs]?)", name).groups()  # type: ignore[union-attr]
     letter = _LETTERS.get(letters, letters)
     return indexed(f"{letter}_{index}" if index else letter)
+
+
+def typeset(text: str) -> Markup:
+    """Set what a screen writes in ASCII: ``||E|| <= 2e-07``, ``lmin(Xi_F)``, ``rho2``."""
+    text = re.sub(r"\b[A-Za-z]+(?![A-Za-z])", lambda word: _LETTERS.get(word[0], word[0]), text)
+    text = re.sub(r"(?<=[\u03c1\u03bc])(?=\d)", "_", text)
+    text = re.sub(r"(?<=L)'|(?<=L_F)'", "\u2032", text)
+    for plain, sign in (("<=", "\u2264"), (">=", "\u2265"), ("||", "\u2016")):
+        text = text.replace(plain, sign)
+    shown = re.sub(r"\bl(min|max)(?=\()", "\u03bb<sub>\\1</sub>", str(indexed(text)))
+    return Markup(re.sub(r"\b[\d.]+e[+-]?\d+\b", lambda number: str(power(number[0])), shown))
 
 
 def formula_svg(latex: str, inline: bool = True) -> Markup:

@@ -13,11 +13,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import shows
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
@@ -25,6 +28,7 @@ from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run
 from ptcc_certify.report.screen import certificate_lines, structure_lines
 from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.family_behaviour import decide
 
 # Where the text of a line of a screen begins, after its head.
 _HEAD = 11
@@ -49,6 +53,21 @@ def certificate_html(certificate: Certificate) -> str:
     """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound."""
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
     return _page(certificate_lines(certificate, "signed digraph"), draw(certificate, ["decay"]).get("decay"), alt)
+
+
+@shows(FamilyCertificate)
+def family_certificate_html(certificate: FamilyCertificate) -> str:
+    """Show the certificate of a family: the screen of ``ptcc certify``."""
+    origins = certificate.origins
+    return _page(family_lines(certificate, origins.get("graph", "family"), origins), None, "")
+
+
+@shows(Family)
+def family_html(family: Family) -> str:
+    """Show a family: the screen of ``ptcc classify``, up to 120 nodes; of more its size alone."""
+    if family.n_nodes > SHOWN_NODES:
+        return _page([f"{'family':<{_HEAD}}{family_text(family, 'family')}"], None, "")
+    return _page(decision_lines(decide(family), family, "family"), None, "")
 
 
 @shows(Trajectory)
@@ -76,8 +95,9 @@ def _structure_page(lines: Iterable[str], structure: Structure) -> str:
 
 def _page(lines: Iterable[str], figure: Any, alt: str) -> str:
     """Return lines, each with a head of ten characters, as a table beside a figure, if there is one."""
+    head = "text-align:left;vertical-align:top;padding-right:0.8em"
     rows = "".join(
-        f'<tr><th scope="row" style="text-align:left;vertical-align:top">{html.escape(line[:_HEAD].strip())}</th>'
+        f'<tr><th scope="row" style="{head}">{html.escape(line[:_HEAD].strip())}</th>'
         f'<td style="text-align:left">{html.escape(line[_HEAD:].strip())}</td></tr>'
         for line in lines
     )

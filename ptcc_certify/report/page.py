@@ -17,7 +17,7 @@ from itertools import groupby, islice
 from typing import Any
 
 import jinja2
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
@@ -118,7 +118,7 @@ def _environment() -> jinja2.Environment:
     environment = texts.environment(lambda text: printable(text, 2000), autoescape=True)
     named = ("above", "below", "indexed", "label", "labels", "plural", "power", "printable", "rational", "symbol")
     environment.filters |= {name: getattr(texts, name) for name in named}
-    environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags}
+    environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags, "typeset": texts.typeset}
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
     environment.globals |= {"ROWS": ROWS, "EXTREMES": EXTREMES, "GROUPS": GROUPS, "FEW": FEW}
@@ -164,9 +164,9 @@ def _view(saved: Certificate) -> dict[str, Any]:
 
 def _in_words(saved: Certificate) -> tuple[Markup, str]:
     """Return the verdict without options of the command line, and the ``rho2`` that leaves 1 %, empty if none."""
-    text = re.sub(r"--rho2 (\S+) \([^)]*\)", "\u03c1<sub>2</sub> = \\1", str(escape(saved.assessment.text)))
+    text = re.sub(r"--(rho2|mu3) (\S+)(?: \([^)]*\))?", r"\1 = \2", saved.assessment.text)
     useful = re.match(r"--rho2 (\S+) .*leaves 1 %", saved.assessment.advice)
-    return Markup(re.sub(r"--mu3 (\S+)", "\u03bc<sub>3</sub> = \\1", text)), useful[1] if useful else ""
+    return texts.typeset(text), useful[1] if useful else ""
 
 
 def _title(saved: Certificate, invariant: str) -> Markup:

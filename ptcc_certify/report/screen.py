@@ -17,6 +17,7 @@ from lmi.exact.decimal_rounding import down, near, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -41,6 +42,7 @@ from ptcc_certify.report.text_layout import (
     wrap_text,
 )
 from ptcc_certify.theorems.claims import Claim
+from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state import FinalState
@@ -54,6 +56,8 @@ SHORT = 8
 
 #: 1 - t/T and its name, where the screen tells what may be left.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
+#: Columns of a list of nodes on the long screen: twelve lines.
+_LONG_LIST = 12 * TEXT
 
 
 def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
@@ -126,21 +130,39 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
 
     Without a path, and where a number is beyond float64, nothing but the claim itself.
     """
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.format import read_document
-
     lines = []
     if report.accepted:
         claims = [part["claim"] for part in document.get("components") or [document]]
-        texts = sorted({f"{claim['behaviour']} (Theorem {claim['theorem']})" for claim in claims})
+        texts = sorted({_file_claim(claim) for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
     if report.accepted and path:
         with suppress(PTCCError):
-            certificate = Certificate(**read_document(Path(path), document, "", report))
-            told = summary_lines(certificate, path, dict.fromkeys(("x(0)", "sigma(0)"), "as in the file"))
+            told = _file_summary(path, document, report)
             answers = dropwhile(lambda line: not line.startswith("protocol"), told)
             lines = list(takewhile(lambda line: not line.startswith("verdict"), answers))
     return wrap_lines([*lines, report.lines()[-1]])
+
+
+def _file_claim(claim: Mapping[str, str]) -> str:
+    """Tell a claim of a file in a few words."""
+    if "signal" not in claim:
+        return f"{claim['behaviour']} (Theorem {claim['theorem']})"
+    return claim["behaviour"] + f" {WHATEVER['any']}" * (claim["behaviour"] != DEPENDS)
+
+
+def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
+    """Return the short screen of an accepted certificate, of a graph or a family, as its file says it."""
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.certificate_data import Source
+    from ptcc_certify.certificate.format import read_document
+    from ptcc_certify.certificate.read_family_certificate import read_family_certificate
+
+    origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
+    if "modes" in document["graph"]:
+        return family_summary(
+            read_family_certificate(Source(Path(path), "", document, report, None, ())), path, origins
+        )
+    return summary_lines(Certificate(**read_document(Path(path), document, "", report)), path, origins)
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
@@ -182,7 +204,7 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
-    """Tell where the agents end, in two lines if all of them fit there, else the least and the largest state."""
+    """Tell where the agents end, in two lines if all fit there, else how many where, or the least and largest state."""
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
@@ -194,9 +216,12 @@ def _short_final_state(certificate: Certificate) -> Lines:
     listed = value_list(labels, result.states, 2 * TEXT)
     grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
     text = min(listed, grouped, key=columns)
+    cut = ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2
     if len(groups) == 1 < len(labels):
         text = f"every agent at {short_number(result.states[0])}"
-    elif ", ... (" in text or len(wrap_text(f"{text} {kind}")) > 2:
+    elif cut and len(groups) == 2:
+        text = " and ".join(f"{len(names):,} agents at {short_number(state)}" for state, names in groups.items())
+    elif cut:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
         text = f"least {least}, largest {most}, of {len(labels):,} agents"
@@ -299,9 +324,11 @@ def structure_lines(structure: Structure, name: str) -> list[str]:
     labels = structure.graph.labels
     followers = [labels[v] for v in structure.followers.tolist()]
     claims = _claim_lines(structure, [component.claim for component in structure.components])
-    told = [("followers", shorten_list(followers))] if followers else []
+    told = [("followers", shorten_list(followers, _LONG_LIST))] if followers else []
     facts = [("nodes", shorten_list(labels)), ("structure", structure_text(structure))]
-    return format_lines([*_graph_lines(structure, name), *facts, *leader_lines(structure, 4), *told, *claims])
+    return format_lines(
+        [*_graph_lines(structure, name), *facts, *leader_lines(structure, 4, _LONG_LIST), *told, *claims]
+    )
 
 
 def certificate_lines(

@@ -15,7 +15,7 @@ ORIENTATION = {
     "matrix": "row = listener",
 }
 
-_SHORT_ORIENTATION = ORIENTATION | {
+SHORT_ORIENTATION = ORIENTATION | {
     "information": "row a,b: information flows a -> b",
     "listens": "row a,b: a listens to b",
 }
@@ -49,7 +49,7 @@ def _connectivity(structure: Structure) -> str:
 
 def _reading_text(structure: Structure) -> str:
     """Tell how the rows were read, and what is particular about the graph, as far as it fits."""
-    text = _SHORT_ORIENTATION[structure.graph.read["orientation"]]
+    text = SHORT_ORIENTATION[structure.graph.read["orientation"]]
     remarks = [remark for remark in remarks_on(structure) if remark not in _LONG_REMARKS]
     if BY_HEADER in remarks:
         remarks.remove(BY_HEADER)

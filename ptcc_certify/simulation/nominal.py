@@ -66,9 +66,11 @@ def simulate_nominal(
     t, remaining = instants.t, instants.remaining
     sampled = limited.limits.sample_period is not None
     if forcing is not None and sampled:
-        raise ParameterError("sample_period takes no disturbance and no noise; leave one of them out")
+        raise ParameterError("a run with a sample period takes no disturbance and no noise; leave one of them out")
     if forcing is not None and forcing.noisy and not limited.bounded:
-        raise ParameterError("noise times a gain that becomes infinite at T is no input; give gain_cap or stop_before")
+        raise ParameterError(
+            "noise times a gain that becomes infinite at T is no input; give a gain cap or stop before T"
+        )
     columns = initial_state.reshape(graph.n_nodes, -1)
     unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
     unit[unit == 0] = 1

@@ -19,10 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.io import as_family
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
@@ -197,7 +201,7 @@ class FamilyComponent:
         return None
 
 
-def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
+def decide(family: Any, signal: str = "any") -> tuple[FamilyComponent, ...]:
     """Decide what every weakly connected component of a family does under every signal.
 
     Stability and bipartite consensus are always decided. Whether a component keeps one kernel of other rows is decided
@@ -208,7 +212,8 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
 
     Parameters
     ----------
-    family : Family
+    family : family-like
+        Whatever :func:`ptcc_certify.as_family` takes.
     signal : {"any", "constant"}
         ``any``: modes and weights change at any instants, arbitrarily often. ``constant``: they are those of one
         member, which is not known. A claim for constant signals does not hold for others.
@@ -220,8 +225,10 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
 
     Raises
     ------
-    ValueError
+    ParameterError
         No signals are called so.
+    GraphError
+        It is no family and no graph.
 
     References
     ----------
@@ -242,7 +249,8 @@ def decide(family: Family, signal: str = "any") -> tuple[FamilyComponent, ...]:
     'bipartite consensus'
     """
     if signal not in SIGNALS:
-        raise ValueError(f'signals are "any" or "constant", not "{signal}"')
+        raise ParameterError(f'signals are "any" or "constant", not "{shorten(str(signal))}"')
+    family = as_family(family)
     n = family.n_nodes
     source, target, _ = family.union
     result = []

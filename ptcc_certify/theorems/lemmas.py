@@ -251,13 +251,20 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     M = sparse.csc_array(sparse.diags_array(graph.in_weight()) - abs(graph.adjacency()))
     rest, last = sparse.csc_array(M[:-1, :-1].T), -M[[-1], :-1].toarray().ravel()
     if fill_core(M) > FILL_ROWS:
-        p = np.append(solve(sparse.csr_array(rest), last, rest.diagonal()), 1.0)
+        rows = sparse.csr_array(rest)
+        p = np.append(solve(rows, last, rest.diagonal()), 1.0)
+        if not (p > 0).all():  # from 0 the search reaches few nodes a step, and may break down: begin everywhere
+            start = np.random.default_rng(0).uniform(0.5, 1.5, rest.shape[0])
+            p = np.append(start + solve(rows, last - rows @ start, rest.diagonal()), 1.0)
     else:
         options = {"SymmetricMode": True}
         factor = splu(rest, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         p = np.append(factor.solve(last), 1.0)
     if not (np.isfinite(p).all() and (p > 0).all()):
-        raise HypothesisError("no positive left vector was found in float64")
+        raise HypothesisError(
+            f"no positive left vector of a group of {graph.n_nodes:,} leaders was found in float64; "
+            "certify a part of the graph, or weights of more even size"
+        )
     return p / p.sum()
 
 

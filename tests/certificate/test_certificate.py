@@ -533,7 +533,7 @@ def test_unknown_signs_are_refused_by_name(real_data: Path):
     (line,) = run.err.splitlines()
     assert "weight 0 of edge" in line
     assert all(f"{source} -> {target}" in line for source, target in unknown)
-    assert str(len(unknown)) in line and "unknown sign" in line
+    assert str(len(unknown)) in line and "neither ally nor opponent" in line
 
 
 # ---------------------------------------------------------------------- special starts, special graphs

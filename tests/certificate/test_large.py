@@ -459,6 +459,17 @@ def test_long_undirected_groups_have_an_exact_left_vector(closed: bool):
     assert cert.final_state is not None and list(cert.final_state.states) == mean_of_start(cert)
 
 
+def test_a_large_group_of_leaders_without_a_sparse_factor_has_a_left_vector():
+    """The iterative search, begun at 0, breaks down on it."""
+    n = 5000
+    jumps = [(i, (7 * i + 3) % n, 2) for i in range(n)]
+    ring = [(i, (i + 1) % n, 1) for i in range(n)]
+    graph = SignedDigraph.from_edges([*ring, *(e for e in jumps if (e[1] - e[0]) % n > 1)])
+    p = left_vector(graph)
+    inflow = np.bincount(graph.source, p[graph.target] * np.abs(graph.weights), n)
+    assert (p > 0).all() and np.allclose(inflow, p * graph.in_weight(), rtol=1e-9)
+
+
 def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
     ring = [(i, (i + 1) % 600, 1) for i in range(600)]
     assert left_vector(SignedDigraph.from_edges(ring)).tolist() == [1 / 600] * 600

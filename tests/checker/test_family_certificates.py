@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 import copy
+import hashlib
+import itertools
+import json
 import os
 import random
+import time
 from collections import Counter
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from common_kernel_families import random_family as with_common_kernel
 from families import KINDS, random_family
+from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
 from oracle_family_certificates import FamilyOracle, false_family_claims
 
-from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify import checker
+from ptcc_certify.certificate import format_vectors
+from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
+from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.theorems.family_behaviour import decide
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -43,7 +54,7 @@ def cases() -> list[tuple[str, Json]]:
     """True certificates of families of every behaviour, small."""
     found = []
     for k, kind in enumerate((*KINDS, *KINDS)):
-        made = random_family(random.Random(100 + k), kind, nodes=4)
+        made = random_family(random.Random(100 + k), kind, nodes=4 if k < len(KINDS) else 3)
         found.append((kind, document(made.family, k, k % 4 > 0)))
     draw = np.random.default_rng(1)
     for kind in ("stability", "consensus", "containment", "undirected"):
@@ -246,3 +257,409 @@ def test_no_mutant_of_thousands_is_accepted_that_is_false(capsys: pytest.Capture
     with capsys.disabled():
         print(f"\nseed {SEED}: {dict(count)}")
     assert os.environ.get("PTCC_FUZZ_ONLY") or count["mutants"] >= 3000
+
+
+# ---------------------------------------------------------------------- the shape
+
+
+VALIDATOR = Draft202012Validator(
+    json.loads((Path(checker.__file__).parent / "certificate.schema.json").read_text("utf-8"))
+)
+
+
+def test_certificates_of_families_are_valid():
+    for _, data in cases():
+        VALIDATOR.validate(data)
+
+
+@pytest.mark.parametrize(
+    ("path", "new"),
+    [
+        (("claim", "signal"), "constant"),
+        (("claim", "behaviour"), "bipartite"),
+        (("graph", "modes"), []),
+        (("graph", "modes", 0, "undirected"), None),
+        (("graph", "modes", 0, "edges", 0), ["a"]),
+        (("structure", "modes", 0, "connectivity"), "torn"),
+        (("protocol", "kind"), "sliding-mode"),
+        (("paper",), {}),
+        (("verdict",), "undecided"),
+        (("input", "bounded"), False),
+        (("lyapunov", "functions", 0, "class"), "paper"),
+        (("proof", 0, "of"), "graph"),
+        (("proof", -1, "lemma"), "Lemma 1"),
+        (("more",), 1),
+    ],
+)
+def test_what_does_not_fit_is_neither_valid_nor_accepted(path: tuple[Any, ...], new: Any):
+    data = next(data for name, data in cases() if name == "uncertain consensus")
+    assert VALIDATOR.is_valid(data) and check(resealed(data)).accepted
+    made = {**data, "more": 1} if path == ("more",) else changed(data, path, new)
+    assert not VALIDATOR.is_valid(made) and not check(resealed(made)).accepted
+
+
+# ---------------------------------------------------------------------- forgeries
+
+
+def test_an_undirected_family_is_not_the_directed_one_of_the_same_bounds():
+    """Its weights change together: a directed member of this path decays with 0.31, below the rate 1.17."""
+    path = [("a", "b", 1, 10), ("b", "c", 1, 10), ("c", "d", 1, 10)]
+    tied = Family.from_intervals(path, undirected=True)
+    free = Family.from_intervals(path + [(t, s, low, high) for s, t, low, high in path])
+    made = certificate(tied, state=False)
+    slowest = min(
+        2
+        * sorted(
+            np.linalg.eigvals(np.diag([a, b + c, d + e, f]) - np.diag([a, c, e], 1) - np.diag([b, d, f], -1)).real
+        )[1]
+        for a, b, c, d, e, f in itertools.product((1, 10), repeat=6)
+    )
+    assert slowest < 0.32 < 1.17 < float(made.rate)
+    assert tied != free and tied.sha256 != free.sha256
+    forged = made.to_dict()
+    forged["graph"]["modes"][0]["undirected"] = False
+    assert check(resealed(forged)).rejected == "graph"
+    forged["graph"]["sha256"] = free.sha256
+    assert check(resealed(forged)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
+
+
+def forged(name: str, *changes: tuple[tuple[Any, ...], Any]) -> Any:
+    data = next(data for own, data in cases() if own == name)
+    for path, new in changes:
+        data = changed(data, path, new)
+    return check(resealed(data))
+
+
+def steps(name: str, kind: str) -> list[int]:
+    data = next(data for own, data in cases() if own == name)
+    return [k for k, step in enumerate(data["proof"]) if step["kind"] == kind]
+
+
+def test_a_function_is_of_its_own_component():
+    data = next(data for name, data in cases() if name == "two components")
+    numbers = [V["component"] for V in data["lyapunov"]["functions"]]
+    assert set(numbers) == {0, 1}
+    for k, number in enumerate(numbers):
+        path = ("lyapunov", "functions", k, "component")
+        assert forged("two components", (path, 1 - number)).rejected == f"lyapunov.functions[{k}]"
+        assert not forged("two components", (path, 2)).accepted
+
+
+def test_functions_of_one_component_bound_no_input_of_another():
+    data = next(data for name, data in cases() if name == "two components")
+    for number in (0, 1):
+        kept = [k for k, V in enumerate(data["lyapunov"]["functions"]) if V["component"] == number]
+        proof = [x for x in data["proof"] if not x["of"].startswith("lyapunov")]
+        middle = next(k for k, x in enumerate(proof) if x["kind"] == "family-claim") + 1
+        renamed = []
+        for place, k in enumerate(kept):
+            for x in data["proof"]:
+                if x["of"].startswith(f"lyapunov.functions[{k}]"):
+                    renamed.append({**x, "of": x["of"].replace(f"functions[{k}]", f"functions[{place}]")})
+        functions = [data["lyapunov"]["functions"][k] for k in kept]
+        report = forged(
+            "two components",
+            (("lyapunov", "functions"), functions),
+            (("proof",), proof[:middle] + renamed + proof[middle:]),
+        )
+        assert not report.accepted and report.rejected in ("family-final-state of final_state", "family-input of input")
+
+
+def test_a_multiplier_is_positive_and_none_is_left_out():
+    (first, *_) = steps("uncertain consensus", "family-rate")
+    path = ("proof", first, "witness", "multipliers")
+    data = next(data for name, data in cases() if name == "uncertain consensus")
+    own = at(data, path)
+    assert own and forged("uncertain consensus", (path, own)).accepted
+    for new in ([], own[:-1], [*own, "1"], ["0", *own[1:]], ["-1", *own[1:]]):
+        assert forged("uncertain consensus", (path, new)).rejected == "family-rate of lyapunov.functions[0].modes[0]"
+    where = ("proof", first, "witness")
+    assert forged("uncertain consensus", (where, None)).reason == "the least weights are not the worst"
+
+
+def test_a_peak_takes_a_rate_of_at_least_two_over_the_exponent():
+    name, data = next(
+        (name, data) for name, data in cases() if data["input"]["peaks"] and data["lyapunov"]["functions"]
+    )
+    rate = max(Fraction(V["rate"]) for V in data["lyapunov"]["functions"])
+    exponent = Fraction(data["protocol"]["kappa"]) * Fraction(data["protocol"]["rho2"])
+    assert rate * exponent >= 2
+    slower = str(Fraction(199, 100) / rate / Fraction(data["protocol"]["rho2"]))
+    assert forged(name, (("protocol", "kappa"), slower)).rejected == "family-input of input"
+
+
+def test_a_rate_that_is_not_positive_moves_nothing():
+    """Then the agents end between the extremes at the beginning, and nothing narrower is taken."""
+    name = "uncertain consensus"
+    data = next(data for own, data in cases() if own == name)
+    proof = [x for x in data["proof"] if x["kind"] != "family-input"]
+    proof = [{**x, "numbers": {"b": "-1"}} if x["kind"] == "family-rate" else x for x in proof]
+    functions = [{**V, "rate": "-1"} for V in data["lyapunov"]["functions"]]
+    size = max(abs(Fraction(x)) for x in data["initial_state"].values())
+    for share, accepted in ((1, True), (Fraction(1, 100), False)):
+        ends = dict.fromkeys(data["graph"]["nodes"], ball("0", str(share * size)))
+        report = forged(
+            name,
+            (("proof",), proof),
+            (("lyapunov", "functions"), functions),
+            (("input",), {"bounded": None, "peaks": None}),
+            (("final_state",), ends),
+        )
+        assert functions and report.accepted == accepted
+        assert accepted or report.rejected == "family-final-state of final_state"
+
+
+def test_a_row_of_a_kernel_has_columns_of_its_own_component_alone():
+    data = next(data for name, data in cases() if name == "bipartite containment")
+    (place,) = steps("bipartite containment", "family-claim")
+    rows = data["proof"][place]["witness"][0]["rows"]
+    label = next(iter(rows))
+    for key in ("0", "9", "01", "-1", ""):
+        path = ("proof", place, "witness", 0, "rows")
+        report = forged("bipartite containment", (path, {**rows, label: {**rows[label], key: "0"}}))
+        assert report.reason == "a row of a kernel"
+
+
+def test_many_components_take_time_in_proportion():
+    edges = [(f"{s}{i}", f"{t}{i}", 1, 1 + (t == "d")) for i in range(500) for s, t in ("ac", "bc", "cd")]
+    family = Family.from_intervals(edges)
+    data = family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+    begin = time.process_time()
+    assert check(data, stdlib=True).accepted
+    assert time.process_time() - begin < 1.5
+
+
+def test_known_weights_are_one_family_whether_undirected_or_not():
+    path = [("a", "b", 1, 1), ("b", "c", -2, -2)]
+    both = path + [(t, s, low, high) for s, t, low, high in path]
+    assert Family.from_intervals(path, undirected=True) == Family.from_intervals(both)
+
+
+@pytest.mark.parametrize("name", ["connectivity", "balanced", "sign_symmetric"])
+def test_what_is_said_of_a_mode_is_verified(name: str):
+    data = next(data for name, data in cases() if name == "leaders change")
+    said = data["structure"]["modes"][0][name]
+    new = (not said) if isinstance(said, bool) else "weak"
+    report = check(resealed(changed(data, ("structure", "modes", 0, name), new)))
+    assert not report.accepted
+
+
+APART = [("a", "c", 1, 1), ("b", "c", 1, 1), ("c", "d", 2, 2)]
+
+
+def moved(state: Json, edge: Any = None, modes: tuple[int, int] = (0, 1)) -> Any:
+    """A certificate that says that a state at rest in one mode moves in another."""
+    second = [("a", "c", 1, 1), ("b", "c", 3, 3), ("c", "d", 2, 4)]
+    data = document(Family.switching([Family.from_intervals(e) for e in (APART, second)]), state=False)
+    place = next(k for k, x in enumerate(data["proof"]) if x["kind"] == "family-claim")
+    witness = [{"mode": modes[0], "other": modes[1], "edge": edge, "state": state}]
+    return check(resealed(changed(data, ("proof", place, "witness"), witness)))
+
+
+def ball(mid: str, radius: str) -> Json:
+    return {"mid": mid, "radius": radius}
+
+
+def test_a_state_at_rest_may_be_exact_or_enclosed():
+    assert moved({"a": "1", "c": "1/2", "d": "1/2"}).accepted
+    assert moved({"a": "1", "c": ball("0.501", "0.002"), "d": ball("0.5", "0.003")}).accepted
+    assert moved({"b": "1", "c": "3/4", "d": "3/4"}, modes=(1, 0)).accepted
+
+
+@pytest.mark.parametrize(
+    ("state", "edge"),
+    [
+        ({"a": "1", "c": "1/2"}, None),  # d moves in the first mode
+        ({"a": "1", "c": "1/2", "d": "1/2"}, ["c", "d", 1]),  # c and d are equal
+        ({"a": "1", "c": "1/2", "d": "1/2"}, ["c", "d", True]),
+        ({"a": "1", "c": "1/2", "d": "1/2"}, ["c", "d", -1]),  # no edge
+        ({"a": "1", "c": "1/2", "d": "1/2"}, ["b", "c", 1]),  # a known edge
+        ({"a": "1", "b": "1", "c": "1", "d": "1"}, None),  # at rest in both
+        ({"a": ball("1", "0.1"), "c": ball("1/2", "0.1"), "d": ball("1/2", "0.1")}, None),  # a leader is exact
+        ({"a": "1", "c": ball("1/2", "0.3"), "d": ball("1/2", "0.3")}, None),  # may be at rest in both
+        ({"a": "1", "c": ball("0.51", "0.002"), "d": ball("0.5", "0.02")}, None),  # c lies elsewhere
+        ({"a": "1", "c": ball("0.501", "0.002"), "d": ball("0.5", "0.001")}, None),  # d may lie elsewhere
+        ({"x": "1"}, None),
+        ({}, None),
+    ],
+)
+def test_a_state_that_does_not_prove_it_is_refused(state: Json, edge: Any):
+    report = moved(state, edge)
+    assert report.rejected == "family-claim of graph" and "\n" not in report.reason
+
+
+def test_the_true_state_lies_within_the_radii():
+    """Enclosures of states at rest that are accepted hold them: random followers, against exact solves."""
+    draw, accepted = random.Random(3), 0
+    for _ in range(60):
+        weights = [Fraction(draw.randint(1, 5)) for _ in range(5)]
+        edges = [("a", "c", weights[0]), ("b", "c", -weights[1]), ("d", "c", weights[2]), ("c", "d", weights[3])]
+        edges.append(("b", "d", weights[4]))
+        first = Family.from_intervals([(s, t, w, w) for s, t, w in edges])
+        second = Family.from_intervals([(s, t, w, w) for s, t, w in edges[1:]] + [("a", "c", 9, 9)])
+        data = document(Family.switching([first, second]), state=False)
+        place = next(k for k, x in enumerate(data["proof"]) if x["kind"] == "family-claim")
+        w = weights  # c (w0 + w1 + w2) - w2 d = w0, d (w3 + w4) - w3 c = 0 for a = 1, b = 0
+        c = w[0] * (w[3] + w[4]) / ((w[0] + w[1] + w[2]) * (w[3] + w[4]) - w[2] * w[3])
+        d = w[3] * c / (w[3] + w[4])
+        size = Fraction(1, draw.choice((4, 100, 10**4)))
+        mids = [x + draw.randint(-8, 8) * size / 8 for x in (c, d)]
+        radii = [draw.randint(1, 8) * size / 8 for _ in (c, d)]
+        state = {"a": "1"} | {k: ball(str(m), str(r)) for k, m, r in zip("cd", mids, radii, strict=True)}
+        witness = [{"mode": 0, "other": 1, "edge": None, "state": state}]
+        if check(resealed(changed(data, ("proof", place, "witness"), witness))).accepted:
+            accepted += 1
+            assert all(abs(x - m) <= r for x, m, r in zip((c, d), mids, radii, strict=True))
+    assert accepted >= 3
+
+
+# ---------------------------------------------------------------------- files made to exhaust the check
+
+
+def hostile(n: int, edges: list[Any] | None = None, multiplier: str = "1000", modes: int = 1) -> Json:
+    """A certificate with a Lyapunov function that proves nothing, all in its form right."""
+    star: Any = [("h", f"v{i}", 1, 2) for i in range(n)]
+    family = Family.switching([Family.from_intervals(edges or star) for _ in range(modes)])
+    parts = tuple(map(ComponentProof, decide(family)))
+    data = family_document(FamilyCertificate(family, PROTOCOL, parts))[0]
+    labels, q = list(family.labels), len(edges or star)
+    function = {"class": "full", "component": 0, "nodes": labels[1:], "rate": "-100"}
+    function["lower_triangle"] = [["1" if i == j else "0" for j in range(i + 1)] for i in range(n)]
+    function |= {"inputs": dict.fromkeys(labels, "1000000"), "coordinates": dict.fromkeys(labels[1:], "2")}
+    data["lyapunov"] = {"functions": [function]}
+
+    def step(kind: str, of: str, witness: Any = None, **numbers: str) -> Json:
+        proves, lemma = checker.OBLIGATIONS[kind]
+        return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers, "witness": witness}
+
+    proof = data["proof"][: modes + 1]
+    multipliers = {"multipliers": [f"{multiplier}{i}" if len(multiplier) > 4 else multiplier for i in range(q)]}
+    proof += [step("family-rate", f"lyapunov.functions[0].modes[{k}]", multipliers, b="-100") for k in range(modes)]
+    data["proof"] = [*proof, step("family-constants", "lyapunov.functions[0]")]
+    data["input"] = {"bounded": None, "peaks": None}
+    return data
+
+
+def long_numbers(count: int, digits: int = 1900) -> list[str]:
+    draw = random.Random(count)
+    return [f"1/{10**digits + 2 * draw.randrange(10**digits) + 1}" for _ in range(count)]
+
+
+def with_long_state(n: int) -> Json:
+    data = hostile(n)
+    labels = data["graph"]["nodes"]
+    data["initial_state"] = dict(zip(labels, long_numbers(n + 1), strict=True))
+    data["final_state"] = dict.fromkeys(labels, ball("0", "100"))
+    data["proof"].append({**data["proof"][-1], "kind": "family-final-state", "of": "final_state"})
+    data["proof"][-1]["proves"], data["proof"][-1]["lemma"] = checker.OBLIGATIONS["family-final-state"]
+    return data
+
+
+def with_long_rows(n: int) -> Json:
+    family = Family.from_intervals([(f"l{i}", "f", 1, 1) for i in range(n)])
+    data = document(family, state=False)
+    step = next(x for x in data["proof"] if x["kind"] == "family-claim")
+    step["witness"][0]["rows"]["f"] = dict(zip(step["witness"][0]["rows"]["f"], long_numbers(n), strict=True))
+    return data
+
+
+def with_long_weights(n: int) -> Json:
+    return hostile(n, [("h", f"v{i}", 1, 1 + Fraction(x)) for i, x in enumerate(long_numbers(n))])
+
+
+def with_many_rows(followers: int, leaders: int, modes: int) -> Json:
+    """Uncertain edges between agents with the same long rows of the kernel."""
+    draw = random.Random(0)
+    first = [(f"l{i}", "f0", 1 + draw.randrange(9), 0) for i in range(leaders)]
+    known: Any = [(s, t, w, w) for s, t, w, _ in first]
+    known += [("f0", f"f{k}", 1, 2) for k in range(1, followers)]
+    pairs = [(f"f{i}", f"f{k}", 0, 1) for i in range(1, followers) for k in range(1, followers) if i != k]
+    family = Family.switching([Family.from_intervals(known + pairs)] * modes)
+    return family_document(FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family)))))[0]
+
+
+def with_many_functions(leaders: int, modes: int) -> Json:
+    """Functions of one agent that hears very many, each with its rates in all modes."""
+    edges = [(f"l{i}", "f", 1, 1) for i in range(leaders)]
+    family = Family.switching([Family.from_intervals(edges)] * modes)
+    data = document(family, state=False)
+    one = data["lyapunov"]["functions"][0]
+    proof = data["proof"]
+    own = [x for x in proof if x["of"].startswith("lyapunov.functions[0]")]
+    rest = [x for x in proof if not x["of"].startswith("lyapunov")]
+    place = next(k for k, x in enumerate(rest) if x["kind"] == "family-claim") + 1
+    many = [{**x, "of": x["of"].replace("[0]", f"[{k}]", 1)} for k in range(100) for x in own]
+    return {**data, "lyapunov": {"functions": [one] * 100}, "proof": rest[:place] + many + rest[place:]}
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: with_long_state(60),
+        lambda: with_long_rows(100),
+        lambda: with_long_weights(100),
+        lambda: hostile(60, multiplier=long_numbers(1)[0]),
+        lambda: hostile(30, [(f"v{i}", f"v{j}", 1, 2) for i in range(31) for j in range(31) if i != j]),
+        lambda: hostile(40, modes=50),
+        lambda: with_many_rows(8, 400, 10),
+        lambda: with_many_functions(60, 4),
+    ],
+)
+def test_long_numbers_and_many_weights_are_answered_soon(make: Any):
+    data = resealed(make())
+    begin = time.process_time()
+    report = check(data, stdlib=True)
+    assert time.process_time() - begin < 3
+    assert report.accepted or "\n" not in (report.reason or "")
+
+
+# ---------------------------------------------------------------------- read back
+
+
+def test_what_is_read_back_says_the_same(tmp_path: Path):
+    for k, kind in enumerate(KINDS[:5]):
+        made = certificate(random_family(random.Random(k), kind, nodes=3).family, k)
+        made.save(tmp_path / f"{k}.json")
+        saved = read_certificate(tmp_path / f"{k}.json")
+        assert (saved.behaviours, saved.rate, saved.family) == (made.behaviours, made.rate, made.family)
+        assert (saved.final_states, saved.input_peaks, saved.bounded) == (
+            made.final_states,
+            made.input_peaks,
+            made.bounded,
+        )
+        assert (saved.deviation_bound([1, 0.5, 0.1]) == made.deviation_bound([1, 0.5, 0.1])).all()
+        assert saved.verdict == made.verdict == "certified" and saved.checked.accepted and saved.upper_bound is None
+        saved.save(tmp_path / "again.json")
+        assert (tmp_path / "again.json").read_bytes() == (tmp_path / f"{k}.json").read_bytes()
+        assert read_certificate(made.to_dict()).final_states == made.final_states
+
+
+def test_a_file_that_is_rejected_is_not_read(tmp_path: Path):
+    data = next(data for name, data in cases() if name == "uncertain consensus")
+    (tmp_path / "c.json").write_text(json.dumps(resealed({**data, "verdict": "undecided"})), encoding="utf-8")
+    with pytest.raises(RejectedCertificate, match="the independent check rejects verdict"):
+        read_certificate(tmp_path / "c.json")
+
+
+def test_many_edges_are_read_from_side_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(format_vectors, "LONG", 2)
+    edges = [("a", "b", 1, 2), ("b", "a", "0", "0.1"), ("b", "a", "-0.25", 0), ("a", "c", -3, -3)]
+    made = certificate(Family.from_intervals(edges), state=False)
+    made.save(tmp_path / "c.json")
+    document = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
+    VALIDATOR.validate(document)
+    files = {path.name: path.read_bytes() for path in tmp_path.glob("*.npy")}
+    assert isinstance(document["graph"]["modes"][0]["edges"], dict) and len(files) >= 4
+    assert false_family_claims(document, files) == []
+    assert all(check(tmp_path / "c.json", stdlib=stdlib).accepted for stdlib in (True, False))
+    saved = read_certificate(tmp_path / "c.json")
+    assert saved.family == made.family and saved.family.modes[0].edge_interval(0) == made.family.modes[0].edge_interval(
+        0
+    )
+    largest = document["graph"]["modes"][0]["edges"]["largest"]
+    values = np.load(tmp_path / largest["file"])
+    values[0] += 1
+    np.save(tmp_path / "other.npy", values)
+    other = {"file": "other.npy", "sha256": hashlib.sha256((tmp_path / "other.npy").read_bytes()).hexdigest()}
+    forged = resealed(changed(document, ("graph", "modes", 0, "edges", "largest"), {**largest, **other}))
+    assert check(forged, files=files | {"other.npy": (tmp_path / "other.npy").read_bytes()}).rejected == "graph"

@@ -14,8 +14,12 @@ from pathlib import Path
 import pytest
 
 import ptcc_certify
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph, select
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.protocols import NominalProtocol
 
 ROOT = Path(ptcc_certify.__file__).parents[1]
 LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()
@@ -180,6 +184,22 @@ def examples() -> list[str]:
     return found
 
 
+@cache
+def families() -> list[str]:
+    """The JSON of certificates of families: by a Lyapunov function, by a basis of the kernel, by a state that moves."""
+    day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    night = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+    apart = [("a", "c", 1, 1), ("b", "c", 2, 2), ("c", "d", 1, 3)]
+    protocol, found = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), []
+    for family in (
+        Family.switching({"day": day, "night": night}),
+        Family.from_intervals(apart),
+        Family.from_intervals([*apart, ("a", "d", 0, 1)]),
+    ):
+        found.append(json.dumps(certify_family(family, protocol, [1, 2, 3, 4][: family.n_nodes]).to_dict()))
+    return found
+
+
 @pytest.mark.parametrize("watched", [False, True])
 def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
     """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
@@ -213,7 +233,7 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
     ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
     check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
-    for text in examples():
+    for text in (*families(), *examples()):
         (tmp_path / "c.json").write_text(text, encoding="utf-8")
         done = run(check, "c.json")
         assert done.returncode == 0, done.stdout + done.stderr

@@ -217,7 +217,7 @@ def test_a_package_that_is_missing_is_named_with_the_check_that_needs_none(certi
 def test_a_run_tells_what_was_written_and_meets_noise():
     words = ("simulate", "team.csv", "--gain-cap", "20", "--noise", "0.1", "-o", "run.csv")
     assert ptcc(*words).out == "written    run.csv\n"
-    assert "gain_cap or stop_before" in ptcc("simulate", "team.csv", "--noise", "0.1").err
+    assert "give a gain cap or stop before T" in ptcc("simulate", "team.csv", "--noise", "0.1").err
 
 
 def test_steps_are_equal_and_end_at_the_deadline():

@@ -699,7 +699,7 @@ BAD_FILES = [
     ("g.csv", "a,b,1_000\n", ["line 1:", '"1_000"', "not a number"]),
     ("g.csv", "a,b,٣\n", ["line 1:", "not a number"]),
     ("g.csv", "a,b,{}\n", ["line 1:", 'weight "{}" of edge a -> b']),
-    ("g.csv", "a,b,1\nb,c,0\n", ["line 2:", "weight 0 of edge b -> c", "unknown sign"]),
+    ("g.csv", "a,b,1\nb,c,0\n", ["line 2:", "weight 0 of edge b -> c", "neither ally nor opponent"]),
     ("g.csv", "a,b,0.0\nb,c,1\nc,d,-0e5\n", ["line 1:", "weight 0 of edge a -> b, c -> d (2 in all)"]),
     (
         "g.csv",
@@ -726,7 +726,7 @@ BAD_FILES = [
     ("g.csv", "a,b,1\n" + "x" * 70_000 + ",b,1\n", ["line 2:", "65536 characters"]),
     ("g.csv", b"a,b,1\nb,c\0,1\n", ["line 2:", "0x00", "UTF-8"]),
     ("g.csv", b"a,b,1\n\xe9,c,1\n", ["line 2:", "0xe9", "UTF-8"]),
-    ("g.csv", "a,b,1\n".encode("utf-16"), ["line 1:", "UTF-8"]),
+    ("g.csv", "a,b,1\n".encode("utf-16"), ["line 1:", "UTF-16", "UTF-8"]),
     ("g.csv", mtx(), ["Matrix Market", ".mtx"]),
     ("g.csv", b"PK\3\4\0\0", ["line 1:", "0x00"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99, mtime=0)[:-12], ["gzip"]),
@@ -927,7 +927,7 @@ def test_a_missing_file_a_folder_and_a_closed_file_are_refused(tmp_path, put):
         read_graph(tmp_path)
     with pytest.raises(FormatError, match="cannot be read"):
         read_graph("a\0b")
-    with pytest.raises(FormatError, match="5 is no file"):
+    with pytest.raises(FormatError, match="int is no file"):
         read_graph(5)  # type: ignore[arg-type]
     file = put("g.csv", "a,b,1\n").open()
     file.close()
@@ -1278,6 +1278,22 @@ def test_a_rater_listens_to_the_rated(real_data):
     graph = read_graph(real_data / "soc-sign-bitcoinotc.csv.gz", orientation="listens")
     assert ("2", "6", Fraction(4)) in edges(graph)
     assert graph.read["notes"] == ("columns ignored: after the third",)
+
+
+def test_a_file_of_raters_that_is_read_as_information_says_so():
+    table = "rater,rated,rating\na,b,1"
+    assert "raters listen? --edges listens" in read_graph(io.StringIO(table)).read["notes"]
+    assert read_graph(io.StringIO(table), orientation="listens").read["notes"] == ()
+
+
+def test_a_header_of_two_columns_may_call_the_values_anything(tmp_path):
+    graph = read_graph(io.StringIO("a b;name;1\nname;a b;1"))
+    (tmp_path / "x.csv").write_text("name,opinion\na b,2\nname,3\n")
+    assert read_state(tmp_path / "x.csv", graph) == [2, 3]
+    (tmp_path / "x.csv").write_text("name,3\na b,2\n")
+    assert read_state(tmp_path / "x.csv", graph) == [2, 3]
+    with pytest.raises(ParameterError, match="1 of 2 nodes have no value: name"):
+        read_state("a b=3", graph)
 
 
 def test_small_real_graphs(real_data):

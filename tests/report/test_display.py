@@ -83,6 +83,13 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
     assert "certified" in shown(cert).text
 
 
+def test_families_are_told_in_words() -> None:
+    family = ptcc.as_family("fig3a", uncertainty="10%")
+    for value in (family, certify(family, PROTOCOL)):
+        page = shown(value)
+        assert not page.images and "depends on the signal" in page.text
+
+
 def test_what_cannot_be_drawn_is_told_in_words() -> None:
     many = SignedDigraph.from_edges([(k, k % (SHOWN_NODES + 1) + 1, 1) for k in range(1, SHOWN_NODES + 2)])
     pair = load_graph("fig1b")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.text import Annotation, Text
+from matplotlib.transforms import Bbox
 from scipy.integrate import quad
+from scipy.spatial import Delaunay
 
 import ptcc_certify
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
@@ -397,6 +399,15 @@ def test_labels_are_drawn_as_they_are() -> None:
     edges = [("$x_1$", r"$\frac$", 1), (r"$\frac$", "lone \ud800", -1), ("lone \ud800", "a very long name", 1)]
     ax = drawn(plot_graph(edges))
     assert [text.get_text() for text in ax.texts] == ["$x_1$", r"$\frac$", "lone ?", "a very long ..."]
+
+
+def test_long_labels_around_a_circle_hardly_cover_another() -> None:
+    names = [f"a person {k}" for k in range(40)]
+    ax = drawn(plot_graph([(a, names[(k + j) % 40], 1) for k, a in enumerate(names) for j in (1, 9, 17)]))
+    boxes = [text.get_window_extent() for text in ax.texts]
+    shared = [Bbox.intersection(a, b) for k, a in enumerate(boxes) for b in boxes[:k]]
+    area = boxes[0].width * boxes[0].height
+    assert len(boxes) == 40 and max(box.width * box.height for box in shared if box is not None) < area / 8
 
 
 def test_the_ground_of_a_leader_group_has_no_hole() -> None:
@@ -786,3 +797,23 @@ def test_the_start_of_a_certificate_is_known_again_whatever_its_decimals(start: 
     cert = certify(graph, PROTOCOL, start)
     assert cert.trajectory is not None
     assert peak_of(plot_input(cert)) is not None
+
+
+def test_followers_are_not_drawn_among_the_leaders_of_a_ring():
+    ring = [((k + 1) % 12 + 1, k + 1, 1 if k % 3 else -1) for k in range(12)]
+    ring += [(k - 8, k + 1, 1) for k in range(12, 16)]
+    ax = plot_graph(ring)
+    *camps, followers = (np.column_stack(line.get_data()) for line in ax.lines if len(line.get_xdata()) > 1)
+    leaders = np.concatenate(camps)
+    assert (len(leaders), len(followers)) == (12, 4)
+    assert (Delaunay(leaders).find_simplex(followers) < 0).all()
+
+
+def test_ticks_of_time_do_not_overlap_beside_long_names():
+    a, b, c, d = (letter * 40 for letter in "abcd")
+    edges = [(a, b, 1), (b, a, -1), (b, c, 2), (c, d, -9), (d, c, 0.1)]
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    ax = plot_trajectory(simulate(SignedDigraph.from_edges(edges), protocol, [7, 3, 0, -5]))
+    FigureCanvasAgg(ax.figure).draw()
+    boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
+    assert len(boxes) > 1 and all(a.x1 < b.x0 for a, b in pairwise(boxes))

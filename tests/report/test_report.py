@@ -29,12 +29,12 @@ from jinja2 import UndefinedError
 from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Certificate, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
-from ptcc_certify.report.notation import LISTED, formula_svg, printable
+from ptcc_certify.report.notation import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.page import EXTREMES, _environment, report_html
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import _tex, report_latex
@@ -592,6 +592,13 @@ def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(
     assert "0 & -1 & 0 \\\\\n2 & 0 & 0 \\\\\n0 & 1 & 0\n\\end{bmatrix}" in text and "(labelled ann, bob, eve)" in text
     assert "All this is without disturbances." in text and r"u_{k} + d_{k}" in text
     assert "without disturbances" in page and "All of this is for agents without disturbances" in page
+    assert "agents end where they would" in text and "agents end where they would" in page
+    certify(graph, protocol, [1, 2, 3], delta=1, simulation=False, limits=[GainLimits(gain_cap=30)]).save(
+        tmp_path / "l.json"
+    )
+    limited = read_certificate(tmp_path / "l.json")
+    for told in (report_latex(limited), sound(report_html(limited)).text):
+        assert "nothing is proved" in told and "where they would" not in told
 
 
 def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
@@ -634,6 +641,14 @@ def test_what_cannot_be_written_is_refused_before_the_work(output: str, tmp_path
     done = ptcc("report", str(tmp_path / "c.json"), "-o", str(tmp_path / output))
     assert done.code == 2 and len(done.err.splitlines()) == 1 and done.out == ""
     assert [p.name for p in tmp_path.iterdir()] == ["c.json"] and (tmp_path / "c.json").read_bytes() == before
+
+
+def test_words_of_a_screen_are_set_and_escaped():
+    assert (
+        typeset("||E(T_r)|| <= 2e-07") == "\u2016E(T<sub>r</sub>)\u2016 \u2264 2\u00a0\u00d7\u00a010<sup>\u22127</sup>"
+    )
+    shown = "\u03bb<sub>min</sub>(\u039e<sub>F</sub> L<sub>F</sub>\u2032) &lt; \u03c1<sub>2</sub>"
+    assert typeset("lmin(Xi_F L_F') < rho2") == shown
 
 
 def test_a_page_does_not_replace_its_certificate(tmp_path: Path):

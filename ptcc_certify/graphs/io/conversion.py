@@ -10,6 +10,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import WAY, SignedDigraph, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.edge_list import header
 from ptcc_certify.graphs.io.files import name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, read_graph
@@ -67,6 +68,8 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
         if orientation is not None:
             raise ParameterError("a SignedDigraph has its orientation; leave out orientation=")
         return held
+    if isinstance(graph, Family):
+        raise GraphError(f"{graph!r} is several graphs, and one is asked for; certify and decide take families")
     way = orientation or "information"
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"

@@ -23,6 +23,8 @@ _TARGET = ("target", "to", "tonodeid", "dst", "rated")
 _WEIGHT = ("weight", "sign", "rating", "value", "w")
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
+#: The note of a file whose raters were read as those who are heard.
+RATERS = "raters listen? --edges listens"
 
 
 def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
@@ -103,6 +105,9 @@ def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
     try:
         parse_exact("".join(row[2:3]))
     except NumberError:
+        if column(row, ("weight_min", "weight_max"), place) is not None:
+            mend = "ptcc classify and certify take it, and ptcc_certify.read_family"
+            raise FormatError(f"{place}: weights in intervals, which make a family of graphs; {mend}") from None
         raise FormatError(f"{place}: the header names no weight; name one column weight, sign or rating") from None
     return None
 
@@ -114,13 +119,14 @@ def read_edge_list(data: bytes, name: str) -> Rows:
     nodes, weights = Numbers(), Numbers()
     first, second, codes, numbers = [], [], [], []
     ignored: dict[str, None] = {}
-    started, named = 0, False
+    started, named, raters = 0, False, False
     width, (s, t, w) = 3, (0, 1, 2)
     for number, row in records(data, name):
         if not started and len(row) > 1:
             started = number
             if columns := header([field.strip() for field in row], f"{name}, line {number}"):
                 named, width, (s, t, w) = True, len(row), columns
+                raters = row[s].strip().lower() == "rater"
                 ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
                 continue
             if "".join(row[2:3]).strip().lower() in _WEIGHT:
@@ -140,7 +146,7 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         second.append(target)
         codes.append(code)
         numbers.append(number)
-    notes = (BY_HEADER,) * (s > 0)
+    notes = (BY_HEADER,) * (s > 0) + (RATERS,) * raters
     notes += ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
     if not named and len(numbers) > 2:
         _refuse_matrix(data, len(numbers), name)

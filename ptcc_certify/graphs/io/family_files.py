@@ -42,16 +42,18 @@ def read_family(
 
     Parameters
     ----------
-    paths : path, file object, or sequence of these
+    paths : str, Path, file object, or sequence of these
         Several files are modes, of which any may act at any instant; each is named by its file.
     uncertainty : number or str
         Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
     optional : iterable of (source, target)
         Edges that may fail, in every mode that has them.
-    orientation, undirected
+    orientation : {"information", "listens"}, optional
+        As in :func:`read_graph`.
+    undirected : bool
         As in :func:`read_graph`; an undirected edge is one parameter, both directions change together.
-    **options : keywords of :func:`read_graph`
-        Not for files with intervals.
+    **options : Any
+        Others of :func:`read_graph`, not for files with intervals.
 
     Returns
     -------
@@ -99,6 +101,56 @@ def read_family(
     return Family.switching(named)
 
 
+def is_family_file(path: Source) -> bool:
+    """Tell whether a file gives weights in intervals, or edges that may fail: by its header alone.
+
+    Examples
+    --------
+    >>> is_family_file(StringIO("source,target,weight_min,weight_max")), is_family_file(StringIO("a,b,1"))
+    (True, False)
+    """
+    name, ending = name_and_ending(path)
+    if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
+        return False
+    data = read_bytes(path, name)
+    if hasattr(path, "seek"):
+        path.seek(0)
+    rows = ([field.strip() for field in row] for _, row in records(data, name))
+    first = next((row for row in rows if len(row) > 1), [])
+    return edge_columns(first, name) is not None and interval_columns(first, name) != (None, None, None)
+
+
+def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int | None, int | None]:
+    """Return the columns of the least and the largest weight, and that of edges that may fail; None of each it lacks.
+
+    Raises
+    ------
+    FormatError
+        One end of the intervals is named without the other.
+
+    Examples
+    --------
+    >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
+    (2, 3, None)
+    """
+    low, high, may_fail = (column(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
+    if (low is None) != (high is None):
+        raise FormatError(f"{place}: the header names one end of the intervals; name weight_min and weight_max")
+    return low, high, may_fail
+
+
+def truth(answer: object) -> bool | None:
+    """Return what an answer to "optional" means; None if it means nothing.
+
+    Examples
+    --------
+    >>> truth("Yes"), truth(False), truth("perhaps")
+    (True, False, None)
+    """
+    text = str(answer).strip().lower()
+    return text in _YES if text in (*_YES, *_NO) else None
+
+
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
     return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
 
@@ -122,14 +174,15 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
         path.seek(0)
     lines = [(number, [field.strip() for field in row]) for number, row in records(data, name) if any(row)]
     first = next((row for _, row in lines if len(row) > 1), [])
-    columns = [column(first, names, name) for names in (_LEAST, _LARGEST, _OPTIONAL)]
-    if columns == [None, None, None] or (ends := edge_columns(first, name)) is None:
+    if (ends := edge_columns(first, name)) is None:
         return None
-    low, high, may_fail = columns
-    if (low is None) != (high is None):
-        raise FormatError(f"{name}: the header names one end of the intervals; name weight_min and weight_max")
+    low, high, may_fail = columns = interval_columns(first, name)
+    if columns == (None, None, None):
+        return None
     if low is None and ends[2] is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
+    if low is not None and share:
+        raise FormatError(f"{name}: gives intervals itself; leave out the uncertainty, or write those of all files")
     if orientation != "information":
         ends = ends[1], ends[0], ends[2]
     nodes: dict[str, None] = {}
@@ -147,6 +200,8 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
                 f"{where}: second row for edge {_text(edge)} (the first is line {rows[edge[:2]][0]}); {mend}"
             )
         rows[edge[:2]] = number, edge
+    if not nodes:
+        raise FormatError(f"{name}: no edge and no node below the header; give rows")
     return list(nodes), [row for _, row in rows.values()]
 
 
@@ -178,9 +233,8 @@ def _row(
             least, largest = parse_exact(field(low)), parse_exact(field(high))
     except NumberError as error:
         raise FormatError(f"{where}: edge {edge}: {error}; give a number") from None
-    answer = field(may_fail).lower()
-    if answer not in (*_YES, *_NO):
-        raise FormatError(f"{where}: optional is {shorten(answer)}; write yes or no")
+    if (answer := truth(field(may_fail))) is None:
+        raise FormatError(f"{where}: optional is {shorten(field(may_fail))}; write yes or no")
     if least > largest:
         raise FormatError(
             f"{where}: edge {edge}: its least weight {least} is above its largest {largest}; exchange them"
@@ -190,4 +244,4 @@ def _row(
     if source == target:
         raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it")
     found = source, target, least, largest
-    return _may_fail(found) if answer in _YES else found
+    return _may_fail(found) if answer else found

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ptcc_certify.errors import FormatError, PTCCError
+from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import MAX_BYTES, MAX_LINE
 
@@ -49,7 +50,7 @@ def refuse_no_path(path: object) -> None:
 def read_bytes(path: Source, name: str) -> bytes:
     """Read a path, standard input (``-``) or a file object, and undo gzip; text becomes UTF-8."""
     if not isinstance(path, str | os.PathLike) and not callable(getattr(path, "read", None)):
-        raise FormatError(f"{shorten(repr(path))} is no file; ptcc_certify.as_graph takes other data")
+        raise FormatError(f"a {type(path).__name__} is no file; ptcc_certify.as_graph takes other data")
     file = getattr(sys.stdin, "buffer", sys.stdin) if isinstance(path, str) and path == "-" else path
     try:
         if isinstance(file, str | os.PathLike):
@@ -59,7 +60,8 @@ def read_bytes(path: Source, name: str) -> bytes:
             data = file.read(MAX_BYTES + 1)
         content = data.encode("utf-8") if isinstance(data, str) else bytes(data)
     except FileNotFoundError:
-        raise FormatError(f"{name}: no such file; check the path") from None
+        mend = "ptcc_certify.as_graph takes the packaged graph" if name in GRAPHS else "check the path"
+        raise FormatError(f"{name}: no such file; {mend}") from None
     except (AttributeError, OSError, TypeError, ValueError) as error:
         raise FormatError(f"{name}: cannot be read ({_reason(error)}); name a file") from None
     refuse_large(len(content), name)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
+from ptcc_certify.graphs.io.edge_list import RATERS, edge_list, read_edge_list
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
 from ptcc_certify.graphs.io.graph_from_rows import graph_of
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
@@ -92,6 +92,8 @@ def read_graph(
     _refuse_unknown("format", ending if format else "csv", _READERS)
     rows = _READERS.get(ending, read_edge_list)(read_bytes(path, name), name)
     way = "matrix" if ending in MATRICES and orientation != "information" else orientation or "information"
+    if way != "information":
+        rows.notes = tuple(note for note in rows.notes if note != RATERS)
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
 
 

@@ -144,7 +144,7 @@ class _Draft:
         if edges.size:
             named = ", ".join(self.edge(edge) for edge in edges[:5].tolist())
             which = f"{what} of edge {named}{_in_all(edges.size)}"
-            self.refuse(edges[0], f"{which}: an unknown sign is not an edge; remove it or give a weight")
+            self.refuse(edges[0], f"{which}: neither ally nor opponent; remove it or give a weight")
 
     def merge_duplicates(self, duplicates: str, undirected: bool) -> tuple[str, ...]:
         """Refuse or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""

@@ -6,6 +6,7 @@ import csv
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import Any
 
@@ -171,7 +172,9 @@ def read_state(
     except csv.Error as error:
         raise ParameterError(f"{place}: unclear quotes ({error}); close each") from None
     bare, labelled = text_or_path.strip(), any("=" in item for item in items)
-    if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or (len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", bare)):
+    if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or (
+        len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", bare) and bare.partition("=")[0] not in graph.index
+    ):
         mend = "separate the values by commas, without brackets, such as 5,2,-4 or a=5,b=2,c=-4"
         raise ParameterError(f"{place}: no such file; {mend}")
     if labelled:
@@ -245,7 +248,7 @@ def by_label(values: Any, name: str = "x0") -> dict[str, Any] | None:
     elif (beside := labels_beside(values)) is not None:
         labels, entries = beside, list(values.to_numpy())
         names = [str(title) for title in getattr(values, "columns", ())]
-        node, value = column(names, _NODE, name), column(names, _VALUE, name)
+        node, value = _node_and_value(names, name)
         if node is not None and value is not None and len(names) == 2:  # a table as in a file
             labels, entries = [str(label) for label in values.iloc[:, node]], list(values.iloc[:, value])
     else:
@@ -289,7 +292,7 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
     for number, texts in records(read_bytes(path, name), name):
         place, row = f"{name}, line {number}", [text.strip() for text in texts]
         if columns is None:
-            node, value = column(row, _NODE, place), column(row, _VALUE, place)
+            node, value = _node_and_value(row, place)
             if node is not None and value is not None:
                 columns = node, value
                 continue
@@ -300,6 +303,17 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
         if cells:
             pairs.append((cells[0], cells[1], place))
     return _in_node_order(pairs, graph, name, FormatError)
+
+
+def _node_and_value(row: Sequence[str], place: str) -> tuple[int | None, int | None]:
+    """Return the columns of a header; beside that of the nodes a single other one holds the values, however called."""
+    node, value = column(row, _NODE, place), column(row, _VALUE, place)
+    if node is not None and value is None and len(row) == 2:
+        with suppress(NumberError):
+            parse_exact(row[1 - node])
+            return node, None  # a row of a node that is called so
+        return node, 1 - node
+    return node, value
 
 
 def _in_node_order(

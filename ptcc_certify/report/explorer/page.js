@@ -29,6 +29,16 @@ function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// With a true minus sign no line ends within a number such as 1e-10.
+function unbroken(text) {
+  return text.replace(/(?<=\de)-(?=\d)/g, "\u2212");
+}
+
+function showWords(place, text) {
+  const words = text.split(" ").map((word) => Object.assign(document.createElement("span"), { textContent: word }));
+  place.replaceChildren(...words.flatMap((word) => [word, " "]).slice(0, -1));
+}
+
 async function showPanel(name, svg) {
   const image = document.querySelector(`#panel-${name} img`);
   const old = image.src;
@@ -51,9 +61,10 @@ async function show(view) {
   const names = [...document.querySelectorAll("figure")].map((figure) => figure.id.slice("panel-".length));
   await Promise.all(names.map((name) => showPanel(name, view.panels[name])));
   verdict.className = view.grade;
-  setText(verdict.lastElementChild, view.verdict);
-  for (const place of document.querySelectorAll("dd")) setText(place, view.facts[place.dataset.head]);
-  for (const name of ["python", "command"]) setText(document.getElementById(name), view[name]);
+  setText(verdict.lastElementChild, unbroken(view.verdict));
+  for (const place of document.querySelectorAll("dd")) setText(place, unbroken(view.facts[place.dataset.head]));
+  setText(document.getElementById("python"), view.python);
+  showWords(document.getElementById("command"), view.command);
 }
 
 function tellGone() {

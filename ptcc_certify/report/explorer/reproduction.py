@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from textwrap import fill
 
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.protocols import SlidingModeProtocol
@@ -24,7 +25,8 @@ def python_of(question: Question) -> str:
         how = "".join(f", {key}={value!r}" for key, value in source.items() if key != "path")
         lines += ["", f"g = ptcc.read_graph({source['path']!r}{how})"]
     kind = "SlidingModeProtocol" if settings.kind == "sliding-mode" else "NominalProtocol"
-    lines.append(f"p = ptcc.{kind}({', '.join(f'{key}={value!r}' for key, value in _texts(question).items())})")
+    parameters = ", ".join(f"{key}={value!r}" for key, value in _texts(question).items())
+    lines += fill(f"p = ptcc.{kind}({parameters})", 80, subsequent_indent="    ").split("\n")
     arguments = [f"x0={question.x0}"]
     if question.sigma0 is not None:
         arguments += [f"sigma0={question.sigma0}", f"disturbance={_disturbance(question)}"]

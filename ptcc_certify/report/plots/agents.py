@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import isotonic_regression
@@ -25,8 +26,10 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
 }
 #: Agents, and agents of one part of a graph, of which each has a line.
 NAMED_AGENTS, NAMED_OF_PART = 8, 3
-#: Size in points of names, and columns of a name.
-NAME_SIZE, NAME_LENGTH = 7, 16
+#: Size in points of names, and columns of a name; points that the label of a tick takes.
+NAME_SIZE, NAME_LENGTH, TICK_ROOM = 7, 16, 24
+#: What keeps a name legible upon lines.
+HALO = [patheffects.withStroke(linewidth=2, foreground="white")]
 
 
 def camp_groups(structure: Structure) -> np.ndarray:
@@ -111,13 +114,17 @@ def name_agents(
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
             looks: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
             looks |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
+            looks["path_effects"] = HALO
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
             ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
     rooms = [10 + max(text_width(name) for _, _, name, _ in column) for column in texts]
     width = ax.get_window_extent().width / ax.figure.dpi * 72
     width = min([0.8 * width, *(width - room for room in rooms[1:])])  # without names at the end, in any panel
-    left = (last - first) * rooms[0] / max(width - rooms[0], width / 3)
-    ticks = MaxNLocator(tick_count(ax.xaxis, 5), steps=STEPS).tick_values(first, last)
+    own = max(width - rooms[0], width / 3)
+    left = (last - first) * rooms[0] / own
+    ticks = MaxNLocator(min(tick_count(ax.xaxis, 5), max(2, int(own / TICK_ROOM))), steps=STEPS).tick_values(
+        first, last
+    )
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
 

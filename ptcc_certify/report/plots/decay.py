@@ -167,7 +167,7 @@ def _bounds(
     for function in functions if each and len(functions) > 1 else ():
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
-            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
+            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
             looks["label"] = f"bound of Theorem {certificate.theorem.number}"
         else:
             looks = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
-from scipy.spatial import Delaunay, QhullError
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
-from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends
+from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, camp_groups, text_width
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends, triangles_of
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
@@ -147,15 +145,16 @@ def _draw_labels(
             ax.annotate(printable(label), p, color="white", va="center_baseline", **looks)
         return nodes
     taken = nodes + lines
-    halo = [patheffects.withStroke(linewidth=2, foreground="white")]
     for label, p in zip(labels, place, strict=True):
         text = shorten_text(printable(label), BESIDE)
         half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE])
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        spots = [p + way * (far * radius + 1) + half * way for far in (1.0, 2.0, 3.0) for way in ways]
+        spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
         taken.append(box := _least_covered(spots, half, taken))
-        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=halo, **looks)
+        if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
+            ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
+        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **looks)
     return nodes + taken[len(nodes) + len(lines) :]
 
 
@@ -212,21 +211,9 @@ def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Seque
     inside[list(nodes)] = True
     own, foreign = inside[graph.source] & inside[graph.target], place[~inside]
     parts = [place[[v, v]] for v in nodes] + list(place[np.stack([graph.source[own], graph.target[own]], axis=1)])
-    try:
-        corners = Delaunay(place[list(nodes)]).simplices if len(nodes) > 2 else []
-    except QhullError:  # all on a line
-        corners = []
-    for corner in corners:
-        triangle = place[list(nodes)][corner]
-        if not any(_inside(triangle, p) for p in foreign):
-            parts.append(triangle)
+    if (triangles := triangles_of(place[list(nodes)])) is not None:
+        free = np.setdiff1d(np.arange(len(triangles.simplices)), triangles.find_simplex(foreign))
+        parts += list(triangles.points[triangles.simplices[free]])
     for part in parts:
         width = 2 * REACH * radius
         ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **looks))  # type: ignore[arg-type]
-
-
-def _inside(triangle: np.ndarray, point: np.ndarray) -> bool:
-    """Whether a point is in a triangle."""
-    edges, offsets = np.roll(triangle, -1, axis=0) - triangle, point - triangle
-    turns = edges[:, 0] * offsets[:, 1] - edges[:, 1] * offsets[:, 0]
-    return bool((turns > 0).all() or (turns < 0).all())

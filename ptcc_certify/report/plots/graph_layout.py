@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
+from scipy.spatial import Delaunay, QhullError
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 
@@ -52,8 +53,9 @@ def places_and_bends(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return places of the nodes in points, (N, 2), and the bend of every arrow, (M,), the same in every run.
 
-    The first of some layouts in which nodes lie apart and every arrow keeps away from nodes that are not its ends; if
-    there is none, the one with the fewest exceptions. On a circle nodes of the same ``part``, (N,), are neighbours.
+    The first of some layouts in which nodes lie apart, none among those of another ``part``, and every arrow keeps away
+    from nodes that are not its ends; if there is none, the one with the fewest exceptions. On a circle nodes of the
+    same ``part``, (N,), are neighbours.
     """
     best: tuple[int, np.ndarray, np.ndarray] | None = None
     for points in _layouts(arrows, part):
@@ -63,12 +65,23 @@ def places_and_bends(
         bends, exceptions = _bends(arrows, place, 1.35 * radius)
         gaps = np.linalg.norm(place[:, None] - place, axis=-1)
         exceptions += int((gaps[np.triu_indices(len(gaps), 1)] < 2.2 * radius).sum())
+        for number in np.unique(part[part >= 0]):
+            if (triangles := triangles_of(place[part == number])) is not None:
+                exceptions += int((triangles.find_simplex(place[part != number]) >= 0).sum())
         if best is None or exceptions < best[0]:
             best = exceptions, place, bends
         if not exceptions:
             break
     assert best is not None
     return best[1], best[2]
+
+
+def triangles_of(place: np.ndarray) -> Delaunay | None:
+    """Return the triangles between places, or None if there are none: fewer than three places, or all on a line."""
+    try:
+        return Delaunay(place) if len(place) > 2 else None
+    except QhullError:
+        return None
 
 
 def arc(start: np.ndarray, end: np.ndarray, bend: float, along: np.ndarray = ALONG) -> np.ndarray:

@@ -1,0 +1,208 @@
+"""A simulated run of a family against what its certificate proves for every signal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ptcc_certify.bounds.envelope import FLOOR_FACTOR
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.simulation.family_members import Members
+from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.signals import WorstCaseSignal
+
+#: A bound is exceeded by more than rounding from this ratio on.
+VIOLATION = 1 + 1e-6
+
+
+@dataclass(frozen=True)
+class FamilyComparison:
+    """The worst ratios of what a run shows to what is proved; None where nothing is proved, or judged.
+
+    Everything is judged above ``floor``, below which the integrator resolves nothing: the tolerance times 1000 times
+    the largest entry of the initial state, and what that makes of ``V`` and of inputs.
+
+    Attributes
+    ----------
+    deviation_ratio : float or None
+        ``max |x_k(t) - x_k(T)|`` over :meth:`FamilyCertificate.deviation_bound
+        <ptcc_certify.certificate.family_certificate.FamilyCertificate.deviation_bound>`; None if the run has no state
+        at ``T`` that has settled.
+    final_ratio : float or None
+        The distance of ``x_k(T)`` from the middle of its interval, over half the length.
+    input_ratio : float or None
+        ``max |u_k(t)|`` over the proved peak.
+    lyapunov_ratio : float or None
+        ``max sqrt(V(s) / (e^(-r s) V(0)))`` for ``s > 0``, over all Lyapunov functions.
+    mode_ratio : float or None
+        The same with ``sum_i r_i s_i`` instead of ``r s``, ``s_i`` the clock spent in mode ``i``.
+    floor : float
+    judged : int
+        How many of the deviations rose above the floor.
+    """
+
+    deviation_ratio: float | None
+    final_ratio: float | None
+    input_ratio: float | None
+    lyapunov_ratio: float | None
+    mode_ratio: float | None
+    floor: float
+    judged: int
+
+    @property
+    def worst_ratio(self) -> float:
+        """The largest of the ratios; 0 if there is none."""
+        ratios = (self.deviation_ratio, self.final_ratio, self.input_ratio, self.lyapunov_ratio, self.mode_ratio)
+        return max((ratio for ratio in ratios if ratio is not None), default=0.0)
+
+    @property
+    def violated(self) -> bool:
+        """Whether a bound was exceeded by more than rounding."""
+        return self.worst_ratio > VIOLATION
+
+
+def compare(certificate: FamilyCertificate, run: FamilyTrajectory) -> FamilyComparison:
+    """Compare a run with the bounds for every signal.
+
+    Parameters
+    ----------
+    certificate : FamilyCertificate
+        With an initial state.
+    run : FamilyTrajectory
+        Of the same family, protocol and initial state.
+
+    Returns
+    -------
+    FamilyComparison
+
+    Raises
+    ------
+    ParameterError
+        The run is of something else.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.certificate.family_certificate import certify_family
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
+    >>> cert = certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2])
+    >>> seen = [compare(cert, simulate_family(unsure, cert.protocol, [1, 2], s)) for s in worst_case_signals(cert)]
+    >>> any(one.violated for one in seen), 0.9 < max(one.lyapunov_ratio for one in seen) < 1.000001
+    (False, True)
+    """
+    _require_same(certificate, run)
+    unit = float(np.abs(run.states[:, 0]).max()) or 1.0
+    floor = FLOOR_FACTOR * run.rtol * unit
+    before = np.isfinite(run.clock)
+    deviation, judged = None, 0
+    if run.deadline_index is not None and run.deadline_resolved:
+        moved = np.abs(run.states[:, before] - run.final_state[:, None]) - floor
+        judged = int((moved > 0).sum())
+        deviation = _worst(moved, certificate.deviation_bound(run.remaining[before]))
+    peaks = certificate.input_peaks
+    input_ratio = None
+    if peaks is not None:
+        gain = run.protocol.gain.value_at_remaining(run.remaining)
+        error = np.multiply.outer(2 * Members(run.family).in_weight * floor, gain)
+        input_ratio = _worst(np.abs(run.input) - error, np.array([[float(peak)] for peak in peaks]))
+    ratios = [_lyapunov_ratios(*one, run, floor) for one in functions_of(certificate)]
+    return FamilyComparison(
+        deviation,
+        _final_ratio(certificate, run, floor),
+        input_ratio,
+        max((rate for rate, _ in ratios), default=None),
+        max((mode for _, mode in ratios), default=None),
+        floor,
+        judged,
+    )
+
+
+def worst_case_signals(certificate: FamilyCertificate, step: float | None = None) -> list[WorstCaseSignal]:
+    """Return the worst-case searches against every Lyapunov function of a certificate, and against the largest state.
+
+    Parameters
+    ----------
+    certificate : FamilyCertificate
+    step : float, optional
+        On the clock, as for :class:`~ptcc_certify.simulation.signals.WorstCaseSignal`.
+    """
+    n = certificate.family.n_nodes
+    against = [WorstCaseSignal.against(V, quotient, nodes, n, step) for nodes, quotient, V in functions_of(certificate)]
+    return [*against, WorstCaseSignal(step=step)]
+
+
+def functions_of(certificate: FamilyCertificate) -> Iterator[tuple[np.ndarray, Quotient, FamilyFunction]]:
+    """Yield every quadratic Lyapunov function with the nodes of its component and the coordinates it is in."""
+    for part in certificate.parts:
+        forms = [V for V in part.functions if isinstance(V, FamilyFunction)]
+        quotient = Quotient.of(part.component) if forms else None
+        for V in forms:
+            assert quotient is not None
+            yield part.component.nodes, quotient, V
+
+
+def _require_same(certificate: FamilyCertificate, run: FamilyTrajectory) -> None:
+    if not isinstance(run, FamilyTrajectory):
+        raise ParameterError(f"{shorten(repr(run))} is no run of a family; give what simulate_family returned")
+    if certificate.initial_state is None:
+        raise ParameterError("the certificate has no initial state; certify the family with x0")
+    if run.family is not certificate.family and run.family != certificate.family:
+        raise ParameterError("the run is of another family than the certificate")
+    for name, same in (
+        ("protocol", run.protocol.gain == certificate.protocol.gain),
+        ("initial state", run.t[0] == 0 and _close(run.states[:, 0], certificate.initial_state)),
+    ):
+        if not same:
+            raise ParameterError(f"the run is of another {name} than the certificate")
+
+
+def _close(x: np.ndarray, exact: tuple[Fraction, ...]) -> bool:
+    return bool(np.allclose(x, [float(value) for value in exact], rtol=1e-14, atol=0))
+
+
+def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
+    """Return the largest ratio of values that are positive; None if nothing bounds them."""
+    if not np.isfinite(bounds).any():
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.where(values > 0, values / bounds, 0.0).max(initial=0.0))
+
+
+def _final_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> float | None:
+    ends = certificate.final_states
+    if run.deadline_index is None or not run.deadline_resolved or ends is None:
+        return None
+    known = [k for k, interval in enumerate(ends) if interval is not None]
+    if not known:
+        return None
+    low, high = (np.array([float(ends[k][side]) for k in known]) for side in (0, 1))  # type: ignore[index]
+    away = np.abs(run.final_state[known] - (low + high) / 2) - floor
+    return _worst(away, (high - low) / 2)
+
+
+def _lyapunov_ratios(
+    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: FamilyTrajectory, floor: float
+) -> tuple[float, float]:
+    """Return the worst ratios of ``sqrt(V)`` to its bounds by one rate, and by those of the modes."""
+    signal = WorstCaseSignal.against(V, quotient, nodes, len(run.labels))
+    assert signal.form is not None
+    x = run.states[:, np.isfinite(run.clock)]
+    root = np.sqrt(np.maximum((x * (signal.form @ x)).sum(axis=0), 0.0))
+    # an error of the floor in every state
+    coordinates = [1 + sum((abs(b) for b in quotient.basis[v]), Fraction(0)) for v in quotient.nodes]
+    size = float(V.highest) ** 0.5 * float(np.linalg.norm([float(c) for c in coordinates])) * floor
+    clock, spent = run.clock[: root.size], run.clock_of_modes()[:, : root.size]
+    rates = np.array([float(rate) for rate in V.rates])
+    excess, result = np.maximum(root - size, 0.0)[1:], []
+    for decay in (float(V.rate) * clock, rates @ spent):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            bound = root[0] * np.exp(-decay / 2)
+            result.append(float(np.where(excess > 0, excess / bound[1:], 0.0).max(initial=0.0)))
+    return result[0], result[1]

@@ -1,0 +1,142 @@
+"""The verdict of a family's certificate in one line: what became of what was asked, and the exit code that agrees.
+
+*Useful* is a bound that leaves at most 1 % at 0.99 T: of the largest ``|x_k(0)|``, for every agent; without an initial
+state, of the norm that decays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
+from ptcc_certify.graphs.family import Mode
+from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.family_claims import component_holds, component_refutation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.theorems.family_behaviour import FamilyComponent
+
+#: What to try where edges do not tell whether rest states agree.
+NEXT_STEP = (
+    "whether rest states agree is not decided: it takes exact rows of more than 120 agents; round the weights to few "
+    "digits, or take out what is uncertain between agents that hear several leader groups"
+)
+
+
+def assess_family(certificate: FamilyCertificate) -> Assessment:
+    """Return the graded verdict of a family's certificate, and of what was expected of it.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
+    >>> asked = Expectations("bipartite consensus", min_rate=100)
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), expectations=asked)
+    >>> cert.assessment.asked, int(cert.assessment.exit_code)
+    ('refuted', 3)
+    """
+    asked, components = certificate.expectations, [part.component for part in certificate.parts]
+    answers = [] if asked.behaviour is None else [judge_family_behaviour(components, asked.behaviour)]
+    answers += [] if asked.min_rate is None else [_judge_rate(certificate, asked.min_rate)]
+    answers += [] if asked.max_input is None else [_judge_input(certificate, asked.max_input)]
+    if certificate.verdict != CERTIFIED:
+        report = certificate.checked
+        why = (
+            NEXT_STEP if report is None else f"the independent check does not accept {report.rejected}: {report.reason}"
+        )
+        return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
+    useful, caveat, advice = _usefulness(certificate), "", ""
+    if certificate.common and not certificate.bounded:
+        grows = certificate.unbounded
+        caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
+        rate, kappa = certificate.rate, certificate.protocol.gain.pole / certificate.protocol.parameters["rho2"]
+        if rate is not None:
+            advice = f"--rho2 {up(2 / (rate * kappa), 3)} bounds it"
+    remark = "" if useful is not False else "little is proved by 0.99 T"
+    return Assessment(CERTIFIED, False, useful, remark, advice, tuple(answers), caveat)
+
+
+def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str) -> Answer:
+    """Tell whether every component shows a behaviour under every signal, with a counterexample where one does not.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> print(judge_family_behaviour(decide(Family.from_intervals([("a", "b", 0, 1)])), "bipartite consensus"))
+    bipartite consensus (held constant, the leader groups of a and b do not hear each other, and do not meet)
+    """
+    answers = [component_holds(component, expected) for component in components]
+    if False in answers:
+        component = components[answers.index(False)]
+        why = component_refutation(component, expected)
+        other = f"it is {component.behaviour}"
+        return Answer(REFUTED, expected, other if why is None else counterexample_text(component, why))
+    return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
+
+
+def _judge_rate(certificate: FamilyCertificate, least: Fraction) -> Answer:
+    """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
+        return Answer(MET, what)
+    if not certificate.common:
+        return Answer(REFUTED, what, "no rate holds for every signal: it depends on the signal")
+    if bound is not None and least > bound:
+        return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
+    reason = "none is proved" if rate is None else f"proved: {down(rate)}"
+    return Answer(OPEN, what, reason if bound is None else f"{reason}, at most {up(bound, 8)} can be")
+
+
+def _judge_input(certificate: FamilyCertificate, most: Fraction) -> Answer:
+    """Tell whether every input is proved to stay within so much for every signal."""
+    what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
+    if peaks is not None and max(peaks) <= most:
+        return Answer(MET, what)
+    if certificate.initial_state is not None and (first := first_input(certificate)) > most:
+        return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
+
+
+def first_input(certificate: FamilyCertificate) -> Fraction:
+    """Return the largest ``|u_k(0)|`` over all signals and agents: that of some member."""
+    assert certificate.initial_state is not None
+    rows = (row for mode in certificate.family.modes for row in _first_rows(mode, certificate.initial_state).values())
+    return certificate.protocol.gain.first * max((max(abs(low), high) for low, high in rows), default=Fraction(0))
+
+
+def _first_rows(mode: Mode, x: Sequence[Fraction]) -> Mapping[int, tuple[Fraction, Fraction]]:
+    """Return the least and the largest ``(L x)_k`` over the members of a mode; of two signs on a pair one is on."""
+    pairs: dict[tuple[int, int], tuple[Fraction, Fraction]] = {}
+    for edge, (source, target) in enumerate(zip(mode.source.tolist(), mode.target.tolist(), strict=True)):
+        step = x[target] - int(mode.sign[edge]) * x[source]
+        low, high = sorted((mode.lower.fraction(edge) * step, mode.upper.fraction(edge) * step))
+        if (source, target) in pairs:  # both may fail: 0 lies in each
+            other = pairs[source, target]
+            low, high = min(low, other[0]), max(high, other[1])
+        pairs[source, target] = low, high
+    sums: dict[int, tuple[Fraction, Fraction]] = {}
+    for (_, target), (low, high) in pairs.items():
+        before = sums.get(target, (Fraction(0), Fraction(0)))
+        sums[target] = before[0] + low, before[1] + high
+    return sums
+
+
+def _usefulness(certificate: FamilyCertificate) -> bool | None:
+    """Tell whether the bound leaves at most 1 % at 0.99 T; None where no state is approached by every signal."""
+    if not certificate.common:
+        return None
+    if certificate.initial_state is not None:
+        size = float(max(map(abs, certificate.initial_state)))
+        return size == 0 or bool(certificate.deviation_bound([float(LAST)]).max() <= size * float(LAST))
+    clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
+    for part in certificate.parts:
+        left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]
+        if part.component.nodes.size > 1 and min(left, default=math.inf) > float(LAST):
+            return False
+    return True

@@ -1,0 +1,256 @@
+"""What ``ptcc classify``, ``certify`` and ``check`` do with a family of graphs: several files, uncertain weights."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.scenario import is_scenario, read_scenario
+from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
+from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.graphs.rationals import shorten
+
+if TYPE_CHECKING:
+    from ptcc_certify.checker import CheckReport
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
+    from ptcc_certify.theorems.family_behaviour import FamilyComponent
+
+#: Options of certify that families do not take.
+_NOT_OF_FAMILIES = (
+    *("sigma0", "disturbance", "delta", "noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation"),
+    *("T_r", "T_s", "mu1", "mu2", "mu3"),
+)
+
+
+def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """Return the edges that ``--optional`` names."""
+    pairs = []
+    for text in () if context.resilient_parsing else texts:
+        ends = [end.strip() for row in csv.reader([text]) for end in row]
+        if len(ends) != 2 or not all(ends):
+            raise ParameterError(f"--optional: {text} is no edge; write SOURCE,TARGET, such as a,b")
+        pairs.append((ends[0], ends[1]))
+    return tuple(pairs)
+
+
+def family_options(command: Any) -> Any:
+    """Add the options that make a family of graphs, and tell for which signals it is asked."""
+    signal = click.option(
+        "--signal",
+        type=click.Choice(["any", "constant"]),
+        default="any",
+        help="Families: mode and weights change at any instants, or are fixed and unknown.",
+    )
+    return mode_options(signal(command))
+
+
+def mode_options(command: Any) -> Any:
+    """Add the options that make a family of graphs."""
+    for option in (
+        click.option(
+            "--optional",
+            multiple=True,
+            metavar="SOURCE,TARGET",
+            callback=_pair,
+            help="Family: this edge may fail; repeat it for more.",
+        ),
+        click.option(
+            "--uncertainty", metavar="SHARE", help="Family: every weight is known up to this share of it, such as 10%."
+        ),
+        click.option(
+            "--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
+    """Return what files and options make: a family, or the graph where there is one, with known weights."""
+    from ptcc_certify.graphs.io import read_family
+    from ptcc_certify.graphs.io.family_files import is_family_file
+
+    if len(graphs) > 1 and not options["switching"]:
+        named = shorten(", ".join(graphs), 200)
+        mend = "add --switching if any of them may act at any time; ptcc batch takes many, each by itself"
+        raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
+    if graphs.count("-") > 1:
+        raise ParameterError("- stands for standard input, which is one graph; name files for the others")
+    files = [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
+    uncertain = options["uncertainty"] is not None or options["optional"]
+    if len(files) == 1 and not uncertain and not is_family_file(files[0]):
+        return shared.read(files[0], options)
+    how = {name: options[name] for name in shared.READING if name != "edges"}
+    more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
+    family = read_family(files, orientation=options["edges"], **more, **how)
+    if family.graph is None:
+        return family
+    return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
+
+
+def _standard_input() -> BytesIO:
+    """Return standard input as a file that is read more than once."""
+    from ptcc_certify.graphs.io.files import read_bytes
+
+    file = BytesIO(read_bytes(shared.graph_file("-"), "standard input"))
+    file.name = "standard input"  # type: ignore[attr-defined]
+    return file
+
+
+def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
+    """Return what a family is called, and how its rows were read."""
+    from ptcc_certify.graphs.io.graph_files import MATRICES
+    from ptcc_certify.report.structure_text import SHORT_ORIENTATION
+
+    way = options["edges"] or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
+    tied = "; undirected, both directions change together" * any(mode.tied for mode in family.modes)
+    return ", ".join(graphs), SHORT_ORIENTATION[way] + tied
+
+
+def classify_family(
+    graphs: tuple[str, ...], family: Family, expect: str | None, as_json: bool, screen: Screen, options: shared.Options
+) -> int:
+    """Tell what every signal does, decided on edges."""
+    from ptcc_certify.theorems.family_behaviour import decide
+
+    components = decide(family, options["signal"])
+    _show_decision(graphs, family, components, as_json, screen, options)
+    return _expected(components, expect)
+
+
+def _show_decision(
+    graphs: tuple[str, ...],
+    family: Family,
+    components: Sequence[FamilyComponent],
+    as_json: bool,
+    screen: Screen,
+    options: shared.Options,
+) -> None:
+    from ptcc_certify.certificate.decision_document import decision_document
+    from ptcc_certify.report.family_screen import decision_lines, decision_summary
+
+    if as_json:
+        print_json(decision_document(family, components))
+        return
+    name, read = _names(graphs, family, options)
+    case = components, family, name, read
+    screen.show(lambda: decision_summary(*case), lambda: decision_lines(*case))
+
+
+def _expected(components: Sequence[FamilyComponent], expect: str | None) -> int:
+    """Tell on standard error what became of an expectation, and what is left undecided; return the exit code."""
+    from ptcc_certify.certificate.family_verdict import NEXT_STEP, judge_family_behaviour
+    from ptcc_certify.certificate.verdict import MET, REFUTED
+
+    if expect is not None:
+        answer = judge_family_behaviour(components, expect)
+        if answer.status == REFUTED:
+            click.echo(one_line(f"refuted: {answer}"), err=True)
+            return ExitCode.REFUTED
+        if answer.status == MET:
+            return ExitCode.OK
+    if any(component.behaviour is None for component in components):
+        click.echo(f"undecided: {NEXT_STEP}", err=True)
+        return ExitCode.UNDECIDED
+    return ExitCode.OK
+
+
+def certify_family(
+    graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
+) -> int:
+    """Certify what the protocol does on a family, whatever the signal."""
+    from ptcc_certify.certificate.family_certificate import STEPS
+    from ptcc_certify.certificate.family_certificate import certify_family as run
+    from ptcc_certify.certificate.request import Expectations
+    from ptcc_certify.certificate.verdict import CERTIFIED
+    from ptcc_certify.report.family_screen import family_lines, family_summary
+    from ptcc_certify.theorems.family_behaviour import decide
+
+    refuse_options(options)
+    most = options["max_input"]
+    if most is not None and most <= 0:
+        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    protocol = shared.protocol_of(options)
+    LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
+    if options["signal"] == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
+        _show_decision(graphs, family, left, as_json, screen, options)
+        code = _expected(left, options["expect"])
+        if output:
+            click.echo("note: certificates are for --signal any; nothing was written", err=True)
+        click.echo(
+            "undecided: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True
+        )
+        return code or ExitCode.UNDECIDED
+    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    name, read = _names(graphs, family, options)
+    drawn = {"x(0)": f"random, seed {options['seed']}"} if options["x0"] == "random" else {}
+    asked = Expectations(options["expect"], options["min_rate"], most)
+    with progress(STEPS, screen.quiet) as begin:
+        origins = {"graph": Path(name).name, "read": read, **drawn}
+        limit = {"time_limit": options["time_limit"], "expectations": asked}
+        certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
+        assessment = certificate.assessment
+    LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
+    saved = output is not None and assessment.verdict == CERTIFIED
+    if output and saved:
+        certificate.save(output)
+    if as_json:
+        print_json(certificate.to_dict() | {"verdict": assessment.verdict})
+        if assessment.exit_code and not screen.quiet:
+            click.echo(f"verdict    {one_line(assessment.text)}", err=True)
+        return assessment.exit_code
+    screen.show(lambda: family_summary(certificate, name, origins), lambda: family_lines(certificate, name, origins))
+    if output:
+        screen.note(f"written    {output}" if saved else "note       nothing is certified, and nothing was written")
+    return assessment.exit_code
+
+
+def refuse_options(options: shared.Options) -> None:
+    """Refuse what is asked of one graph alone, on the command line or in a scenario."""
+    source = click.get_current_context().get_parameter_source
+    if options["kind"] != "nominal":
+        raise ParameterError("--protocol: families are for the nominal protocol alone; leave it out")
+    for name in _NOT_OF_FAMILIES:
+        if source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP) and options[name] not in (
+            None,
+            False,
+        ):
+            raise ParameterError(f"{shared.flag_of(name)}: is for one graph, not for families yet; leave it out")
+
+
+def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
+    """Return what constant signals do where it does not follow from what all signals do; nothing where it does."""
+    follows = all(one.behaviour == other.behaviour for one, other in zip(constant, every, strict=True))
+    return () if follows else constant
+
+
+def same_family(
+    report: CheckReport, document: dict[str, Any], graphs: tuple[str, ...], options: shared.Options
+) -> tuple[CheckReport, dict[str, str]]:
+    """Compare the family of an accepted certificate with that of files; return the report, and how these were read."""
+    from dataclasses import replace
+
+    from ptcc_certify.certificate.format_family import certificate_family
+    from ptcc_certify.graphs.family import Family
+    from ptcc_certify.graphs.family_difference import family_difference
+
+    if len(graphs) == 1 and is_scenario(graphs[0]):
+        scenario = read_scenario(graphs[0])
+        given = {name: value for name, value in scenario.options.items() if name in options}
+        graphs, options = scenario.graphs, {**options, **given, "switching": len(scenario.graphs) > 1}
+    read_back = read_graph_or_family(graphs, options)
+    family = read_back if isinstance(read_back, Family) else Family.from_graph(read_back)
+    name, read = _names(graphs, family, options)
+    how = {"graph_read": f"{name}, {read}"}
+    if family.sha256 == report.sha256:
+        return report, how
+    reason = f"another family than {name}: {family_difference(certificate_family(document['graph']), family)}"
+    return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how

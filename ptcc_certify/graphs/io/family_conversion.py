@@ -1,0 +1,140 @@
+"""The gate for families: whatever a user holds becomes a family of signed digraphs, or is refused with the mend."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from ptcc_certify.errors import GraphError, NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family, read_share
+from ptcc_certify.graphs.io.conversion import as_graph
+from ptcc_certify.graphs.io.edge_list import edge_columns
+from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, truth
+from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.rationals import as_fraction, shorten
+
+
+def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any = 0) -> Family:
+    """Return the family of signed digraphs that a user holds, in whatever form.
+
+    Parameters
+    ----------
+    family : family-like
+        - a :class:`~ptcc_certify.graphs.family.Family`;
+        - a mapping of names to graphs, or a list of graphs or of their paths: modes, of which any may act at any
+          instant;
+        - a DataFrame of edges with columns ``source``, ``target``, ``weight_min``, ``weight_max``, or a list of
+          ``(source, target, least, largest)``: weights in intervals; a column ``optional`` (true or false) marks edges
+          that may fail;
+        - whatever :func:`~ptcc_certify.graphs.io.as_graph` takes: one graph; a path may also be of a file with
+          intervals.
+    orientation : {"information", "listens"}, optional
+        As in :func:`~ptcc_certify.graphs.io.as_graph`.
+    uncertainty : number or str
+        Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
+
+    Returns
+    -------
+    Family
+
+    Raises
+    ------
+    GraphError
+        It is no graph and no family, or its modes have different nodes; the message names the mend.
+    ParameterError
+        A family with an uncertainty besides: it has its own weights.
+
+    References
+    ----------
+    docs/theory/families.md, "What may change".
+
+    Examples
+    --------
+    >>> as_family({"day": [("a", "b", 1)], "night": [("b", "a", 1)]})
+    Family(2 nodes, 2 modes)
+    >>> as_family("fig1a", uncertainty="10%")
+    Family(6 nodes, 12 of 12 weights uncertain)
+    """
+    if isinstance(family, Family):
+        if uncertainty or orientation is not None:
+            raise ParameterError("a Family has its weights and its orientation; leave out uncertainty and orientation")
+        return family
+    if isinstance(family, Mapping) or _is_list_of_graphs(family):
+        if isinstance(family, Mapping):
+            named = {str(name): one for name, one in family.items()}
+        elif all(isinstance(one, str | os.PathLike) for one in family):
+            paths = [file_or_packaged(str(one)) for one in family]
+            return read_family(paths, uncertainty=uncertainty, orientation=orientation)
+        else:
+            named = {str(number): one for number, one in enumerate(family, 1)}
+        alone = {name: _mode_of(one, orientation, uncertainty) for name, one in named.items()}
+        return Family.switching(alone)
+    if isinstance(family, str | os.PathLike) and (family in GRAPHS or os.path.exists(family)):  # noqa: PTH110
+        return read_family(file_or_packaged(os.fspath(family)), uncertainty=uncertainty, orientation=orientation)
+    if (edges := _interval_edges(family, uncertainty)) is not None:
+        return Family.from_intervals(edges, orientation=orientation or "information")
+    return Family.from_graph(as_graph(family, orientation), uncertainty=uncertainty)
+
+
+def _mode_of(graph: Any, orientation: str | None, uncertainty: Any) -> Family:
+    """Return a mode of several, which may be a family itself."""
+    return (
+        graph
+        if isinstance(graph, Family) and not uncertainty
+        else as_family(graph, orientation, uncertainty=uncertainty)
+    )
+
+
+def is_family(held: Any) -> bool:
+    """Tell whether a user holds a family rather than one graph.
+
+    Examples
+    --------
+    >>> is_family(["fig1a", "fig1b"]), is_family([("a", "b", 1)]), is_family(Family.from_graph(as_graph("fig1a")))
+    (True, False, False)
+    """
+    if isinstance(held, Family):
+        return held.graph is None
+    if isinstance(held, str | os.PathLike):
+        return os.path.isfile(held) and is_family_file(held)  # noqa: PTH113 - Path.is_file may raise
+    return isinstance(held, Mapping) or _is_list_of_graphs(held) or _interval_edges(held) is not None
+
+
+def _is_list_of_graphs(held: Any) -> bool:
+    if not isinstance(held, list | tuple) or not held:
+        return False
+    return all(
+        isinstance(one, SignedDigraph | Family | str | os.PathLike) or hasattr(one, "is_multigraph") for one in held
+    )
+
+
+def _interval_edges(held: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
+    """Return the edges of a DataFrame with intervals, or of a list of edges with four entries; None of others."""
+    if isinstance(held, list | tuple):
+        return [*held] if held and all(isinstance(row, tuple) and len(row) == 4 for row in held) else None
+    if not hasattr(held, "columns") or not hasattr(held, "to_numpy"):
+        return None
+    names = [str(name) for name in held.columns]
+    low, high, may_fail = interval_columns(names, "the DataFrame")
+    ends = edge_columns(names, "the DataFrame")
+    if ends is None or (low, high, may_fail) == (None, None, None):
+        return None
+    weights = (low, high) if low is not None else (ends[2], ends[2])
+    if None in weights:
+        raise GraphError("the DataFrame names no weight; name a column weight, or weight_min and weight_max")
+    at = [list(held[held.columns[k]]) for k in (*ends[:2], *weights) if k is not None]
+    off = [False] * len(at[0]) if may_fail is None else list(held[held.columns[may_fail]])
+    share, rows = (read_share(uncertainty) if low is None else 0), []
+    for number, (source, target, least, largest, fails) in enumerate(zip(*at, off, strict=True), 1):
+        if (answer := truth(fails)) is None:
+            raise GraphError(f"row {number} of the DataFrame: optional is {shorten(str(fails))}; write True or False")
+        try:
+            one, other = (as_fraction(end, "the weight") for end in (least, largest))
+        except NumberError as error:
+            raise GraphError(f"row {number} of the DataFrame: {error}") from None
+        if share:
+            one, other = sorted((one * (1 - share), one * (1 + share)))
+        rows.append((source, target, min(one, 0), max(other, 0)) if answer else (source, target, one, other))
+    return rows

@@ -1,0 +1,418 @@
+"""One screen of text about a family of graphs: its decision, its certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.report.structure_text import Lines, structure_text
+from ptcc_certify.report.text_layout import (
+    TEXT,
+    counted,
+    format_lines,
+    printable,
+    short_number,
+    shorten_label,
+    shorten_list,
+    shorten_text,
+    value_list,
+    wrap_lines,
+    wrap_text,
+)
+from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_claims import camps, special_behaviours
+from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.family_rate import explicit_rate
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+
+#: Components of which a screen tells, and lines of a text on the short one.
+_COMPONENTS, _LINES = 4, 2
+#: 1 - t/T and its name, where the long screen tells the error.
+_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
+_NOTHING: Mapping[str, str] = MappingProxyType({})
+#: What is told of signals.
+WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
+
+
+def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[str, str] = _NOTHING) -> list[str]:
+    r"""Return the short screen of ``ptcc certify`` for a family: 9 lines of 80 columns, more rather than cut an answer.
+
+    Parameters
+    ----------
+    certificate : FamilyCertificate
+    name : str
+        What the family is called.
+    origins : mapping of str to str, optional
+        Where ``x(0)`` comes from, and how rows were ``read``.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", "0.9", "1.1")], undirected=True)
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1))
+    >>> print("\n".join(family_summary(cert, "pair")))
+    family     pair: 2 nodes, 2 edges, 2 uncertain
+    protocol   nominal: T=1, rho1=1, rho2=2, kappa=1; no x(0)
+    claim      consensus at T = 1 for every signal
+    rate       3.59999, upper bound 3.6: both proved, ratio 0.999999
+    input      bounded for every signal and every initial state
+    verdict    certified; checked without a solver
+    """
+    components, T = [part.component for part in certificate.parts], certificate.protocol.T
+    entries = [
+        *_family_entries(certificate.family, name, origins),
+        ("protocol", _protocol_text(certificate, origins)),
+        *_claim_entries(components, f" at T = {near(T)}"),
+        *_rate_entries(certificate),
+        *_final_entries(certificate),
+        *_error_entries(certificate),
+        *_input_entries(certificate),
+        ("verdict", _verdict(certificate)),
+    ]
+    return wrap_lines(format_lines(entries))
+
+
+def decision_summary(components: Sequence[FamilyComponent], family: Family, name: str, read: str = "") -> list[str]:
+    r"""Return the short screen of ``ptcc classify`` for a family.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", -1, 0), ("b", "a", 1, 2)])
+    >>> print("\n".join(decision_summary(ptcc.decide(unsure), unsure, "pair")))
+    family     pair: 2 nodes, 2 edges, 2 uncertain, 1 of them optional
+    claim      depends on the signal
+    why        the state a=1, b=1 rests at the least weights and moves with a -> b
+               on
+    constant   where weights never change: it depends on the weights
+    groups     no limit is claimed of a, b
+    """
+    return wrap_lines(format_lines([*_family_entries(family, name, {"read": read}), *_claim_entries(components)]))
+
+
+def decision_lines(components: Sequence[FamilyComponent], family: Family, name: str, read: str = "") -> list[str]:
+    """Return the lines of ``ptcc classify -v`` for a family, as long as they are."""
+    entries = [*_family_entries(family, name, {"read": read}), ("nodes", shorten_list(family.labels))]
+    entries += _mode_entries(family, components)
+    return format_lines([*entries, *_claim_entries(components, every=True)])
+
+
+def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str, str] = _NOTHING) -> list[str]:
+    """Return the lines of ``ptcc certify -v`` for a family, as long as they are."""
+    components, family = [part.component for part in certificate.parts], certificate.family
+    entries = [*_family_entries(family, name, origins), ("nodes", shorten_list(family.labels))]
+    entries += _mode_entries(family, components)
+    entries += [("protocol", _gains(certificate))]
+    if certificate.initial_state is not None:
+        drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
+        entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + drawn))
+    entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True)
+    entries += [*_rate_entries(certificate), *_function_entries(certificate), *_final_entries(certificate, long=True)]
+    entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
+    entries += [("note", note) for note in certificate.notes]
+    entries.append(("proof", _proof_text(certificate)))
+    return format_lines([*entries, ("verdict", certificate.assessment.text)])
+
+
+# ---------------------------------------------------------------------- the family
+
+
+def family_text(family: Family, name: str) -> str:
+    """Tell the size of a family, its modes by name, and what is uncertain.
+
+    Examples
+    --------
+    >>> family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair")
+    'pair: 2 nodes, 1 edge, 1 optional'
+    """
+    several = len(family.modes) > 1
+    edges = sum(mode.n_edges for mode in family.modes)
+    uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
+    optional = sum(int(mode.optional.sum()) for mode in family.modes)
+    rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
+    rest += f", {uncertain} uncertain" * (uncertain > optional)
+    rest += f", {optional}{' of them' * (uncertain > optional)} optional" * bool(optional)
+    if not several:
+        return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
+    names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
+    rest = f"{counted(len(names), 'mode')} on {rest}"
+    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 20))}: {rest}"
+
+
+def _family_entries(family: Family, name: str, origins: Mapping[str, str]) -> list[tuple[str, str]]:
+    notes = "".join(f"; {note}" for note in family.notes)
+    read = origins.get("read", "")
+    return [("family", family_text(family, name))] + [("read", (read + notes).removeprefix("; "))] * bool(read or notes)
+
+
+def _mode_entries(family: Family, components: Sequence[FamilyComponent]) -> Lines:
+    """Tell of every mode its edges, what is uncertain, and the structure of its mandatory graph."""
+    from ptcc_certify.graphs.structure import analyse
+
+    for number, mode in enumerate(family.modes):
+        structure = components[0].structures[number] if len(components) == 1 else analyse(mode.mandatory)
+        size = counted(mode.n_edges, "edge") + f" ({int((mode.sign < 0).sum())} negative)" + "; undirected" * mode.tied
+        yield "mode", f"{mode_name(family, number)}: {size}; mandatory edges: {structure_text(structure)}"
+        if edges := _uncertain_edges(mode):
+            yield "", f"uncertain: {edges}"
+
+
+def _uncertain_edges(mode: Mode) -> str:
+    listed = []
+    for edge in np.flatnonzero(~mode.known)[:12].tolist():
+        ends = [shorten_label(mode.labels[int(side[edge])]) for side in (mode.source, mode.target)]
+        least, largest = (short_number(end) for end in mode.edge_interval(edge))
+        listed.append(f"{ends[0]} -> {ends[1]} in [{least}, {largest}]")
+    return shorten_list(listed, 4 * TEXT, int((~mode.known).sum()))
+
+
+def _gains(certificate: FamilyCertificate) -> str:
+    p = certificate.protocol
+    return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
+
+
+def _protocol_text(certificate: FamilyCertificate, origins: Mapping[str, str]) -> str:
+    begin = "no x(0)" if certificate.initial_state is None else f"x(0) {origins.get('x(0)', 'given')}"
+    return f"{_gains(certificate)}; {begin}"
+
+
+# ---------------------------------------------------------------------- what it does
+
+
+def sharpest(component: FamilyComponent) -> str:
+    """Name the sharpest behaviour of a component.
+
+    Examples
+    --------
+    >>> sharpest(ptcc.decide([("a", "b", 1, 2)])[0])
+    'consensus'
+    """
+    return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
+
+
+def _claim_entries(components: Sequence[FamilyComponent], when: str = "", every: bool = False) -> Lines:
+    """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
+    order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
+    if len(components) == 1:
+        yield "claim", _claim_text(components[0], when, every)
+    else:
+        for place, k in enumerate(order[:_COMPONENTS]):
+            text = _claim_text(components[k], when, False)
+            names = [printable(label) for label in components[k].family.labels[:TEXT]]
+            room = max(TEXT - len(text) - 2, 12)
+            yield "claim" if not place else "", f"{shorten_list(names, room, components[k].nodes.size)}: {text}"
+        if len(components) > _COMPONENTS:
+            yield "", f"... {len(components)} components in all"
+    told = [components[k] for k in order if components[k].behaviour == DEPENDS]
+    for component in told[: len(told) if every else 1]:
+        yield from _depends_entries(component, every)
+
+
+def _claim_text(component: FamilyComponent, when: str, every: bool) -> str:
+    if component.behaviour is None:
+        return "not decided"
+    if component.behaviour == DEPENDS:
+        return DEPENDS if component.signal == "any" else "depends on which graph it is"
+    whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
+    text = f"{sharpest(component)}{when} {whatever}"
+    sides = [_names(component, side.tolist(), TEXT if every else 20) for side in camps(component)]
+    if component.behaviour == STABILITY or len(sides) < 2:
+        return text
+    longer = f"{text}: camps {' against '.join('{' + side + '}' for side in sides)}"
+    return longer if every or len(longer) <= TEXT else text
+
+
+def _names(component: FamilyComponent, nodes: Sequence[int], width: int) -> str:
+    return shorten_list([printable(shorten_label(component.family.labels[v])) for v in nodes], width)
+
+
+def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
+    if component.counterexample is not None:
+        yield "why", _cut(printable(counterexample_text(component, component.counterexample)), every)
+    family = component.family
+    if len(family.modes) > 1:
+        alone = (f"{mode_name(family, k)}: {_alone(mode)}" for k, mode in enumerate(family.modes))
+        yield "alone", _cut("; ".join(alone), every)
+    elif component.signal == "any":
+        (held, *_) = decide(family, "constant")
+        behaviour = "it depends on the weights" if held.behaviour == DEPENDS else sharpest(held)
+        yield "constant", f"where weights never change: {behaviour}"
+    if component.signal == "any":
+        yield "groups", _cut(groups_text(component), every)
+
+
+def _alone(mode: Mode) -> str:
+    """Tell what a mode does if no other one acts."""
+    found = dict.fromkeys(sharpest(component) for component in decide(Family((mode,))))
+    return ", ".join(found)
+
+
+def groups_text(component: FamilyComponent) -> str:
+    """Tell which agents agree, follow or end at 0 under every signal, where the behaviour depends on it.
+
+    Examples
+    --------
+    >>> groups_text(ptcc.decide([(1, 3, 1, 2), (2, 3, 1, 1)])[0])
+    '1 keeps its value; 2 keeps its value; 3 ends between these, up to signs, or moves there for ever'
+    """
+    groups, parts = FamilyGroups(component), []
+    for group in groups.agreeing:
+        names = _names(component, group.nodes.tolist(), 30)
+        parts.append(f"{names} keeps its value" if group.nodes.size == 1 else f"{names} agree up to camps")
+    member = {v for group in groups.agreeing for v in group.nodes.tolist()}
+    zero = groups.at_zero.tolist()
+    others = [v for v in range(component.nodes.size) if v not in member and v not in set(zero)]
+    drawn = [v for v in others if groups.bounded_by(v)]
+    free = [v for v in others if v not in set(drawn)]
+    if zero:
+        parts.append(f"{_names(component, zero, 30)} {'end' if len(zero) > 1 else 'ends'} at 0")
+    if drawn:
+        ends = "end" if len(drawn) > 1 else "ends"
+        moves = "move" if len(drawn) > 1 else "moves"
+        parts.append(f"{_names(component, drawn, 30)} {ends} between these, up to signs, or {moves} there for ever")
+    if free:
+        parts.append(f"no limit is claimed of {_names(component, free, 30)}")
+    return "; ".join(parts)
+
+
+def _cut(text: str, every: bool) -> str:
+    lines = wrap_text(text)
+    if every or len(lines) <= _LINES:
+        return text
+    return " ".join([*lines[: _LINES - 1], shorten_text(f"{lines[_LINES - 1]} ...", TEXT)])
+
+
+# ---------------------------------------------------------------------- what is proved
+
+
+def _rate_entries(certificate: FamilyCertificate) -> Lines:
+    """Tell the proved rate, its upper bound and their ratio; where no rate was found, the one in closed form."""
+    if not certificate.common or all(part.component.nodes.size == 1 for part in certificate.parts):
+        return
+    rate, bound = certificate.rate, certificate.upper_bound
+    limit = "" if bound is None else f"upper bound {up(bound)}"
+    if rate is not None:
+        ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
+        yield "rate", f"{down(rate)}, {limit}{ratio}" if limit else f"{down(rate)}, proved"
+        return
+    explicit = [explicit_rate(part.component) for part in certificate.parts]
+    logs = [one.log10_decay_rate for one in explicit if one is not None]
+    if logs and len(logs) == sum(part.component.nodes.size > 1 for part in certificate.parts):
+        yield (
+            "rate",
+            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved" + f"; {limit}" * bool(limit),
+        )
+    else:
+        yield "rate", "there is one, but none was proved" + f"; {limit}" * bool(limit)
+
+
+def _function_entries(certificate: FamilyCertificate) -> Lines:
+    for part in certificate.parts:
+        names = [mode_name(certificate.family, k) for k in range(len(certificate.family.modes))]
+        for V in part.functions:
+            own = getattr(V, "rates", ())  # functions of rows have one rate
+            rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
+            alone = f"; of each mode: {rates}" if len(names) > 1 and rates else ""
+            yield "function", f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
+        if part.upper_bound is not None:
+            kinds = {
+                "member": "one graph",
+                "mixture": "a mixture of graphs, by fast switching",
+                "word": "a periodic signal",
+            }
+            modes = dict.fromkeys(names[member.mode] for member in part.upper_bound.members)
+            what = f"{kinds[part.upper_bound.kind]}" + f" of {', '.join(modes)}" * (len(names) > 1)
+            yield "bound", f"decay rate at most {up(part.upper_bound.value)}, proved by {what}"
+
+
+def _interval(ends: tuple[Fraction, Fraction] | None) -> str:
+    if ends is None:
+        return "no limit is claimed"
+    low, high = ends
+    return f"at {short_number(low)}" if low == high else f"in [{down(low, 5)}, {up(high, 5)}]"
+
+
+def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
+    """Tell between which ends every agent is at the deadline, agents with the same ends together."""
+    if certificate.final_states is not None and certificate.common:
+        width = 12 * TEXT if long else 2 * TEXT - 20
+        yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+
+
+def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:
+    groups: dict[str, list[str]] = {}
+    for label, ends in zip(labels, states, strict=True):
+        groups.setdefault(_interval(ends), []).append(printable(shorten_label(label)))
+    if len(groups) == 1 < len(states):
+        yield "x(T)", f"every agent {next(iter(groups))}"
+        return
+    texts = [f"{shorten_list(names, 24 if width < 4 * TEXT else 4 * TEXT)} {ends}" for ends, names in groups.items()]
+    yield "x(T)", shorten_list(texts, width)
+
+
+def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
+    """Tell how near the agents are to their final states by when."""
+    if not certificate.common or certificate.rate is None or certificate.initial_state is None:
+        return
+    if not long:
+        bound = certificate.deviation_bound([0.01]).max()
+        yield "error", f"at 0.99 T: every agent within {up(float(bound), 2)} of its final state"
+        return
+    bounds = certificate.deviation_bound([remaining for remaining, _ in _INSTANTS]).max(axis=0)
+    told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(_INSTANTS, bounds, strict=True))
+    yield "error", f"every agent is within so much of its final state: {', '.join(told)}"
+
+
+def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
+    if any(part.component.behaviour is None for part in certificate.parts):
+        return
+    if not certificate.bounded:
+        if not certificate.common:
+            yield "INPUT", "no bound holds for every signal: a switch near T may meet any gain"
+        elif certificate.unbounded:
+            yield "INPUT", "NOT BOUNDED for some signal from some initial states"
+        else:
+            yield "input", "not proved bounded"
+        return
+    peaks, labels = certificate.input_peaks, certificate.family.labels
+    yield from _peak_entries(labels, peaks or ())
+    if long and peaks is not None:
+        told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
+        yield "", f"|u_k| <= {shorten_list(told, 4 * TEXT)}"
+
+
+def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction]) -> Lines:
+    if not peaks:
+        yield "input", "bounded for every signal and every initial state"
+        return
+    largest = max(peaks)
+    agent = shorten_label(labels[peaks.index(largest)], 22)
+    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}"
+
+
+def _proof_text(certificate: FamilyCertificate) -> str:
+    report = certificate.checked
+    if report is None:
+        return "nothing to check"
+    return report.lines()[-1]
+
+
+def _verdict(certificate: FamilyCertificate) -> str:
+    assessment = certificate.assessment
+    if assessment.verdict != "certified":
+        return assessment.text
+    certified = assessment.certified_part + ", but says little by T" * (assessment.useful is False)
+    plain = assessment.useful is not False and not assessment.answers and not assessment.caveat
+    return assessment.line(certified, "checked without a solver" * plain, assessment.caveat, assessment.advice)

@@ -1,0 +1,237 @@
+"""Runs of a family of graphs under many signals, within what is proved for every signal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ptcc_certify.bounds.envelope import FLOOR_FACTOR
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.family_comparison import worst_case_signals
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, camp_groups, draw_deadlines, name_agents
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
+from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
+from ptcc_certify.simulation.signals import RandomSignal, Signal
+
+#: Random signals that are drawn beside the worst cases.
+_RANDOM = 8
+_AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
+
+
+def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None = None) -> list[FamilyTrajectory]:
+    """Return runs from a certificate's initial state.
+
+    Parameters
+    ----------
+    certificate : FamilyCertificate
+    signals : iterable of Signal, optional
+        By default eight random ones, and worst cases.
+
+    Raises
+    ------
+    ParameterError
+        The certificate has no initial state.
+    """
+    if certificate.initial_state is None:
+        raise ParameterError("the certificate has no initial state; certify the family with x0")
+    chosen = [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)] if signals is None else signals
+    start = [float(x) for x in certificate.initial_state]
+    return [simulate_family(certificate.family, certificate.protocol, start, signal) for signal in chosen]
+
+
+@styled
+def plot_family(
+    subject: FamilyCertificate,
+    *,
+    ax: Axes | None = None,
+    runs: Sequence[FamilyTrajectory] | None = None,
+    time_unit: str = "",
+) -> Axes:
+    """Draw the states ``x_k(t)`` under many signals, within what is proved for every signal.
+
+    Thin lines are runs under given or random signals, thicker ones under worst cases, in the colours and lines of the
+    camps in the first mode. Shaded: where the agents of a camp are for every signal, the final interval of each widened
+    by the bound of ``|x_k(t) - x_k(T)|``, and never beyond the largest state. Bars behind ``T``: the final intervals.
+    Of more than eight agents those are drawn that begin highest and lowest.
+
+    Parameters
+    ----------
+    subject : FamilyCertificate
+        With an initial state.
+    ax : Axes, optional
+    runs : sequence of FamilyTrajectory, optional
+        By default under eight random signals and worst cases.
+    time_unit : str
+        Of the deadline, for the label of the axis: ``"s"``.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate of a family, or has no initial state.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.certificate.family_certificate import certify_family
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
+    >>> ax = plot_family(certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]), time_unit="s")
+    >>> ax.get_xlabel(), [text.get_text() for text in ax.get_legend().get_texts()][-2:]
+    ('time $t$ (s)', ['proved for every signal', 'deadline $T$'])
+    """
+    runs, ax = _runs_of(subject, runs), axes_of(ax)
+    first = runs[0]
+    groups = camp_groups(analyse(subject.family.modes[0].mandatory))
+    agents = _drawn_agents(first.states[:, 0])
+    named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
+    labels = set()
+    for k in agents:
+        for run in runs:
+            worst = run.signal.startswith("worst")
+            looks: dict[str, Any] = {"linewidth": 1.1 if worst else 0.5, "alpha": 1.0 if worst else 0.7}
+            looks |= {"color": named[k], "linestyle": CAMP_STYLES[groups[k]][1]}
+            ax.plot(run.t, run.states[k], **looks, label=None if groups[k] in labels else groups[k])
+            labels.add(groups[k])
+    bars = _draw_tubes(ax, subject, first, agents, groups)
+    draw_deadlines(ax, first)
+    name_agents(ax, first, first.states, named)
+    values = [run.states[agents].ravel() for run in runs]
+    low, high = float(np.min([*map(np.min, values), *bars])), float(np.max([*map(np.max, values), *bars]))
+    low, high = (low, high) if low < high else (low - 1, high + 1)
+    ax.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", f"{len(runs)} signals")
+
+
+@styled
+def plot_family_decay(
+    subject: FamilyCertificate,
+    *,
+    ax: Axes | None = None,
+    runs: Sequence[FamilyTrajectory] | None = None,
+    axis: str = "left",
+    time_unit: str = "",
+) -> Axes:
+    """Draw ``max_k |x_k(t) - x_k(T)|`` under many signals below its bound for every signal, logarithmically.
+
+    Parameters
+    ----------
+    subject : FamilyCertificate
+        With an initial state and a proved rate.
+    ax : Axes, optional
+    runs : sequence of FamilyTrajectory, optional
+        By default under eight random signals and worst cases; those that have settled at ``T`` are drawn.
+    axis : {"left", "time", "clock"}
+        As in :func:`~ptcc_certify.plot_decay`.
+    time_unit : str
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate of a family, or has no initial state or no bound; or an unknown axis.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.certificate.family_certificate import certify_family
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
+    >>> cert = certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2])
+    >>> plot_family_decay(cert, axis="clock").get_xlabel()
+    'stretched clock $s(t)$'
+    """
+    if axis not in _AXES:
+        raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_AXES)}')
+    runs, ax = _runs_of(subject, runs), axes_of(ax)
+    first = runs[0]
+    before = first.remaining > 0
+    bound = subject.deviation_bound(first.remaining[before]).max(axis=0)
+    if not np.isfinite(bound).any():
+        raise ParameterError("the certificate holds no proved bound of a decay")
+    places = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
+    scale = float(np.abs(first.states[:, 0]).max()) or 1.0
+    floor = FLOOR_FACTOR * first.rtol * scale
+    label: str | None = "random signals"
+    for run in runs:
+        if run.deadline_resolved and np.array_equal(run.t, first.t):
+            gap = np.abs(run.states[:, before] - run.final_state[:, None]).max(axis=0)
+            worst = run.signal.startswith("worst")
+            looks: dict[str, Any] = {"color": "black" if worst else RUN, "linewidth": 0.9 if worst else 0.6}
+            ax.plot(places, np.where(gap > floor, gap, np.nan), **looks, label=None if worst else label)
+            label = label if worst else None
+    if any(run.signal.startswith("worst") and run.deadline_resolved for run in runs):
+        ax.plot([], [], color="black", linewidth=0.9, label="worst cases")
+    ax.plot(places, bound, color=BOUND, linewidth=1.8, label="proved for every signal")
+    bottom = floor / 10
+    ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
+    ax.axhline(floor, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")
+    ax.set_yscale("log")
+    ax.set_ylim(bottom, 3 * float(bound[np.isfinite(bound)].max()))
+    ax.set_xscale("log" if axis == "left" else "linear")
+    last = int(np.flatnonzero(bound >= bottom)[-1])
+    ax.set_xlim(places[0], places[max(last, 1)])
+    name = time_label(_AXES[axis], time_unit) if axis == "time" else _AXES[axis]
+    return finished(ax, name, r"$\max_k |x_k(t) - x_k(T)|$")
+
+
+def _runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[FamilyTrajectory]:
+    if not isinstance(subject, FamilyCertificate):
+        raise ParameterError(
+            f"this figure is drawn from the certificate of a family, not from {type(subject).__name__}"
+        )
+    result = sample_runs(subject) if runs is None else list(runs)
+    if not result or not all(isinstance(run, FamilyTrajectory) and run.family == subject.family for run in result):
+        raise ParameterError("runs are what simulate_family returned for the family of the certificate")
+    return result
+
+
+def _drawn_agents(x: np.ndarray) -> list[int]:
+    """Return all agents, or those that begin highest and lowest."""
+    order = np.argsort(x, kind="stable").tolist()
+    if len(order) <= NAMED_AGENTS:
+        return sorted(order)
+    half = NAMED_AGENTS // 2
+    return sorted([*order[:half], *order[-half:]])
+
+
+def _draw_tubes(
+    ax: Axes, certificate: FamilyCertificate, run: FamilyTrajectory, agents: list[int], groups: np.ndarray
+) -> list[float]:
+    """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
+    before = run.remaining > 0
+    moves = certificate.deviation_bound(run.remaining[before])
+    finals = certificate.final_states or ()
+    largest = np.zeros(len(groups))  # what the states of a component never exceed
+    for part in certificate.parts:
+        largest[part.component.nodes] = np.abs(run.states[part.component.nodes, 0]).max()
+    T, label = float(certificate.protocol.T), "proved for every signal"
+    places: dict[tuple[float, float, str], None] = {}
+    for name in dict.fromkeys(groups[agents]):
+        tubes = []
+        for k in (k for k in agents if groups[k] == name):
+            if (interval := finals[k]) is not None:
+                low, high = (float(end) for end in interval)
+                places[low, high, CAMP_STYLES[name][0]] = None
+                tubes.append((np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])))
+        if name != "single leaders":
+            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))] * bool(
+                tubes
+            )
+        for least, most in tubes:
+            looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
+            ax.fill_between(run.t[before], least, most, **looks, label=label)
+            label = ""
+    for number, (low, high, colour) in enumerate(places, 1):
+        place = T + number * (float(run.t[-1]) - T) / (len(places) + 1)
+        ax.plot([place, place], [low, high], color=colour, linewidth=2.5, zorder=4, marker="_", markersize=5)
+    return [end for low, high, _ in places for end in (low, high)]

@@ -1,0 +1,209 @@
+"""Members of a family in floating point: which one a signal chooses, and its Laplacian."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.rationals import shorten
+
+#: Where uncertain weights lie unless a signal tells: in the middle of their intervals.
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One member of a family.
+
+    Attributes
+    ----------
+    mode : int
+        From 0.
+    levels : tuple of q float
+        Of each uncertain parameter of the mode, in the order of :attr:`Mode.parameters
+        <ptcc_certify.graphs.family.Mode.parameters>`: the size is ``w- + level (w+ - w-)``, level from 0 to 1.
+    """
+
+    mode: int
+    levels: tuple[float, ...] = ()
+
+
+class _ModeArrays:
+    """The edges of a mode with their sizes in floats, and which parameter each belongs to."""
+
+    def __init__(self, mode: Mode):
+        self.source, self.target, self.sign = mode.source, mode.target, mode.sign.astype(float)
+        self.lower = mode.lower.as_float()
+        self.upper = mode.upper.as_float()
+        self.q = mode.parameters.size
+        ends = [self._ends(mode, edge) for edge in range(mode.n_edges)]
+        number = {ends[edge]: p for p, edge in enumerate(mode.parameters.tolist())}
+        self.uncertain = np.array([e for e in range(mode.n_edges) if not mode.known[e]], dtype=np.int64)
+        self.parameter = np.array([number[ends[e]] for e in self.uncertain.tolist()], dtype=np.int64)
+        self.gap = (self.upper - self.lower)[self.uncertain]
+        self.rivals = [
+            (p, number[source, target, -sign])
+            for (source, target, sign), p in number.items()
+            if sign > 0 and (source, target, -sign) in number
+        ]
+
+    @staticmethod
+    def _ends(mode: Mode, edge: int) -> tuple[int, int, int]:
+        ends = int(mode.source[edge]), int(mode.target[edge])
+        return (*(sorted(ends) if mode.tied else ends), int(mode.sign[edge]))  # type: ignore[return-value]
+
+    def sizes(self, levels: Sequence[float]) -> np.ndarray:
+        """Return ``|w|`` of every edge."""
+        sizes = self.lower.copy()
+        sizes[self.uncertain] += self.gap * np.asarray(levels, dtype=float)[self.parameter]
+        return sizes
+
+
+class Members:
+    """The members of a family, as arrays over one pattern.
+
+    Parameters
+    ----------
+    family : Family
+
+    Attributes
+    ----------
+    indptr, indices : int arrays
+        The pattern of all Laplacians, by columns, with the whole diagonal.
+    in_weight : (N,) array
+        The largest in-weight of each node over all members.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> members = Members(Family.from_intervals([("a", "b", -3, -1), ("b", "a", 2, 2)]))
+    >>> members.laplacian(members.choice(0, 1.0)).toarray()
+    array([[ 2., -2.],
+           [ 3.,  3.]])
+    """
+
+    def __init__(self, family: Family):
+        self.family = family
+        self.arrays = [_ModeArrays(mode) for mode in family.modes]
+        n = family.n_nodes
+        source, target, _ = family.union
+        keys = np.unique(np.concatenate([source * n + target, np.arange(n) * (n + 1)]))
+        self.indices = keys % n
+        self.indptr = np.searchsorted(keys // n, np.arange(n + 1))
+        self._diagonal = np.searchsorted(keys, np.arange(n) * (n + 1))
+        self._places = [np.searchsorted(keys, a.source * n + a.target) for a in self.arrays]
+        heaviest = [np.bincount(a.target, a.upper, minlength=n) for a in self.arrays]
+        self.in_weight = np.max(heaviest, axis=0)
+
+    @cached_property
+    def unit(self) -> float:
+        """A stretch of the clock in which agents move: 1 over the median in-weight of those that listen."""
+        listening = self.in_weight[self.in_weight > 0]
+        return float(1 / np.median(listening)) if listening.size else 1.0
+
+    def choice(self, mode: int | str, level: float | Sequence[float] | np.ndarray = MIDDLE) -> Choice:
+        """Return a choice, of two edges of opposite signs between one pair of nodes with one on at most.
+
+        Parameters
+        ----------
+        mode : int or str
+            The number, from 0; or the name, or the number from 1 as a text.
+        level : float or (q,) sequence of float
+            From 0 (``w-``) to 1 (``w+``), of all uncertain parameters or of each.
+
+        Raises
+        ------
+        ParameterError
+            There is no such mode, or levels do not fit.
+        """
+        number = self.number(mode)
+        q = self.arrays[number].q
+        levels = np.array(np.broadcast_to(level, q) if np.ndim(level) == 0 else level, dtype=float)
+        if levels.shape != (q,):
+            raise ParameterError(f"mode {self.name(number)} has {q} uncertain weights, not {levels.size}")
+        if not ((levels >= 0) & (levels <= 1)).all():
+            raise ParameterError(f"level {levels.min()} to {levels.max()} is not from 0 (w-) to 1 (w+)")
+        for one, other in self.arrays[number].rivals:
+            levels[one if levels[one] < levels[other] else other] = 0.0
+        return Choice(number, tuple(levels.tolist()))
+
+    def name(self, mode: int) -> str:
+        """Return what a mode is called: its name, or its number from 1."""
+        return self.family.modes[mode].name or str(mode + 1)
+
+    def number(self, mode: int | str) -> int:
+        """Return the number of a mode from 0, from that or from its name, or from its number from 1 as a text.
+
+        Raises
+        ------
+        ParameterError
+            There is none.
+        """
+        count = len(self.arrays)
+        names = [m.name for m in self.family.modes]
+        if isinstance(mode, str) and mode in names and mode:
+            return names.index(mode)
+        if isinstance(mode, str) and mode.isascii() and mode.isdigit() and 1 <= int(mode) <= count:
+            return int(mode) - 1
+        if not isinstance(mode, str) and 0 <= int(mode) < count and int(mode) == mode:
+            return int(mode)
+        known = ", ".join(shorten(self.name(k)) for k in range(min(count, 8)))
+        raise ParameterError(f"the family has no mode {shorten(str(mode))}; it has {known}{', ..' * (count > 8)}")
+
+    def data(self, choice: Choice) -> np.ndarray:
+        """Return the entries of the Laplacian of a member over the pattern."""
+        own = self.arrays[choice.mode]
+        sizes = own.sizes(choice.levels)
+        entries = np.bincount(self._places[choice.mode], -own.sign * sizes, minlength=self.indices.size)
+        entries[self._diagonal] += np.bincount(own.target, sizes, minlength=self.family.n_nodes)
+        return entries
+
+    def laplacian(self, choice: Choice) -> sparse.csc_array:
+        """Return the Laplacian of a member."""
+        n = self.family.n_nodes
+        return sparse.csc_array((self.data(choice), self.indices, self.indptr), shape=(n, n))
+
+    def imbalance(self, x: np.ndarray, choice: Choice | None = None) -> float:
+        """Bound ``max_k |(L x)_k| / (2 D_k)`` over all members, or of one; nobody moves the agents with ``D_k = 0``."""
+        worst = np.zeros(len(x)) if choice is None else np.abs(self.laplacian(choice) @ x)
+        for own in self.arrays if choice is None else ():
+            pulls = x[own.target] - own.sign * x[own.source]
+            total = np.abs(np.bincount(own.target, own.lower * pulls, minlength=len(x)))
+            some = own.uncertain
+            total += np.bincount(own.target[some], own.gap * np.abs(pulls[some]), minlength=len(x))
+            worst = np.maximum(worst, total)
+        listens = self.in_weight > 0
+        return float((worst[listens] / (2 * self.in_weight[listens])).max(initial=0.0))
+
+    def worst(self, x: np.ndarray, gradient: np.ndarray) -> Choice:
+        """Return the member by which a function falls least, of which the gradient at ``x`` is given.
+
+        Along ``x' = -L x`` it falls by ``sum |w_kl| gradient_k (x_k - sgn(w_kl) x_l)``, linear in every weight: each is
+        at ``w+`` where its summand is negative, at ``w-`` otherwise.
+
+        Examples
+        --------
+        >>> from ptcc_certify.graphs.family import Family
+        >>> family = Family.from_intervals([("a", "b", 1, 3), ("c", "b", 1, 2)], nodes="abc")
+        >>> x = np.array([1.0, 0.0, -2.0])
+        >>> Members(family).worst(x, np.array([0.0, 1.0, 0.0]))  # b is to stay large
+        Choice(mode=0, levels=(1.0, 0.0))
+        """
+        least, worst = np.inf, Choice(0)
+        for mode, own in enumerate(self.arrays):
+            falls = gradient[own.target] * (x[own.target] - own.sign * x[own.source])
+            slopes = np.bincount(own.parameter, own.gap * falls[own.uncertain], minlength=own.q)
+            levels = np.where(slopes < 0, 1.0, 0.0)
+            for one, other in own.rivals:
+                if levels[one] and levels[other]:
+                    levels[one if slopes[one] > slopes[other] else other] = 0.0
+            fall = float(own.lower @ falls + slopes @ levels)
+            if fall < least:
+                least, worst = fall, Choice(mode, tuple(levels.tolist()))
+        return worst

@@ -1,0 +1,380 @@
+"""Signals: which member of a family acts, from when on.
+
+A signal is piecewise constant on the stretched clock ``s``; a table may name instants of the time ``t`` instead, which
+the clock of the gain translates.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptcc_certify.errors import FormatError, NumberError, ParameterError
+from ptcc_certify.graphs.io.edge_list import column, records
+from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.simulation.family_members import MIDDLE, Choice, Members
+from ptcc_certify.theorems.family_behaviour import decide
+
+#: How random weights lie in their intervals.
+WEIGHTS = ("both", "ends", "between")
+#: What :func:`as_signal` takes as a word.
+WORDS = ("random", "worst-case", "constant")
+# The largest entry is imitated by the sum of this power: only the largest entries weigh in its gradient.
+_POWER = 15
+# Steps of the worst-case search for the time in which agents move.
+_STEPS = 10
+# Against the largest entry of the initial state: what still moves below is rounding, and the steps grow.
+_AT_REST = 1e-11
+_SHORTEST, _LONGEST = 1e-12, 1e12
+
+State = Callable[[], np.ndarray]
+
+
+class Stretch(NamedTuple):
+    """A member that acts until a value of the clock, infinite if for ever."""
+
+    choice: Choice
+    until: float
+
+
+class Signal(ABC):
+    """What chooses a member of a family at every instant before ``T``; the last one stays.
+
+    Attributes
+    ----------
+    text : str
+        The signal in words.
+    """
+
+    text: str
+
+    @abstractmethod
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield the members in their order, and until when each acts; ``state()`` is the present state."""
+
+    def past(self, members: Members, T: float) -> list[tuple[float, Choice]]:
+        """Return what is chosen at instants from ``T`` on."""
+        return []
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.text})"
+
+
+class ConstantSignal(Signal):
+    """One member for ever.
+
+    Parameters
+    ----------
+    mode : int or str
+        Its number from 0, or its name.
+    level : float or sequence of float
+        Where the uncertain weights lie: 0 is ``w-``, 1 is ``w+``.
+    """
+
+    def __init__(self, mode: int | str = 0, level: float | Sequence[float] = MIDDLE):
+        self.mode, self.level = mode, level
+        self.text = f"constant, mode {mode if isinstance(mode, str) else mode + 1}"
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield it."""
+        yield Stretch(members.choice(self.mode, self.level), math.inf)
+
+
+class TableSignal(Signal):
+    """Members from a table of instants.
+
+    Parameters
+    ----------
+    rows : sequence of (instant, mode) or (instant, mode, level)
+        The first instant is 0, the others ascend. The mode is a name, or a number from 0; the level that of
+        :class:`ConstantSignal`.
+    clock : bool
+        Whether instants are values of the stretched clock, instead of times.
+
+    Raises
+    ------
+    ParameterError
+        A row is none, or the instants do not ascend from 0.
+
+    Examples
+    --------
+    >>> TableSignal([(0, "day"), (0.5, "night")])
+    TableSignal(2 rows over time)
+    """
+
+    def __init__(self, rows: Sequence[Sequence[Any]], clock: bool = False):
+        self.clock = clock
+        self.rows: list[tuple[float, int | str, Any]] = []
+        for row in rows:
+            if not 2 <= len(row) <= 3:
+                raise ParameterError(f"row {shorten(repr(row))} is not (instant, mode) or (instant, mode, level)")
+            instant = number_within(row[0], "instant", 0, 1e300)
+            if instant <= self.rows[-1][0] if self.rows else instant:
+                mend = f"{instant:g} follows {self.rows[-1][0]:g}" if self.rows else f"it begins at {instant:g}"
+                raise ParameterError(f"the instants of a signal ascend from 0, and {mend}")
+            self.rows.append((instant, row[1], row[2] if len(row) > 2 else MIDDLE))
+        if not self.rows:
+            raise ParameterError("the table of a signal is empty; give a row for the instant 0")
+        self.text = f"{len(self.rows)} row{'s' * (len(self.rows) > 1)} over {'the clock' if clock else 'time'}"
+
+    @classmethod
+    def read(cls, path: Source) -> TableSignal:
+        r"""Read a table with the columns ``t`` (or ``clock``) and ``mode``, and perhaps ``level``.
+
+        Parameters
+        ----------
+        path : path or file object
+            CSV with a header.
+
+        Raises
+        ------
+        FormatError
+            The header names no such columns, or a cell is no number; the line is named.
+
+        Examples
+        --------
+        >>> TableSignal.read(StringIO("clock,mode,level\n0,day,1\n2.5,night,0\n"))
+        TableSignal(2 rows over the clock)
+        """
+        name, _ = name_and_ending(path)
+        lines = [(k, [c.strip() for c in row]) for k, row in records(read_bytes(path, name), name) if any(row)]
+        first = lines[0][1] if lines else []
+        time, clock, mode, level = (
+            column(first, names, name) for names in (("t", "time"), ("clock", "s"), ("mode",), ("level",))
+        )
+        instant = clock if time is None else time
+        if instant is None or mode is None or (time is not None and clock is not None):
+            raise FormatError(f"{name}: the header of a signal names t (or clock) and mode, and perhaps level")
+        rows: list[tuple[Any, ...]] = []
+        for number, cells in lines[1:]:
+            cells = [*cells, *[""] * len(first)]
+            try:
+                where = float(parse_exact(cells[instant]))
+                own = () if level is None or not cells[level] else (float(parse_exact(cells[level])),)
+            except (NumberError, OverflowError) as error:
+                raise FormatError(f"{name}, line {number}: {error}; give a number") from None
+            rows.append((where, cells[mode], *own))
+        try:
+            return cls(rows, clock=time is None)
+        except ParameterError as error:
+            raise FormatError(f"{name}: {error}") from None
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield the rows before ``T``."""
+        places = np.array([row[0] for row in self.rows])
+        if not self.clock:
+            places = np.asarray(gain.clock(places))
+        begun = int(np.isfinite(places).sum())
+        for (_, mode, level), until in zip(self.rows[:begun], [*places[1:begun], math.inf], strict=True):
+            yield Stretch(members.choice(mode, level), float(until))
+
+    def past(self, members: Members, T: float) -> list[tuple[float, Choice]]:
+        """Return the rows from ``T`` on."""
+        late = [] if self.clock else [row for row in self.rows if row[0] >= T]
+        return [(t, members.choice(mode, level)) for t, mode, level in late]
+
+
+class PeriodicSignal(Signal):
+    """Members in turn, each for its stretch of the clock.
+
+    Parameters
+    ----------
+    word : sequence of (mode, duration) or (mode, duration, level)
+
+    Raises
+    ------
+    ParameterError
+        There is none, or a duration is not positive.
+
+    Examples
+    --------
+    >>> PeriodicSignal([("day", 0.5), ("night", 1)])
+    PeriodicSignal(2 modes in turn, period 1.5 of the clock)
+    """
+
+    def __init__(self, word: Sequence[Sequence[Any]]):
+        if not word or any(not 2 <= len(letter) <= 3 for letter in word):
+            raise ParameterError("the word of a signal is a list of (mode, duration) or (mode, duration, level)")
+        self.word = [
+            (letter[0], number_within(letter[1], "duration", _SHORTEST, _LONGEST), [*letter, MIDDLE][2])
+            for letter in word
+        ]
+        period = sum(duration for _, duration, _ in self.word)
+        self.text = f"{len(word)} mode{'s' * (len(word) > 1)} in turn, period {period:.4g} of the clock"
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield the word again and again."""
+        choices = [(members.choice(mode, level), duration) for mode, duration, level in self.word]
+        clock = 0.0
+        while True:
+            for choice, duration in choices:
+                clock += duration
+                yield Stretch(choice, clock)
+
+
+class RandomSignal(Signal):
+    """Random modes with random weights; how long each acts is exponentially distributed on the clock.
+
+    Parameters
+    ----------
+    seed : int
+    dwell : float, optional
+        Its mean, on the clock; by default the time in which agents move, 1 over the median in-weight.
+    weights : {"both", "ends", "between"}
+        Uncertain weights at ``w-`` or ``w+``, or uniform between, or either way from stretch to stretch.
+
+    Examples
+    --------
+    >>> RandomSignal(3)
+    RandomSignal(random, seed 3)
+    """
+
+    def __init__(self, seed: int = 0, dwell: float | None = None, weights: str = "both"):
+        if weights not in WEIGHTS:
+            raise ParameterError(f"weights = {shorten(repr(weights))} is unknown; one of {', '.join(WEIGHTS)}")
+        self.seed, self.weights = whole_number(seed, "seed", 0, 2**63 - 1), weights
+        self.dwell = None if dwell is None else number_within(dwell, "dwell", _SHORTEST, _LONGEST)
+        self.text = f"random, seed {self.seed}" + (f", dwell {self.dwell:.4g}" if self.dwell else "")
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield them."""
+        rng, clock = np.random.default_rng(self.seed), 0.0
+        while True:
+            mode = int(rng.integers(len(members.arrays)))
+            levels = rng.random(members.arrays[mode].q)
+            if self.weights == "ends" or (self.weights == "both" and rng.random() < 0.5):
+                levels = levels.round()
+            clock += rng.exponential(self.dwell or members.unit)
+            yield Stretch(members.choice(mode, levels), clock)
+
+
+class WorstCaseSignal(Signal):
+    """At every step of the clock the member by which a function falls least: a greedy search for the slowest decay.
+
+    Parameters
+    ----------
+    form : (N, N) array, optional
+        ``X' form X`` is the function: see :meth:`against`. Without one, ``max_k |x_k|``; in components that come to
+        consensus ``max g_k x_k - min g_k x_k``.
+    step : float, optional
+        On the clock; by default a tenth of the time in which agents move.
+
+    Examples
+    --------
+    >>> WorstCaseSignal()
+    WorstCaseSignal(worst case)
+    """
+
+    def __init__(self, form: np.ndarray | None = None, step: float | None = None):
+        self.form = None if form is None else np.asarray(form, dtype=float)
+        self.step = None if step is None else number_within(step, "step", _SHORTEST, _LONGEST)
+        self.text = "worst case" + (" for a Lyapunov function" if form is not None else "")
+
+    @classmethod
+    def against(
+        cls, function: FamilyFunction, quotient: Quotient, nodes: np.ndarray, n: int, step: float | None = None
+    ) -> WorstCaseSignal:
+        """Return the search against a Lyapunov function of a component.
+
+        Parameters
+        ----------
+        function : FamilyFunction
+        quotient : Quotient
+            Of the component.
+        nodes : (m,) int array
+            The nodes of the component, among ``n``.
+        n : int
+        step : float, optional
+        """
+        C = np.zeros((len(quotient.nodes), n))
+        for row, v in enumerate(quotient.nodes):
+            C[row, nodes[v]] = 1
+            for b, pivot in zip(quotient.basis[v], quotient.pivots, strict=True):
+                C[row, nodes[pivot]] -= float(b)
+        P = np.array([[float(x) for x in row] for row in function.matrix]).reshape(len(C), len(C))
+        return cls(C.T @ P @ C, step)
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield the member that is worst at the present state, step by step."""
+        n, form = members.family.n_nodes, self.form
+        if form is not None and form.shape != (n, n):
+            raise ParameterError(f"the form of the worst case is {form.shape}, and the family has {n} nodes")
+        step, clock = self.step or members.unit / _STEPS, 0.0
+        groups = None if form is not None else _groups(members)
+        rest = _AT_REST * float(np.abs(state()).max())
+        while True:
+            x = state()
+            gradient = form @ x if form is not None else _slope_of_largest(x, groups or [])
+            clock = clock + step if members.imbalance(x) > rest else 2 * clock + step
+            yield Stretch(members.worst(x, gradient), clock)
+
+
+def _groups(members: Members) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Return the nodes of each component, and its camps if it comes to consensus."""
+    return [
+        (
+            part.nodes,
+            part.gauge.astype(float) if part.behaviour == BIPARTITE_CONSENSUS and part.gauge is not None else None,
+        )
+        for part in decide(members.family)
+    ]
+
+
+def _slope_of_largest(x: np.ndarray, groups: list[tuple[np.ndarray, np.ndarray | None]]) -> np.ndarray:
+    """Return the gradient of a smooth function near to the largest entry of every component, or their spread."""
+    gradient = np.zeros(len(x))
+    for nodes, camps in groups:
+        y = x[nodes] if camps is None else camps * x[nodes]
+        if camps is not None:
+            y = y - (y.max() + y.min()) / 2
+        slope = (y / (np.abs(y).max() or 1.0)) ** _POWER
+        gradient[nodes] = slope if camps is None else camps * slope
+    return gradient
+
+
+def as_signal(signal: Any, seed: int = 0) -> Signal:
+    r"""Return a signal, or read it.
+
+    Parameters
+    ----------
+    signal : Signal, str, path, file object or sequence of rows
+        ``"random"``, ``"worst-case"``, ``"constant"`` (the first mode, its weights in the middle), a table as
+        :meth:`TableSignal.read` reads it, or its rows over time.
+    seed : int
+        Of the random one.
+
+    Raises
+    ------
+    ParameterError
+        It is none of these.
+
+    Examples
+    --------
+    >>> as_signal("random", 7), as_signal([(0, "day"), (0.5, "night")])
+    (RandomSignal(random, seed 7), TableSignal(2 rows over time))
+    """
+    if isinstance(signal, Signal):
+        return signal
+    if signal == "random":
+        return RandomSignal(seed)
+    if signal == "worst-case":
+        return WorstCaseSignal()
+    if signal == "constant":
+        return ConstantSignal()
+    if isinstance(signal, list | tuple):
+        return TableSignal(signal)
+    try:
+        return TableSignal.read(signal)
+    except FormatError as error:
+        if isinstance(signal, str):
+            raise ParameterError(f"signal: {error}; or one of {', '.join(WORDS)}") from None
+        raise

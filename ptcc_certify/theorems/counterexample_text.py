@@ -1,0 +1,126 @@
+"""Counterexamples of families in words, with the names of modes and agents."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.rationals import nearest_float, shorten
+from ptcc_certify.theorems.family_behaviour import (
+    CLOSED_SET,
+    DIFFERENT,
+    NO_CAMPS,
+    STABLE,
+    TWO_COMPONENTS,
+    Counterexample,
+    FamilyComponent,
+)
+
+#: Names that are listed, edges of a closed walk, and characters of a name.
+_LISTED, _STEPS, _WIDTH = 4, 8, 24
+
+
+def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
+    """Tell in one sentence what refutes a behaviour of a component for every signal.
+
+    Parameters
+    ----------
+    component : FamilyComponent
+        Whose nodes and modes ``why`` numbers.
+    why : Counterexample
+
+    Returns
+    -------
+    str
+        Without a full stop.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> (pair,) = decide(Family.from_intervals([("a", "b", 0, 1), ("b", "a", 1, 2)]))
+    >>> counterexample_text(pair, pair.refutation("stability"))
+    'held constant and its optional edges off, b hears nobody else and keeps its value'
+    """
+    family, names = component.family, [shorten(label, _WIDTH) for label in component.family.labels]
+    where = f"held in {mode_name(family, why.mode)}" if len(family.modes) > 1 else "held constant"
+    if why.kind == CLOSED_SET:
+        without = " and its optional edges off" if family.modes[why.mode].optional.any() else ""
+        alone = f"{_listed([names[v] for v in why.nodes])} hear{'s' * (len(why.nodes) == 1)} nobody else"
+        keep = (
+            "keeps its value" if len(why.nodes) == 1 else f"stay at {_camps([names[v] for v in why.nodes], why.camps)}"
+        )
+        return f"{where}{without}, {alone} and {keep}"
+    if why.kind == TWO_COMPONENTS:
+        one, two = (names[v] for v in why.nodes)
+        return f"{where}, the leader groups of {one} and {two} do not hear each other, and do not meet"
+    if why.kind == NO_CAMPS:
+        steps = list(dict.fromkeys(f"{names[source]} -> {names[target]}" for source, target in why.cycle))
+        if len(steps) == 1:
+            return f"{steps[0]} has both signs, so that no camps keep it"
+        walk = ", ".join(steps[:_STEPS]) + ", ..." * (len(steps) > _STEPS)
+        return f"the signs of {walk} multiply to -1, so that no camps keep them"
+    if why.kind == DIFFERENT:
+        return _different(component, why)
+    if why.kind == STABLE:
+        off = [_edge(family.modes[why.mode], edge) for edge in why.off]
+        rest = f"with {_listed(off)} off and every other edge on" if off else "with every edge on"
+        mode = mode_name(family, why.mode)
+        return f"{mode if len(family.modes) > 1 else 'the graph'} {rest} is stable: all its agents end at 0"
+    return _moving(family, names, why)
+
+
+def mode_name(family: Family, number: int) -> str:
+    """Return what a mode is called.
+
+    Examples
+    --------
+    >>> mode_name(Family.from_intervals([("a", "b", 1, 2)]), 0)
+    'the graph'
+    """
+    return shorten(family.modes[number].name or (f"mode {number + 1}" if len(family.modes) > 1 else "the graph"), 40)
+
+
+def _different(component: FamilyComponent, why: Counterexample) -> str:
+    """Tell how many leader groups keep values in one mode and in another."""
+    counts = [
+        sum(c.balanced for c in component.structures[number].closed_components) for number in (why.mode, why.other)
+    ]
+    one, two = (mode_name(component.family, number) for number in (why.mode, why.other))
+    groups = f"{counts[0]} leader group{'s keep values' if counts[0] > 1 else ' keeps its value'} in {one}"
+    return f"{groups}, {counts[1] or 'none'} in {two}" + " (every agent ends at 0)" * (not counts[1])
+
+
+def _moving(family: Family, names: Sequence[str], why: Counterexample) -> str:
+    """Tell which state is at rest in one member and moves in another."""
+    one, two = (f"in {mode_name(family, number)} " * (len(family.modes) > 1) for number in (why.mode, why.other))
+    if why.edge is not None:
+        optional = family.modes[why.other].optional[why.edge]
+        two += f"with {_edge(family.modes[why.other], why.edge)} {'on' if optional else 'at its largest'}"
+        one += "at the least weights " * (why.mode == why.other)
+    if why.state is not None:
+        size = max(map(abs, why.state)) or Fraction(1)
+        state = ", ".join(f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False))
+        state += ", ..." * (len(names) > _LISTED)
+        return f"the state {state} rests {one}and moves {two}".rstrip()
+    group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
+    return f"a state{group} rests {one}and moves {two}".rstrip()
+
+
+def _number(x: Fraction) -> str:
+    short = abs(x.numerator) < 1000 and x.denominator < 1000
+    return str(x) if short else f"{nearest_float(x):.4g}"
+
+
+def _edge(mode: Mode, edge: int) -> str:
+    return f"{shorten(mode.labels[mode.source[edge]], _WIDTH)} -> {shorten(mode.labels[mode.target[edge]], _WIDTH)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _LISTED:,} more" if len(names) > _LISTED else ""
+    return ", ".join(names[:_LISTED]) + more
+
+
+def _camps(names: Sequence[str], camps: Sequence[int]) -> str:
+    signs = [f"{name}={sign}" for name, sign in zip(names[:_LISTED], camps, strict=False)]
+    return ", ".join(signs) + ", ..." * (len(names) > _LISTED)

@@ -1,0 +1,260 @@
+"""Families of graphs on the command line: several files, weights in intervals, edges that may fail."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from bad_inputs import ptcc
+
+from ptcc_certify.certificate.verdict import CERTIFIED
+from ptcc_certify.graphs.io import read_family
+
+INTERVALS = "source,target,weight_min,weight_max"
+#: "day" and "night" keep the same camps, "spoiled" others.
+FILES = {
+    "day.csv": "a,b,1\nb,c,-1\n",
+    "night.csv": "c,a,-2\na,b,1\n",
+    "spoiled.csv": "c,a,2\na,b,1\n",
+    "other.csv": "a,b,1\nb,d,-1\n",
+    "unsure.csv": f"{INTERVALS}\na,b,1,2\nb,c,-2,-1\nc,a,-1,0\n",
+    "may_fail.csv": "source,target,weight,optional\na,b,1,no\nb,a,-1,yes\n",
+    "s.toml": '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\n[protocol]\nkappa = 3\n',
+}
+BOTH = ("day.csv", "night.csv", "--switching")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for name, text in FILES.items():
+        Path(name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "claim"),
+    [
+        (BOTH, "bipartite consensus for every signal: camps {a, b} against {c}"),
+        (("unsure.csv",), "bipartite consensus for every signal"),
+        (("day.csv", "--uncertainty", "10%"), "bipartite consensus for every signal"),
+        (("fig1a", "--optional", "1,2"), "stability for every signal"),
+        (("fig1a", "fig1b", "--switching"), "depends on the signal"),
+        (("may_fail.csv",), "depends on the signal"),
+        (("day.csv", "spoiled.csv", "--switching", "--signal", "constant"), "if mode and weights never change"),
+        (("day.csv", "--optional", "a,b", "--optional", "b,c"), "depends on the signal"),
+    ],
+)
+def test_what_every_signal_does_is_decided_on_the_command_line(words: tuple[str, ...], claim: str):
+    run = ptcc("classify", *words)
+    (line,) = (line for line in run.out.splitlines() if line.startswith("claim "))
+    assert run.code == 0 and claim in line, run
+
+
+def test_one_graph_with_known_weights_is_no_family():
+    Path("known.csv").write_text(f"{INTERVALS}\na,b,1,1\nb,c,-1,-1\n")
+    plain = ptcc("certify", "day.csv", "--no-simulation")
+    assert "Theorem 2.1" in plain.out
+    for words in (("day.csv", "--switching"), ("day.csv", "--uncertainty", "0"), ("day.csv", "--signal", "constant")):
+        assert ptcc("certify", *words, "--no-simulation").out == plain.out
+    assert "Theorem 2.1" in ptcc("classify", "known.csv").out
+
+
+def test_standard_input_holds_intervals_or_a_mode():
+    unsure = ptcc("classify", "-", stdin=FILES["unsure.csv"].encode())
+    assert unsure.code == 0 and "for every signal" in unsure.out
+    assert "for every signal" in ptcc("classify", "day.csv", "-", "--switching", stdin=FILES["night.csv"].encode()).out
+    assert "Theorem 2.1" in ptcc("classify", "-", stdin=FILES["day.csv"].encode()).out
+    assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
+
+
+def test_what_is_written_is_checked_against_the_files_in_their_order():
+    assert ptcc("certify", *BOTH, "--kappa", "3", "-o", "c.json").code == 0
+    checked = ptcc("check", "c.json")
+    assert checked.code == 0 and "bipartite consensus at T = 1 for every signal" in checked.out
+    assert ptcc("check", "c.json", *BOTH).code == 0
+    for words, why in (
+        (("night.csv", "day.csv", "--switching"), "the modes are in another order"),
+        (("day.csv", "spoiled.csv", "--switching"), "in mode night"),
+        ((*BOTH, "--uncertainty", "1%"), "in mode day"),
+        (("day.csv",), "2 modes in the certificate, 1 in the files"),
+        (("other.csv", "--uncertainty", "1%"), "the certificate alone has node c"),
+    ):
+        run = ptcc("check", "c.json", *words)
+        assert run.code == 1 and why in " ".join(run.out.split()), run
+
+
+def test_a_scenario_lists_the_graphs_of_a_family():
+    """Its certificate is that of the same flags, and is checked against the scenario."""
+    run = ptcc("certify", "s.toml", "-o", "c.json")
+    assert run.code == 0 and "4 edges, 4 uncertain" in run.out
+    assert ptcc("check", "c.json", "s.toml").code == 0
+    assert ptcc("certify", *BOTH, "--uncertainty", "5%", "--kappa", "3", "-o", "d.json").code == 0
+    one, other = (json.loads(Path(name).read_text()) for name in ("c.json", "d.json"))
+    assert one["digest"] == other["digest"]
+    assert "4 uncertain" not in ptcc("classify", "s.toml", "--uncertainty", "0").out
+
+
+def test_the_json_is_the_certificate_or_the_decision():
+    certificate = json.loads(ptcc("certify", *BOTH, "--json").out)
+    assert certificate["verdict"] == CERTIFIED and len(certificate["graph"]["modes"]) == 2
+    decision = json.loads(ptcc("classify", "day.csv", "spoiled.csv", "--switching", "--json").out)
+    (part,) = decision["components"]
+    assert part["behaviour"] == "depends on the signal" and part["counterexample"]["kind"] == "moving rest state"
+    assert [mode["name"] for mode in decision["modes"]] == ["day", "spoiled"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        ((*BOTH, "--expect", "bipartite-consensus"), 0, "met: bipartite consensus"),
+        ((*BOTH, "--expect", "bipartite-containment"), 0, "met: bipartite containment"),
+        ((*BOTH, "--expect", "stability"), 3, "refuted: stability (held in day, a hears nobody else and keeps"),
+        ((*BOTH, "--expect", "consensus"), 3, "refuted: consensus"),
+        ((*BOTH, "--min-rate", "0.1"), 0, "met: rate >= 0.1"),
+        ((*BOTH, "--min-rate", "100"), 3, "refuted: rate >= 100 (upper bound"),
+        ((*BOTH, "--kappa", "3", "--max-input", "1000"), 0, "met: |u_k| <= 1000"),
+        ((*BOTH, "--kappa", "3", "--max-input", "1"), 3, "it is up to 57.888 at the start, proved"),
+        ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
+        (("day.csv", "spoiled.csv", "--switching", "--min-rate", "1"), 3, "no rate holds for every signal"),
+        (("day.csv", "spoiled.csv", "--switching", "--expect", "bipartite-consensus"), 3, "multiply to -1"),
+        (("day.csv", "spoiled.csv", "--switching", "--signal", "constant"), 4, "no rate is certified"),
+        ((*BOTH, "--signal", "constant"), 0, "certified"),
+    ],
+)
+def test_the_exit_code_agrees_with_what_was_asked(words: tuple[str, ...], code: int, says: str):
+    run = ptcc("certify", *words)
+    assert run.code == code and says in " ".join((run.out + run.err).split()), run
+
+
+def test_a_refuted_expectation_is_one_line_with_the_counterexample():
+    run = ptcc("classify", *BOTH, "--expect", "stability")
+    assert run.code == 3 and run.err == "refuted: stability (held in day, a hears nobody else and keeps its value)\n"
+    assert ptcc("classify", *BOTH, "--expect", "bipartite-consensus").code == 0
+
+
+def test_what_is_not_decided_says_what_to_try_and_writes_nothing():
+    """Rows of 300 agents that agree by a coincidence of weights."""
+    rows = ["left,n1,1,1", "right,n1,2,2"]
+    for k in range(2, 301):
+        rows += [f"n{k - 1},n{k},{k},{k}", f"left,n{k},1,1", f"n{min(k + 1, 300)},n{k},3,3" if k < 300 else ""]
+    rows += [f"{leader},{agent},1,1" for leader in ("left", "right") for agent in ("twin", "other")]
+    Path("many.csv").write_text("\n".join([INTERVALS, *filter(None, rows), "twin,other,0,1", ""]))
+    run = ptcc("classify", "many.csv")
+    assert run.code == 4 and "round the weights" in run.err
+    assert ptcc("classify", "many.csv", "--expect", "stability").code == 3
+    run = ptcc("certify", "many.csv", "-o", "c.json")
+    assert run.code == 4 and "undecided: " in run.out and not Path("c.json").exists()
+
+
+@pytest.mark.parametrize("command", ["plot", "simulate", "design", "explore"])
+def test_commands_about_one_graph_say_so(command: str):
+    needs = ("--max-input", "1", "--initial-bound", "1", "--deadline", "1") if command == "design" else ()
+    for words in (("day.csv", "night.csv"), ("unsure.csv",), ("day.csv", "--switching")):
+        run = ptcc(command, *words, *needs)
+        assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1), run
+        assert re.search(
+            "takes one graph|ptcc classify and certify take|option of ptcc classify, ptcc certify", run.err
+        )
+    if command != "explore":
+        assert f"ptcc {command} takes one graph" in ptcc(command, "s.toml").err
+
+
+def test_pages_and_figures_of_the_certificate_of_a_family_are_refused():
+    assert ptcc("certify", "may_fail.csv", "-o", "c.json").code == 0
+    for words in (("report", "c.json", "-o", "p.html"), ("plot", "c.json")):
+        run = ptcc(*words)
+        assert run.code == 2 and "certificate of a family" in run.err
+
+
+def _rows(*rows: str, header: str = INTERVALS) -> str:
+    return "\n".join([header, *rows, ""])
+
+
+BAD = {
+    "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: its least weight 2 is above"),
+    "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
+    "two signs in one mode": (_rows("a,b,1,2", "a,b,-2,-1"), (), "line 3: second row .* two files \\(modes\\), or one"),
+    "one end": (_rows("a,b,1", header="source,target,weight_min"), (), "one end of the intervals"),
+    "no number": (_rows("a,b,1,x"), (), 'line 2: edge a -> b: "x" is not a number'),
+    "empty end": (_rows("a,b,,2"), (), "line 2: edge a -> b"),
+    "not finite": (_rows("a,b,nan,2"), (), "not a finite number"),
+    "no weight": (_rows("a,b,yes", header="source,target,optional"), (), "names no weight"),
+    "answer": (
+        _rows("a,b,1,perhaps", header="source,target,weight,optional"),
+        (),
+        "optional is perhaps; write yes or no",
+    ),
+    "loop": (_rows("a,a,1,2"), (), "self-loop at node a"),
+    "no source": (_rows(",b,1,2"), (), "the source is empty"),
+    "no rows": (_rows(), (), "bad.csv: no edge and no node"),
+    "sum of intervals": (_rows("a,b,1,2"), ("--duplicates", "sum"), "neither merged nor dropped"),
+    "interval and share": (_rows("a,b,1,2"), ("--uncertainty", "1%"), "gives intervals itself"),
+    "other nodes": ("a,b,1", ("day.csv", "--switching"), "mode bad has no node c, which another mode has"),
+    "not switching": ("a,b,1", ("day.csv",), "2 graphs; add --switching"),
+    "more than all": ("a,b,1", ("--uncertainty", "150%"), "uncertainty 150% is not from 0 to 1"),
+    "percent": ("a,b,1", ("--uncertainty", "10"), "write 10% if it is one"),
+    "no share": ("a,b,1", ("--uncertainty", "much"), '"much" is not a number'),
+    "no edge": ("a,b,1", ("--optional", "a"), "--optional: a is no edge; write SOURCE,TARGET"),
+    "unknown edge": ("a,b,1", ("--optional", "b,a"), "optional edge b -> a is in no file"),
+    "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
+    "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
+    "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
+    "sliding mode": (_rows("a,b,1,2"), ("--protocol", "sliding-mode"), "nominal protocol alone"),
+    "no deadline": (_rows("a,b,1,2"), ("--rho2", "0"), "rho2 = 0 gives no deadline"),
+    "another length": (_rows("a,b,1,2"), ("--x0", "1,2,3"), "3 values for 2 nodes"),
+    **{
+        f"option {flag}": (
+            _rows("a,b,1,2"),
+            (flag, *value),
+            f"{flag}:? (is for one graph, not for families|belongs to)",
+        )
+        for flag, *value in (
+            *(("--gain-cap", "5"), ("--stop-before", "0.1"), ("--sample-period", "0.1"), ("--noise", "1")),
+            *(("--delta", "1"), ("--method", "paper"), ("--at", "0.5"), ("--initial-bound", "1"), ("--sigma0", "1")),
+            *(("--simulation",), ("--disturbance", "none")),
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_family_that_is_none_is_refused_in_one_line(name: str):
+    text, words, says = BAD[name]
+    Path("bad.csv").write_text(text)
+    run = ptcc("certify", "bad.csv", *words, "-o", "c.json")
+    assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1), run
+    assert re.search(says, run.err), run.err
+    assert not Path("c.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("file = []", "s.toml: [graph] file: names no graph"),
+        ("file = [1]", "s.toml: [graph] file: write a list of texts"),
+        ('file = ["day.csv", "nowhere.csv"]', "[graph] file: nowhere.csv: no such file"),
+        ('file = "day.csv"\nuncertainty = 3', "s.toml: [graph] uncertainty: uncertainty 3 is not from 0 to 1"),
+        ('file = "day.csv"\nuncertainty = true', "s.toml: [graph] uncertainty: write a text"),
+        ('file = "day.csv"\noptional = ["a;b"]', "s.toml: [graph] optional: a;b is no edge"),
+        ('file = "day.csv"\noptional = [1]', "s.toml: [graph] optional: write a list of texts"),
+        ('file = "day.csv"\nsignal = "now"', "s.toml: [graph] signal: 'now' is not one of"),
+        ('file = "unsure.csv"\n[limits]\ngain_cap = 5', "s.toml: [limits] gain_cap: is for one graph"),
+    ],
+)
+def test_what_is_wrong_with_the_family_of_a_scenario_is_told_by_its_key(text: str, says: str):
+    Path("s.toml").write_text(f"[graph]\n{text}\n")
+    run = ptcc("certify", "s.toml")
+    assert run.code == 2 and says in run.err and len(run.err.splitlines()) == 1, run
+
+
+def test_what_new_writes_tells_of_families():
+    text = ptcc("new").out
+    assert "# uncertainty = " in text and '["day.csv", "night.csv"]' in text
+
+
+def test_modes_are_called_by_their_files():
+    assert [mode.name for mode in read_family(["day.csv", "night.csv"]).modes] == ["day", "night"]
+    assert "day, night: 2 modes" in ptcc("classify", *BOTH).out

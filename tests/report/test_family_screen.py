@@ -1,0 +1,181 @@
+"""The screens of families: few lines of 80 columns whatever the family, and a verdict the exit code agrees with."""
+
+from __future__ import annotations
+
+import random
+import re
+from fractions import Fraction
+
+import pytest
+from families import KINDS, random_family
+from rich.cells import cell_len
+
+import ptcc_certify as ptcc
+from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.family_verdict import first_input
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.report.family_screen import (
+    decision_lines,
+    decision_summary,
+    family_lines,
+    family_summary,
+    groups_text,
+)
+from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
+
+PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+LONG = "agent number {} of a rather long list of agents"
+BEHAVIOURS = ("stability", "bipartite consensus", "interval bipartite consensus", "bipartite containment")
+
+
+def renamed(family: Family, name: str) -> Family:
+    """Return the family with other names of nodes and modes."""
+    labels = tuple(name.format(k) for k in range(family.n_nodes))
+    fields = ("source", "target", "sign", "lower", "upper")
+    modes = (Mode(labels, *(getattr(m, f) for f in fields), name.format(m.name), m.tied) for m in family.modes)
+    return Family(tuple(modes), family.notes)
+
+
+def assert_fits(lines: list[str], most: int) -> None:
+    assert len(lines) <= most, "\n".join(lines)
+    for line in lines:
+        assert cell_len(line) <= 80 and line.isprintable() and line == line.rstrip(), line
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_decision_of_any_family_fits_the_screen(kind: str):
+    rng = random.Random(KINDS.index(kind))
+    for case in range(12):
+        family = random_family(rng, kind).family
+        family = renamed(family, LONG) if case % 3 == 0 else family
+        for signal in ("any", "constant"):
+            components = ptcc.decide(family, signal)
+            lines = decision_summary(components, family, "g.csv", "row a,b: information flows a -> b; undirected")
+            assert_fits(lines, 12)
+            told = decision_lines(components, family, "g.csv")
+            assert len(components) > 1 or sum(line.startswith("claim") for line in told) == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_certificate_of_any_family_fits_the_screen(kind: str):
+    rng = random.Random(10 + KINDS.index(kind))
+    family = random_family(rng, kind, nodes=3).family
+    family = renamed(family, LONG) if KINDS.index(kind) % 2 else family
+    cert = certify_family(family, PROTOCOL, "random", time_limit=3)
+    lines = family_summary(cert, "g.csv", {"read": "row a,b: information flows a -> b"})
+    assert_fits(lines, 13)
+    (verdict,) = (line for line in lines if line.startswith("verdict"))
+    assert re.match("verdict    certified" if cert.verdict == "certified" else "verdict    undecided", verdict)
+    assert cert.summary().splitlines()[-1] == lines[-1]
+    assert family_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
+
+
+def test_every_refutation_is_told_in_words():
+    """Each names agents or modes, and never an index or an internal kind."""
+    rng, kinds = random.Random(5), set()
+    for _ in range(80):
+        family = random_family(rng, rng.choice(KINDS)).family
+        for signal in ("any", "constant"):
+            for component in ptcc.decide(family, signal):
+                for behaviour in BEHAVIOURS:
+                    if (why := component.refutation(behaviour)) is not None:
+                        kinds.add(why.kind)
+                        text = counterexample_text(component, why)
+                        assert any(
+                            name in text for name in (*component.family.labels, "leader group", "mode ", "the graph")
+                        ), text
+                        assert "Fraction" not in text and "  " not in text and text == text.strip()
+    assert len(kinds) == 6
+
+
+def test_groups_are_told_once_each():
+    """Of every agent it is told that it agrees, ends at 0, follows, or that no limit is claimed."""
+    rng = random.Random(3)
+    for _ in range(80):
+        for component in ptcc.decide(random_family(rng, "depends").family):
+            if component.behaviour == "depends on the signal":
+                assert_once(component, groups_text(component))
+
+
+def assert_once(component: FamilyComponent, text: str) -> None:
+    words = re.findall(r"n\d+", text)
+    assert len(words) == len(set(words))
+    assert set(words) == set(component.family.labels) or "in all" in text, text
+
+
+def test_a_wish_is_refuted_by_an_input_that_some_member_has_at_the_start():
+    """The largest first input is that of a vertex: no member of a random family exceeds it, and one attains it."""
+    rng = random.Random(1)
+    for _ in range(25):
+        family = random_family(rng, "any", nodes=3).family
+        x = [Fraction(rng.randint(-5, 5)) for _ in range(3)]
+        certificate = _shell(family, tuple(x))
+        largest = first_input(certificate)
+        assert largest == max(_member_input(mode, x, rng) for mode in family.modes) * PROTOCOL.gain.first
+
+
+def _shell(family: Family, x: tuple[Fraction, ...]) -> FamilyCertificate:
+    return FamilyCertificate(family, PROTOCOL, (), x)
+
+
+def _member_input(mode: Mode, x: list[Fraction], rng: random.Random) -> Fraction:
+    """Return the largest ``|(L x)_k|`` over the vertices of a mode, each agent by itself."""
+    best = Fraction(0)
+    for k in range(len(mode.labels)):
+        into = [e for e in range(mode.n_edges) if mode.target[e] == k]
+        for mask in range(2 ** len(into)):
+            on = [e for j, e in enumerate(into) if mask >> j & 1]
+            if len({int(mode.source[e]) for e in on}) == len(on):  # of two signs on a pair one is on
+                terms = (
+                    (mode.upper if e in on else mode.lower).fraction(e) * (x[k] - int(mode.sign[e]) * x[mode.source[e]])
+                    for e in into
+                )
+                best = max(best, abs(sum(terms, Fraction(0))))
+    return best
+
+
+def test_consensus_is_called_by_its_sharpest_name():
+    undirected = ptcc.decide(Family.from_intervals([("a", "b", 1, 2), ("b", "c", -2, -1)], undirected=True))
+    positive = ptcc.decide([("a", "b", 1, 2), ("b", "a", 0, 1)])
+    lines = [decision_summary(parts, parts[0].family, "g")[1] for parts in (undirected, positive)]
+    assert lines[0].startswith("claim      signed-average consensus for every signal")
+    assert lines[1].startswith("claim      consensus for every signal")
+
+
+def test_python_takes_a_family_in_many_forms():
+    day, night = ptcc.as_graph([("a", "b", 1), ("b", "a", 1)]), ptcc.as_graph([("a", "b", 2), ("b", "a", 3)])
+    forms = [{"day": day, "night": night}, [day, night], Family.switching({"day": day, "night": night})]
+    made = {ptcc.certify(form, PROTOCOL) for form in forms}
+    assert all(repr(one) == repr(next(iter(made))) for one in made)
+    asked = ptcc.certify(forms[0], PROTOCOL, [1, 2], expectations=Expectations("stability"))
+    assert asked.assessment.asked == "refuted" and int(asked.assessment.exit_code) == 3
+    known = ptcc.certify(Family.from_graph(day), PROTOCOL, simulation=False)
+    assert isinstance(known, ptcc.Certificate)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (
+            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, delta=1),
+            "delta is not for families",
+        ),
+        (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", method="lmi"), "method is not for families"),
+        (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty=3), "not from 0 to 1"),
+        (lambda: ptcc.certify({}, PROTOCOL), "at least one mode"),
+        (lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), 5), "protocol = 5 is none"),
+        (lambda: ptcc.decide("fig1a", "sometimes"), 'signals are "any" or "constant", not "sometimes"'),
+        (lambda: ptcc.as_family(Family.from_intervals([("a", "b", 1, 2)]), uncertainty=0.1), "leave out uncertainty"),
+        (lambda: Family.from_graph([("a", "b", 1)]), "is no SignedDigraph"),
+        (
+            lambda: ptcc.simulate(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, [1, 2]),
+            "is several graphs, and one",
+        ),
+    ],
+)
+def test_a_call_that_does_not_fit_a_family_is_one_line(call, says: str):
+    with pytest.raises(ptcc.PTCCError, match=re.escape(says)) as refused:
+        call()
+    assert "\n" not in str(refused.value)
