@@ -114,6 +114,8 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     items = entries(entry["parts"], "parts of a function")
     need(len(items) <= MANY_FUNCTIONS, "too many parts of a function")
     parts = [_part(doc, family, component, item, f"{of}.parts[{j}]") for j, item in enumerate(items)]
+    same = all(type(x := item["function"]["component"]) is int and x == entry["component"] for item in items)
+    need(same, "a part of another component")
     led = [v for part in parts for v in part.bounds]
     need(len(led) == len(set(led)), "parts of a function share an agent")
     resting = set(component.pivots.values()).difference(led)
