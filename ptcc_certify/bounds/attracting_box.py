@@ -134,16 +134,23 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     -------
     AttractingBox
 
+    Raises
+    ------
+    ValueError
+        Other agents than these have intervals, or the vector of ``decay`` proves no rate here.
+
     Examples
     --------
     >>> from ptcc_certify.lyapunov.family_rows import follower_decay
-    >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
+    >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)], nodes="abc")
     >>> ends = {0: (Fraction(0), Fraction(0)), 1: (Fraction(4), Fraction(4))}
     >>> box = attracting_box(family, follower_decay(family), ends)
     >>> round(float(box.lower[0]), 9), round(float(box.upper[0]), 9)
     (1.0, 2.0)
     """
     nodes, d = decay.nodes, decay.vector
+    if sorted(intervals) != np.setdiff1d(np.arange(family.n_nodes), nodes).tolist():
+        raise ValueError("give the intervals of all agents that are no followers, and of no others")
     rows = IntervalRows.of(family.modes, nodes)
     lifted = rows.lifted()
     unit, z = _outside(intervals)
