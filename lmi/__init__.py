@@ -20,7 +20,6 @@ _MODULES = {
     "joint_block_search": "CoupledCertificate FixedLeader FreeLeader coupled_lyapunov",
     "diagonal": "diagonal_lyapunov diagonal_rate_limit h_matrix_lyapunov rate_frontier refute_diagonal_lyapunov",
     "full": "FullCertificate full_frontier",
-    "common": "CommonCertificate UncertainMatrix common_lyapunov least_condition",
     "schur_coupling": "Coupling RhoInterval couple_blocks schur_positive_definite",
     "definiteness_proofs": "DefinitenessProof ResidualWitness definite_by_polynomial "
     "no_diagonal_rate_above prove_generalized_margin prove_margin prove_positive_definite",

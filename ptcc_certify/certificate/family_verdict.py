@@ -7,21 +7,17 @@ state, of the norm that decays.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: What to try where edges do not tell whether rest states agree.
 NEXT_STEP = (
@@ -30,7 +26,7 @@ NEXT_STEP = (
 )
 
 
-def assess_family(certificate: FamilyCertificate) -> Assessment:
+def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Assessment:
     """Return the graded verdict of a family's certificate, and of what was expected of it.
 
     Examples
@@ -45,8 +41,7 @@ def assess_family(certificate: FamilyCertificate) -> Assessment:
     answers = [] if asked.behaviour is None else [judge_family_behaviour(components, asked.behaviour)]
     answers += [] if asked.min_rate is None else [_judge_rate(certificate, asked.min_rate)]
     answers += [] if asked.max_input is None else [_judge_input(certificate, asked.max_input)]
-    if certificate.verdict != CERTIFIED:
-        report = certificate.checked
+    if report is None or not report.accepted:
         why = (
             NEXT_STEP if report is None else f"the independent check does not accept {report.rejected}: {report.reason}"
         )
@@ -80,7 +75,7 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
     return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
 
 
-def _judge_rate(certificate: FamilyCertificate, least: Fraction) -> Answer:
+def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
@@ -93,7 +88,7 @@ def _judge_rate(certificate: FamilyCertificate, least: Fraction) -> Answer:
     return Answer(OPEN, what, reason if bound is None else f"{reason}, at most {up(bound, 8)} can be")
 
 
-def _judge_input(certificate: FamilyCertificate, most: Fraction) -> Answer:
+def _judge_input(certificate: FamilyContent, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
     if peaks is not None and max(peaks) <= most:
@@ -103,7 +98,7 @@ def _judge_input(certificate: FamilyCertificate, most: Fraction) -> Answer:
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
 
 
-def first_input(certificate: FamilyCertificate) -> Fraction:
+def first_input(certificate: FamilyContent) -> Fraction:
     """Return the largest ``|u_k(0)|`` over all signals and agents: that of some member."""
     assert certificate.initial_state is not None
     rows = (row for mode in certificate.family.modes for row in _first_rows(mode, certificate.initial_state).values())
@@ -127,7 +122,7 @@ def _first_rows(mode: Mode, x: Sequence[Fraction]) -> Mapping[int, tuple[Fractio
     return sums
 
 
-def _usefulness(certificate: FamilyCertificate) -> bool | None:
+def _usefulness(certificate: FamilyContent) -> bool | None:
     """Tell whether the bound leaves at most 1 % at 0.99 T; None where no state is approached by every signal."""
     if not certificate.common:
         return None

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lmi.exact.numbers import longest
+from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
@@ -24,14 +25,11 @@ from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
-if TYPE_CHECKING:
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
-
 #: Bits of the middles and radii of final states, which are rounded outwards.
 _BITS = 64
 
 
-def family_document(certificate: FamilyCertificate, files: bool = False) -> tuple[dict[str, Any], Writer]:
+def family_document(certificate: FamilyContent, files: bool = False) -> tuple[dict[str, Any], Writer]:
     """Return a certificate of a family as JSON-ready data, and what holds its side files."""
     out = Writer(certificate.family.labels, files)
     family, parts = certificate.family, certificate.parts
@@ -83,7 +81,7 @@ def _enclosed(low: Fraction, high: Fraction) -> Any:
 
 
 def _proof(
-    certificate: FamilyCertificate,
+    certificate: FamilyContent,
     components: Sequence[FamilyComponent],
     functions: Sequence[tuple[int, Any]],
 ) -> list[dict[str, Any]]:
@@ -102,7 +100,7 @@ def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, 
     return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers, "witness": witness}
 
 
-def _unverified(certificate: FamilyCertificate) -> dict[str, Any]:
+def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     expectations = certificate.expectations
     bounds = [part.upper_bound for part in certificate.parts]
     return {

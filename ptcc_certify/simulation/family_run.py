@@ -238,8 +238,16 @@ def simulate_family(
     signal : Signal, str, path, file object or sequence of rows
         ``"random"``, ``"worst-case"``, a table of instants and modes, or a
         :class:`~ptcc_certify.simulation.signals.Signal`: see :func:`~ptcc_certify.simulation.signals.as_signal`.
-    times, remaining, samples, past, rtol, atol
-        As for :func:`ptcc_certify.simulate`.
+    times : increasing numbers >= 0, optional
+        The instants wanted, in units of time.
+    remaining : float
+        Without ``times``: instants go from ``1 - t/T = 1`` to this; dimensionless.
+    samples : int
+        Without ``times``: so many of these instants; see :func:`ptcc_certify.simulate`.
+    past : float
+        Without ``times``: go on to ``T (1 + past)``; dimensionless.
+    rtol, atol : float
+        Tolerances of CVODES; ``atol`` is relative to the largest entry of ``x0``.
 
     Returns
     -------

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import lmi
-from lmi import UncertainMatrix, common_lyapunov, least_condition
 from lmi.child_process import apart
-from lmi.common import best_multipliers, evaluate
+from lmi.common import UncertainMatrix, best_multipliers, common_lyapunov, evaluate, least_condition
 
 
 def uncertain(rng, n=3, q=3):
