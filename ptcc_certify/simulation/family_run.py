@@ -265,7 +265,7 @@ def simulate_family(
 
     References
     ----------
-    docs/theory/families.md, "What may change".
+    The network (3) under the protocol (4) of [Zhu]_; docs/theory/families.md, "What may change".
 
     Examples
     --------
