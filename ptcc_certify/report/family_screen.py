@@ -12,7 +12,6 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -323,7 +322,7 @@ def _function_entries(certificate: FamilyCertificate) -> Lines:
     for part in certificate.parts:
         names = [mode_name(certificate.family, k) for k in range(len(certificate.family.modes))]
         for V in part.functions:
-            own = V.rates if isinstance(V, FamilyFunction) and len(names) > 1 else ()
+            own = getattr(V, "rates", ()) if len(names) > 1 else ()  # functions of rows have one rate
             rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
             alone = f"; of each mode: {rates}" * bool(own)
             yield "function", f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
