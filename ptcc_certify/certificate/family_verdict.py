@@ -16,7 +16,7 @@ from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.theorems.counterexample_text import counterexample_text
-from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation
 
 #: What to try where edges do not tell whether rest states agree.
@@ -80,8 +80,10 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
         return Answer(MET, what)
-    if not certificate.common:
+    if any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
+    if not certificate.common:
+        return Answer(OPEN, what, "whether rest states agree is not decided")
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"

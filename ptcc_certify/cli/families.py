@@ -178,7 +178,10 @@ def certify_family(
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
+    if options["signal"] == "constant" and (most is not None or options["min_rate"] is not None):
+        raise ParameterError("--min-rate and --max-input are judged for --signal any; leave them out with constant")
     protocol = shared.protocol_of(options)
+    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
     if options["signal"] == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
         _show_decision(graphs, family, left, as_json, screen, options)
@@ -189,7 +192,6 @@ def certify_family(
             "undecided: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True
         )
         return code or ExitCode.UNDECIDED
-    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     name, read = _names(graphs, family, options)
     drawn = {"x(0)": f"random, seed {options['seed']}"} if options["x0"] == "random" else {}
     asked = Expectations(options["expect"], options["min_rate"], most)
@@ -228,7 +230,9 @@ def refuse_options(options: shared.Options) -> None:
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
     """Return what constant signals do where it does not follow from what all signals do; nothing where it does."""
-    follows = all(one.behaviour == other.behaviour for one, other in zip(constant, every, strict=True))
+    from ptcc_certify.theorems.family_behaviour import DEPENDS
+
+    follows = all(one.behaviour == other.behaviour != DEPENDS for one, other in zip(constant, every, strict=True))
     return () if follows else constant
 
 

@@ -255,8 +255,9 @@ def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
 
 def _alone(mode: Mode) -> str:
     """Tell what a mode does if no other one acts."""
-    found = dict.fromkeys(sharpest(component) for component in decide(Family((mode,))))
-    return ", ".join(found)
+    components = decide(Family((mode,)))
+    text = ", ".join(dict.fromkeys(map(sharpest, components)))
+    return text if len(components) == 1 else f"{len(components)} separate parts, each by itself: {text}"
 
 
 def groups_text(component: FamilyComponent) -> str:
@@ -380,7 +381,7 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         return
     if not certificate.bounded:
         if not certificate.common:
-            yield "INPUT", "no bound holds for every signal: a switch near T may meet any gain"
+            yield "INPUT", "no bound for all signals and x(0): a switch near T may meet any gain"
         elif certificate.unbounded:
             yield "INPUT", "NOT BOUNDED for some signal from some initial states"
         else:

@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from ptcc_certify.errors import GraphError
+from ptcc_certify.errors import GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.io import as_family, read_family
 from tests.families import KINDS, random_family
 
 GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
@@ -106,3 +107,18 @@ def test_undirected_edges_are_one_parameter_for_both_directions():
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "c", 3, 3)], undirected=True)
     assert family.modes[0].parameters.size == 1
     assert family.modes[0].n_edges == 4
+
+
+def test_no_file_takes_the_place_of_another_of_the_same_name(tmp_path):
+    paths = [tmp_path / folder / name for folder, name in (("1", "net.csv"), ("2", "net (3).csv"), ("3", "net.csv"))]
+    for k, path in enumerate(paths, 1):
+        path.parent.mkdir()
+        path.write_text(f"a,b,{k}\n")
+    family = read_family(paths)
+    assert [mode.edge_interval(0)[0] for mode in family.modes] == [1, 2, 3]
+    assert len({mode.name for mode in family.modes}) == 3
+
+
+def test_intervals_take_no_uncertainty_besides():
+    with pytest.raises(ParameterError, match="give intervals themselves"):
+        as_family([("a", "b", 1, 2)], uncertainty="50%")

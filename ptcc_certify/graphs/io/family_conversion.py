@@ -15,6 +15,9 @@ from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 
+#: Of weights in intervals.
+_TWICE = "the edges give intervals themselves; leave out the uncertainty"
+
 
 def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any = 0) -> Family:
     """Return the family of signed digraphs that a user holds, in whatever form.
@@ -113,7 +116,10 @@ def _is_list_of_graphs(held: Any) -> bool:
 def _interval_edges(held: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
     """Return the edges of a DataFrame with intervals, or of a list of edges with four entries; None of others."""
     if isinstance(held, list | tuple):
-        return [*held] if held and all(isinstance(row, tuple) and len(row) == 4 for row in held) else None
+        intervals = bool(held) and all(isinstance(row, tuple) and len(row) == 4 for row in held)
+        if intervals and read_share(uncertainty):
+            raise ParameterError(_TWICE)
+        return [*held] if intervals else None
     if not hasattr(held, "columns") or not hasattr(held, "to_numpy"):
         return None
     names = [str(name) for name in held.columns]
@@ -121,6 +127,8 @@ def _interval_edges(held: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any
     ends = edge_columns(names, "the DataFrame")
     if ends is None or (low, high, may_fail) == (None, None, None):
         return None
+    if low is not None and read_share(uncertainty):
+        raise ParameterError(_TWICE)
     weights = (low, high) if low is not None else (ends[2], ends[2])
     if None in weights:
         raise GraphError("the DataFrame names no weight; name a column weight, or weight_min and weight_max")

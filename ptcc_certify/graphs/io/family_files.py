@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -81,8 +82,10 @@ def read_family(
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
         rows = _interval_rows(path, orientation or "information", share)
-        name = Path(str(path)).name.partition(".")[0] if isinstance(path, str | Path) else str(number)
-        name = name if name not in named else f"{name} ({number})"
+        name = stem = Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
+        again = number
+        while name in named:  # no mode may take the place of another
+            name, again = f"{stem} ({again})", again + 1
         if rows is not None:
             if options.get("duplicates", "refuse") != "refuse" or options.get("drop_self_loops"):
                 raise ParameterError("rows with intervals are neither merged nor dropped; mend them in the file")
