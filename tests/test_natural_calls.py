@@ -96,7 +96,7 @@ NETWORK_SCIENTIST = {
     "ptcc.simulate(G, p, pd.Series({'eve': 1, 'bob': 2, 'ann': 3}), times=[0, 1]).states[:, 0]": "[3. 2. 1.]",
     "ptcc.final_state(G, pd.Series([1, 2, 3]))": "ParameterError: the initial state x0: no value for ann, bob, eve",
     "cert.final_state['ann']": "8/3",
-    "cert.final_state['joe']": "ParameterError: no agent is called 'joe'; there are ann, bob, eve",
+    "cert.final_state['joe']": "UnknownAgentError: no agent is called 'joe'; there are ann, bob, eve",
     "dict(cert.final_state)": "{'ann': Fraction(8, 3)",
     "cert.final_state.to_pandas()": "ann ",
     "cert.trajectory.to_pandas().columns": "'ann', 'bob', 'eve'",
@@ -131,6 +131,8 @@ ENGINEER = {
 }
 STUDENT = {
     "ptcc.certify('fig1b', p, 'random', **fast)": "Certificate(bipartite consensus",
+    "pd.Series(cert.final_state).index.tolist()": "['ann', 'bob', 'eve']",
+    "'joe' in cert.final_state, cert.final_state.get('joe')": "(False, None)",
     "ptcc.certify('fig1b', p, '5,2,-4,3,-2,1', **fast).final_state": "FinalState(1=",
     "ptcc.certify('fig9', p)": "FormatError: fig9: no such file, and no packaged graph (fig1a, fig1b",
     "ptcc.certify(None, p)": "GraphError: None is not read as a graph; give a SignedDigraph, a path",

@@ -480,7 +480,7 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
         yield f"reaching times {reaching}, the last {when} (agent {run.labels[last]}); {ratio}"
     if certificate.final_state is not None:
-        gap = float(abs(run.final_state - certificate.final_state.values).max())
+        gap = float(abs(run.final_state - certificate.final_state).max())
         remark = "" if run.deadline_resolved else " (the run had not settled)"
         yield f"end state within {gap:.1e} of the final state{remark}"
 

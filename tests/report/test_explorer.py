@@ -132,9 +132,7 @@ def test_gains_move_the_bound_and_leave_the_rate(explorer: Explorer, name: str, 
 def test_the_seed_decides_the_initial_state_and_with_it_the_final_state(explorer: Explorer):
     start = np.random.default_rng(7).integers(-9, 10, size=6).tolist()
     final_state = ptcc.final_state(ptcc.analyse(load_graph("fig3a")), start)
-    ends = ", ".join(
-        f"{label}={value:.5g}" for label, value in zip(final_state.labels, final_state.values, strict=True)
-    )
+    ends = ", ".join(f"{label}={float(value):.5g}" for label, value in final_state.items())
     assert explorer.preview(Settings(seed=7)).facts["x(T)"] == f"{ends} (exact)"
 
 

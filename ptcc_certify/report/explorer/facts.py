@@ -70,7 +70,7 @@ def _final_state(certificate: Certificate) -> str:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return NOTHING
-    pairs = [f"{shorten(label, 12)}={value:.5g}" for label, value in zip(labels, result.values, strict=True)]
+    pairs = [f"{shorten(label, 12)}={value:.5g}" for label, value in zip(labels, np.asarray(result), strict=True)]
     more = f", ... ({len(pairs)} in all)" if len(pairs) > _LABELS_SHOWN else ""
     kind = "exact" if result.exact else "to 5 digits"
     return f"{', '.join(pairs[:_LABELS_SHOWN])}{more} ({kind})"
