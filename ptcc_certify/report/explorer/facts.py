@@ -76,7 +76,7 @@ def _final_state(certificate: Certificate) -> str:
     more = f", ... ({len(pairs)} in all)" if len(pairs) > _LABELS_SHOWN else ""
     exact = result.exact and all(Fraction(value) == x for value, x in zip(values, result.states, strict=True))
     kind = "exact" if exact else "to 5 digits"
-    return f"{', '.join(pairs[:_LABELS_SHOWN])}{more} ({kind})"
+    return f"{kind}: {', '.join(pairs[:_LABELS_SHOWN])}{more}"
 
 
 def _error(certificate: Certificate) -> str:
