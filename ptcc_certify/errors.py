@@ -100,6 +100,19 @@ class ParameterError(PTCCError, ValueError):
     """
 
 
+class UnknownAgentError(ParameterError, KeyError):
+    """No agent has this label.
+
+    Examples
+    --------
+    >>> final_state([("a", "b", -1)], [3, 5])["c"]
+    Traceback (most recent call last):
+    ptcc_certify.errors.UnknownAgentError: no agent is called 'c'; there are a, b
+    """
+
+    __str__ = Exception.__str__  # a KeyError would quote the message
+
+
 class HypothesisError(PTCCError, ValueError):
     """A theorem or lemma is asked about a graph or matrix that does not meet its hypotheses.
 

@@ -204,7 +204,7 @@ def _columns(certificate: Certificate) -> Row:
         "diagonal_rate": _down(certificate.diagonal_rate),
         "input_bounded": None if effort is None else effort.bounded,
         "peak_input": None if effort is None or effort.peak is None else _up(Fraction(effort.peak.largest)),
-        "largest_final_state": None if result is None else _finite(float(np.abs(result.values).max())),
+        "largest_final_state": None if result is None else _finite(float(np.abs(np.asarray(result)).max())),
         "degenerate": None if result is None else bool(result.degenerate),
         "reaching_time": None if reaching is None else max(r.time for r in reaching),
         "worst_ratio": None if comparison is None else _finite(comparison.worst_ratio),

@@ -16,7 +16,7 @@ the certificate forms them exactly.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -291,8 +291,8 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
 
 
 @dataclass(frozen=True)
-class FinalState:
-    """The state at the deadline and after.
+class FinalState(Mapping[str, Number]):
+    """The state at the deadline and after: a mapping from labels to states; ``numpy.asarray`` rounds it to floats.
 
     Attributes
     ----------
@@ -341,12 +341,14 @@ class FinalState:
         return tuple(zip((Fraction(x) for x in self.states), radius, strict=True))
 
     @cached_property
-    def values(self) -> np.ndarray:
-        """(N,) float64 array: ``states``, rounded."""
-        return np.array([float(x) for x in self.states])
+    def _by_label(self) -> dict[str, Number]:
+        return dict(zip(self.labels, self.states, strict=True))
 
     def __getitem__(self, label: Hashable) -> Number:
-        return self.states[position(label, self.labels)]
+        try:
+            return self._by_label[str(label)]
+        except KeyError:
+            return self.states[position(label, self.labels)]
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -355,14 +357,10 @@ class FinalState:
         return iter(self.labels)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.values, dtype=dtype)
-
-    def keys(self) -> tuple[str, ...]:
-        """Return the labels, so that ``dict(final_state)`` has the states by label."""
-        return self.labels
+        return np.array([float(x) for x in self.states], dtype=dtype)
 
     def to_pandas(self) -> pd.Series:
-        """Return ``values`` as a Series by label.
+        """Return the states, rounded to floats, as a Series by label.
 
         Raises
         ------
@@ -374,7 +372,7 @@ class FinalState:
         >>> final_state([("a", "b", -1)], [3, 5]).to_pandas().to_dict()
         {'a': 3.0, 'b': -3.0}
         """
-        return series(self.values, self.labels, "final state")
+        return series(np.asarray(self), self.labels, "final state")
 
     def __repr__(self) -> str:
         entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])

@@ -87,7 +87,7 @@ class Certificate(Content, Shown):
     proof : RateProof
         The proved rate of the paper's function (None if not proved) and the statements proved for it.
     searched_functions : tuple of LyapunovFunction
-        Sharper ones of the classes that ``method`` names, proved.
+        Better ones, of the classes that ``method`` names, proved.
     limit : RateBound or None
         The proved upper bound on the decay rate, and what proves it; None if no agent listens to another.
     final_state : FinalState or None

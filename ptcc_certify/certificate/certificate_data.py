@@ -235,7 +235,7 @@ class Content:
 
     @property
     def search(self) -> Search:
-        """Sharper Lyapunov functions than the paper's, proved, and what else was searched."""
+        """Better Lyapunov functions than the paper's, proved, and what else was searched."""
         return replace(self.observed.search, functions=self.searched_functions)
 
     # ------------------------------------------------------------------ claims
@@ -364,7 +364,7 @@ class Content:
         """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
         if self.initial_state is None or self.final_state is None:
             return None
-        return float(np.abs(np.array([float(x) for x in self.initial_state]) - self.final_state.values).max())
+        return float(np.abs(np.array([float(x) for x in self.initial_state]) - np.asarray(self.final_state)).max())
 
     @cached_property
     def envelope(self) -> Envelope:

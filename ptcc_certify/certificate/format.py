@@ -299,7 +299,10 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any],
         pairs = list(zip(final_state.states, final_state.radius, strict=True))
         if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
             radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
-            final = {"mid": out.vector("mid", final_state.values), "radius": out.vector("radius", np.array(radius))}
+            final = {
+                "mid": out.vector("mid", np.asarray(final_state)),
+                "radius": out.vector("radius", np.array(radius)),
+            }
         else:
             final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
     groups = []
@@ -409,7 +412,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
     residual = {str(1 - q if q > 1e-3 else f"1-{q:g}"): q for q in remaining}
     floats = None
     if content.final_state is not None and not content.final_state.exact:
-        floats = dict(zip(content.graph.labels, map(finite, content.final_state.values.tolist()), strict=True))
+        floats = dict(zip(content.graph.labels, map(finite, np.asarray(content.final_state).tolist()), strict=True))
     return {
         "spectral": finite(content.spectral_rate),
         "optimality_ratio": content.optimality_ratio,

@@ -377,7 +377,7 @@ class Case:
         if result is None and first is not None:
             result = final_state(structure, first, matrix=matrix)
         if run is not None and result is not None:
-            gap = float(np.abs(run.final_state - result.values).max())
+            gap = float(np.abs(run.final_state - np.asarray(result)).max())
             if gap > SETTLED * max(float(max(map(abs, (*(x0 or ()), *sigma0)))), 1e-300):
                 self.notes.append(
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"

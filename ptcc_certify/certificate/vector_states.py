@@ -69,7 +69,7 @@ class VectorCertificate:
     @property
     def final_state(self) -> np.ndarray:
         """(N, S) float64 array; the exact one of component j is ``components[j].final_state``."""
-        return np.column_stack([one.final_state.values for one in self.components if one.final_state is not None])
+        return np.column_stack([np.asarray(one.final_state) for one in self.components if one.final_state is not None])
 
     @property
     def peak_input(self) -> np.ndarray | None:

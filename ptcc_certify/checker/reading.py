@@ -60,7 +60,7 @@ def read(path: str | Path) -> dict[str, Any]:
             content = file.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")
         loaded = loaded_bytes(content, text)
         if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
             tenths = -(-loaded // 10**8)

@@ -92,7 +92,9 @@ class _Commands(click.Group):
                 raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
             flag, others = error.option_name, self.commands.items()
             if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
-                raise
+                options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
+                hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike
+                raise click.UsageError(error.message + hint) from None
             raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}") from None
 
 

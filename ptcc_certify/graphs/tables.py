@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, UnknownAgentError
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ def position(label: Hashable, labels: Sequence[str]) -> int:
 
     Raises
     ------
-    ParameterError
+    UnknownAgentError
         No agent is called so.
 
     Examples
@@ -26,7 +26,7 @@ def position(label: Hashable, labels: Sequence[str]) -> int:
     1
     """
     if str(label) not in labels:
-        raise ParameterError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}")
+        raise UnknownAgentError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}")
     return labels.index(str(label))
 
 

@@ -223,7 +223,7 @@ def _distributions(saved: Certificate) -> dict[str, Any]:
     if saved.graph.n_nodes <= DRAWN_NODES:
         return {}
     ends = {} if saved.final_state is None else {"final": plot_final_states(saved).figure}
-    return ends | {"degrees": plot_degrees(saved.graph).figure}
+    return ends | ({"degrees": plot_degrees(saved.graph).figure} if saved.graph.n_edges else {})
 
 
 def _remaining(saved: Certificate) -> list[tuple[str, ...]]:

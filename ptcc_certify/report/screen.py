@@ -96,7 +96,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     p = certificate.protocol
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
-    drawn = _is_set_asked(certificate, origins)
+    drawn = _is_set_asked(certificate)
     for agents in (True, False):
         entries = [
             *graph_entries(certificate.structure, name),
@@ -168,7 +168,7 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     """Tell the protocol with its parameters, and where the initial state comes from."""
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
-    if certificate.initial_set is not None and (not begin or _is_set_asked(certificate, origins)):
+    if certificate.initial_set is not None and (not begin or _is_set_asked(certificate)):
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
@@ -220,7 +220,9 @@ def _short_final_state(certificate: Certificate) -> Lines:
     if len(groups) == 1 < len(labels):
         text = f"every agent at {short_number(result.states[0])}"
     elif cut and len(groups) == 2:
-        text = " and ".join(f"{len(names):,} agents at {short_number(state)}" for state, names in groups.items())
+        text = " and ".join(
+            f"{len(names):,} agent{'s'[: len(names) > 1]} at {short_number(state)}" for state, names in groups.items()
+        )
     elif cut:
         order = sorted(range(len(labels)), key=result.states.__getitem__)
         least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
@@ -228,9 +230,9 @@ def _short_final_state(certificate: Certificate) -> Lines:
     yield "x(T)", f"{text} {kind}"
 
 
-def _is_set_asked(certificate: Certificate, origins: Mapping[str, str]) -> bool:
+def _is_set_asked(certificate: Certificate) -> bool:
     """Tell whether the question is of a set of initial states, and the one at hand drawn for the simulated run."""
-    return certificate.initial_set is not None and "x(0)" in origins
+    return certificate.initial_set is not None and "x(0)" in certificate.request.origins
 
 
 def _bounds(certificate: Certificate, single: bool, drawn: bool) -> Lines:
@@ -347,9 +349,9 @@ def certificate_lines(
             yield "", "a line that names no limits, noise or disturbances is without them"
         if certificate.initial_state is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
-            alone = ", of the simulated run alone" * _is_set_asked(certificate, origins)
+            alone = ", of the simulated run alone" * _is_set_asked(certificate)
             yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn + alone
-        states = () if _is_set_asked(certificate, origins) else (_final_state_lines, _deviation_lines)
+        states = () if _is_set_asked(certificate) else (_final_state_lines, _deviation_lines)
         for part in (_sliding_lines, *states, _rate_lines, input_lines):
             yield from part(certificate)
         yield from _headed("simulated", _simulated(certificate))
@@ -383,7 +385,7 @@ def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
     """Tell how exactly a final state is known, and whether it is written with fewer digits."""
     if result.radius is None and not result.exact:
         return "floating point"
-    cut = any(Fraction(short_number(x)) != x for x in result.states[:100])
+    cut = any(Fraction(short_number(x)) != x for x in result.states)
     if widest := max(result.radius or (0,)):
         return f"to within {up(widest, 2)}, proved" + f"; {rounded}" * cut
     return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
@@ -500,7 +502,7 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
         yield f"reaching times {reaching}, the last {when} (agent {run.labels[last]}); {ratio}"
     if certificate.final_state is not None:
-        gap = float(abs(run.final_state - certificate.final_state.values).max())
+        gap = float(abs(run.final_state - certificate.final_state).max())
         remark = "" if run.deadline_resolved else " (the run had not settled)"
         yield f"end state within {gap:.1e} of the final state{remark}"
 

@@ -33,7 +33,7 @@ _THEOREMS: dict[tuple[str, bool], tuple[str, str]] = {
     ("weak", True): ("3.1", BIPARTITE_CONTAINMENT),
     ("weak", False): ("3.2", STABILITY),
 }
-#: The corollaries of each theorem: number, what the component has to be, and the sharper behaviour if there is one.
+#: The corollaries of each theorem: number, what the component has to be, and the special behaviour if there is one.
 _COROLLARIES: dict[str, tuple[tuple[str, str, str | None], ...]] = {
     "1.1": (("1.1", "undirected", SIGNED_AVERAGE_CONSENSUS), ("2", "all_positive", CONSENSUS)),
     "1.2": (("1.2", "undirected", None),),
@@ -57,7 +57,7 @@ class Claim:
     corollaries : tuple of str
         Those whose hypotheses hold, e.g. ``("1.1", "2")``.
     special : tuple of str
-        Sharper behaviours that the corollaries give, e.g. ``("consensus",)``.
+        Special behaviours that the corollaries add, e.g. ``("consensus",)``.
 
     References
     ----------

@@ -104,7 +104,7 @@ def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(di
         assert cert.trajectory is not None and cert.final_state is not None and cert.comparison is not None
         most = float(largest_at_start(cert) + sum(map(abs, sigma0)))
         assert (cert.deviation_bound(REMAINING) <= most * (1 + 1e-12)).all(), name
-        assert np.abs(cert.trajectory.states - cert.final_state.values[:, None]).max() <= most * (1 + 1e-9), name
+        assert np.abs(cert.trajectory.states - np.asarray(cert.final_state)[:, None]).max() <= most * (1 + 1e-9), name
         assert not cert.comparison.violated, name
 
 

@@ -118,6 +118,11 @@ def test_an_option_of_another_command_is_told_with_it():
     assert "--gain-cap'. It is an option of ptcc certify, ptcc simulate, ptcc plot" in ptcc(*words).err
 
 
+def test_only_near_options_are_told():
+    assert ptcc("certify", "team.csv", "--theorem", "3").err == "ptcc: No such option '--theorem'.\n"
+    assert ptcc("certify", "team.csv", "--max-inputs", "3").err.endswith("Did you mean --max-input?\n")
+
+
 def test_a_first_row_without_a_weight_may_be_a_header():
     for rows in ("a,b\n", "a,b,1\n"):
         Path("said.csv").write_text(f"listener,speaker\n{rows}")

@@ -101,10 +101,16 @@ def test_a_row_with_one_field_declares_a_node():
 
 def test_columns_beyond_the_third_are_ignored_and_said():
     assert text("a,b,1\n").read["notes"] == ()
-    assert text("a,b,1,9\n").read["notes"] == ("columns ignored: after the third",)
-    assert text("a,b,1\nb,a,1,9\n").read["notes"] == ("columns ignored: after the third",)
+    assert text("a,b,1,2026\n").read["notes"] == ("columns ignored: after the third",)
+    assert text("a,b,1\nb,a,1,late\n").read["notes"] == ("columns ignored: after the third",)
     assert text("source,time,target,weight\na,9,b,1\n").read["notes"] == ('columns ignored: "time"',)
     assert text("source,target,weight\na,b,1,9\n").read["notes"] == ("columns ignored: beyond the header",)
+
+
+@pytest.mark.parametrize("rows", ["a,b,-1,5\n", "# trust\na,b,1\nb,a,-0,25\n"])
+def test_a_decimal_comma_is_not_taken_for_another_column(rows):
+    with pytest.raises(FormatError, match="a weight with a decimal comma, or a weight and another column"):
+        text(rows)
 
 
 def test_names_of_a_header_in_a_row_with_a_number_are_nodes():

@@ -610,6 +610,25 @@ def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
     assert "--rho2" not in page
 
 
+@pytest.mark.parametrize("more", [{}, {"sample_period": "0.1"}])
+def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any], tmp_path: Path):
+    limits = GainLimits(gain_cap=3, **more)
+    certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False, limits=[limits]).save(tmp_path / "c.json")
+    page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
+    assert page.count("Without the limits of the gain:") == 3
+    assert ("Nothing is certified with gain \u2264 3, zero-order hold of 0.1" in page) == bool(more)
+    assert page.count("gain \u2264 3") >= 2
+
+
+def test_a_page_needs_neither_an_instant_after_the_reaching_time_nor_an_edge(tmp_path: Path):
+    short = ptcc_certify.SlidingModeProtocol(T_r=1, T_s="1/100", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    certify("fig1b", short, [5, 1, 2, 3, 4, 6], sigma0="random", simulation=False).save(tmp_path / "c.json")
+    assert "of its final state at T" in sound(report_html(read_certificate(tmp_path / "c.json"))).text
+    alone = SignedDigraph.from_edges([], [f"n{k}" for k in range(301)])
+    certify(alone, NOMINAL, [*range(301)], simulation=False).save(tmp_path / "alone.json")
+    assert "301 agents" in sound(report_html(read_certificate(tmp_path / "alone.json"))).text
+
+
 def test_long_tables_are_cut(tmp_path: Path):
     graph = SignedDigraph.from_edges([(k, k + 1, 1) for k in range(LISTED + 9)])
     certify(graph, NOMINAL, [1] * (LISTED + 10), simulation=False, method="paper").save(tmp_path / "c.json")

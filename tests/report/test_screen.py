@@ -154,6 +154,8 @@ def test_noise_that_is_left_open_has_its_reason():
 def test_a_drawn_state_is_not_told_where_a_set_is_asked_about():
     certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, initial_set=1)
     assert any(line.startswith("x(T)") for line in assert_screen(certificate))
+    assert "x(T)" in "\n".join(summary_lines(certificate, "g", {"x(0)": "as in the file"}))
+    certificate = ptcc.certify(PAIR, NOMINAL, "random", simulation=False, initial_set=1)
     for show in (summary_lines, certificate_lines):
         text = "\n".join(show(certificate, "g", {"x(0)": "random, seed 0"}))
         assert "x(T)" not in text and "every agent" not in text and "all |x_k(0)| <= 1" in text
@@ -166,6 +168,9 @@ def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends
 
     assert "a=1/6, b=-1/6 (exact)" in line(["1/3", 0])
     assert "a=0.11728, b=-0.11728 (rounded)" in line(["0.234567", "0.0"])
+    many = SignedDigraph.from_edges([("n0", f"n{k}", 1) for k in range(1, 109)], ["alone"])
+    text = line(["3.123456789" if label == "alone" else 1 for label in many.labels], many)
+    assert "1 agent at 3.1235 and 109 agents at 1 (rounded)" in text
     labels = [f"n{k}" for k in range(40)]
     loose = SignedDigraph.from_edges([("n0", "n1", 1)], labels)
     assert "least n0=0, largest n39=39," in line([*range(40)], loose).replace("every agent", "")

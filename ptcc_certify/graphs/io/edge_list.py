@@ -148,6 +148,8 @@ def read_edge_list(data: bytes, name: str) -> Rows:
         numbers.append(number)
     notes = (BY_HEADER,) * (s > 0) + (RATERS,) * raters
     notes += ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
+    if not named and ignored:
+        _refuse_decimal_commas(data, name)
     if not named and len(numbers) > 2:
         _refuse_matrix(data, len(numbers), name)
     rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
@@ -162,6 +164,16 @@ def _refuse_matrix(data: bytes, n: int, name: str) -> None:
         if all(len(row) == n and [*map(parse_exact, row)][k] == 0 for k, row in enumerate(rows)):
             mend = "save it as .npy or .mtx, or write rows source,target,weight"
             raise FormatError(f"{name}: looks like a {n} x {n} matrix, not like a table of edges; {mend}")
+
+
+def _refuse_decimal_commas(data: bytes, name: str) -> None:
+    """Refuse rows such as ``a,b,-1,5`` throughout: their weight may be -1, with another column, or -1.5."""
+    lines = (line for line in lines_of(data, name) if line.lstrip()[:1] not in "#%")
+    if all(re.fullmatch(r"[^,;\s]*|[^,]*,[^,]*,\s*[+-]?\d+(,\s*\d{1,3}\s*)?", line) for line in lines):
+        which = "a weight with a decimal comma, or a weight and another column?"
+        raise FormatError(
+            f"{name}: {which} Write decimals with a point, or begin with a header source,target,weight,..."
+        )
 
 
 def _declared(row: list[str], columns: tuple[int, int, int], place: str, mend: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 
 import numpy as np
 
@@ -70,10 +71,12 @@ def _final_state(certificate: Certificate) -> str:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return NOTHING
-    pairs = [f"{shorten(label, 12)}={value:.5g}" for label, value in zip(labels, result.values, strict=True)]
+    values = [f"{value:.5g}" for value in np.asarray(result)]
+    pairs = [f"{shorten(label, 12)}={value}" for label, value in zip(labels, values, strict=True)]
     more = f", ... ({len(pairs)} in all)" if len(pairs) > _LABELS_SHOWN else ""
-    kind = "exact" if result.exact else "to 5 digits"
-    return f"{', '.join(pairs[:_LABELS_SHOWN])}{more} ({kind})"
+    exact = result.exact and all(Fraction(value) == x for value, x in zip(values, result.states, strict=True))
+    kind = "exact" if exact else "to 5 digits"
+    return f"{kind}: {', '.join(pairs[:_LABELS_SHOWN])}{more}"
 
 
 def _error(certificate: Certificate) -> str:

@@ -43,7 +43,7 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     """
     if certificate.final_state is None:
         raise ParameterError("the certificate has no final state; certify the graph with x0")
-    values, followers = certificate.final_state.values, certificate.structure.followers
+    values, followers = np.asarray(certificate.final_state), certificate.structure.followers
     leaders = np.delete(np.arange(values.size), followers)
     ax = axes_of(ax)
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}
