@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
@@ -23,7 +21,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io import write_atomically
-from ptcc_certify.graphs.io.files import read_bytes, refuse_no_path
+from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
@@ -206,30 +204,17 @@ class Certificate(Content, Shown):
         if path.suffix.lower() not in ("", ".json"):
             other = ", a page or LaTeX by write_report, a figure by save_figure"
             raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
-        if self.source is None:
-            document, out = self._document(self.verdict)
-            for name, content in out.files.items():
-                write_atomically(path.parent / name, content)
-        else:
-            document = dict(self.source.document)
-            for name in set(_side_files(document)):
-                if not (path.parent / name).exists():
-                    shutil.copyfile(self.source.path.parent / name, path.parent / name)
+        document, files = self.for_check()
+        for name, content in files.items():
+            write_atomically(path.parent / name, content)
         write_atomically(path, _bytes(document))
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
-        """Return the JSON and the contents of its side files, as the independent check takes them.
-
-        Raises
-        ------
-        FormatError
-            The certificate was read, and a side file is no longer there.
-        """
-        if self.source is None:
-            document, out = self._document(self.verdict)
-            return document, out.files
-        folder, names = self.source.path.parent, set(_side_files(self.document))
-        return self.document, {name: read_bytes(folder / name, name) for name in names}
+        """Return the JSON and the contents of its side files, as the independent check takes them."""
+        if self.source is not None:
+            return self.source.document, self.source.files
+        document, out = self._document(self.verdict)
+        return document, out.files
 
     def plot(self, what: str = "decay", **keywords: Any) -> Any:
         """Draw a figure of the certificate.
@@ -321,20 +306,19 @@ def read_certificate(
     >>> saved.with_simulation(samples=11).comparison.violated
     False
     """
+    files = None
     if isinstance(path, Certificate):
-        with TemporaryDirectory() as folder:  # for its side files
-            path.save(Path(folder, "certificate.json"))
-            return read_certificate(Path(folder, "certificate.json"), stdlib=stdlib, memory=memory)
+        path, files = path.for_check()
     if isinstance(path, Mapping):
         try:
             path = json.loads(_json(dict(path)))
         except (TypeError, ValueError, RecursionError):
             raise FormatError("the mapping is no JSON object; parse the file with json.load") from None
-        document, report = read_and_check(path, stdlib=stdlib, memory=memory)
+        document, report = read_and_check(path, files=files, stdlib=stdlib, memory=memory)
         file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
         if not report.accepted:
             raise RejectedCertificate(file, report)
-        return Certificate(**read_document(file, document, sha256, report))
+        return Certificate(**read_document(file, document, sha256, report, files))
     refuse_no_path(path)
     path = Path(path)
     sha256 = _file_hash(path)
@@ -352,14 +336,6 @@ def _file_hash(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
-
-
-def _side_files(value: Any) -> Iterator[str]:
-    """Yield the names of the side files of a document."""
-    if isinstance(value, dict) and {"file", "sha256"} <= set(value):
-        yield value["file"]
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from _side_files(part)
 
 
 def _json(document: Mapping[str, Any]) -> str:

@@ -66,6 +66,7 @@ def _same_graph(
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
     from ptcc_certify.certificate.format_graph import certificate_graph
+    from ptcc_certify.certificate.format_vectors import read_side_files
     from ptcc_certify.graphs.difference import difference
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
@@ -77,7 +78,8 @@ def _same_graph(
     how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
     if signed.sha256 == report.sha256:
         return report, how
-    reason = f"another graph than {graph}: {difference(certificate_graph(document, Path(certificate).parent), signed)}"
+    checked = certificate_graph(document, read_side_files(document, Path(certificate).parent))
+    reason = f"another graph than {graph}: {difference(checked, signed)}"
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how
 
 
