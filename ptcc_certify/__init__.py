@@ -138,7 +138,7 @@ def modules_of(package: str) -> Callable[[str], Any]:
     """
 
     def load(name: str) -> Any:
-        if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
+        if name.isidentifier() and not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
         from ptcc_certify.errors import UnknownName, did_you_mean
 

@@ -214,7 +214,7 @@ MISTAKES = {
     "ptcc.final_state(G, x0, matrix=5)": "ParameterError: matrix is not the influence of this graph; leave it out",
     "ptcc.final_state(G, x0, matrix=ptcc.influence('fig1a'))": "ParameterError: matrix is not the influence of this",
     "ptcc.explore(G, p)": "ParameterError: settings = NominalProtocol(T=1, rho1=1, rho2=2, kap... is none; give",
-    "ptcc.check(cert, memory='1 GB')": "ParameterError: memory = '1 GB' is outside its domain; it must be > 0, in GB",
+    "ptcc.check(cert, memory='1 GB')": "ParameterError: memory in GB = 1 GB is outside its domain",
     "ptcc.check(cert, 'team.csv')": "ParameterError: check takes source without a name",
     "ptcc.write_report(cert, 'c.html', title='Team')": "ParameterError: write_report has no parameter title; it has",
     "ptcc.analyse(G).holds('peace')": 'ParameterError: unknown behaviour "peace"; one of stability',

@@ -121,12 +121,23 @@ def test_what_is_no_certificate_is_refused_with_the_mend():
         ptcc.check(5)
 
 
+def test_the_memory_of_a_check_may_be_a_number_of_numpy(cert):
+    assert ptcc.check(cert, memory=np.int64(1)).accepted
+    for none in (0, float("nan"), float("inf"), "1"):
+        with pytest.raises(ParameterError, match="in GB"):
+            ptcc.check(cert, memory=none)
+
+
 def test_an_agent_is_found_by_its_label(cert):
     final = cert.final_state
     assert dict(final) == dict(zip(TEAM.labels, final.states, strict=True))
     assert list(np.asarray(final)) == [float(x) for x in final.values()] and len(final) == 3
     assert (cert.trajectory["bob"] == cert.trajectory.states[1]).all()
-    assert "ann" in TEAM and list(TEAM) == ["ann", "bob", "eve"] and len(TEAM) == 3
+    assert list(TEAM) == ["ann", "bob", "eve"]
+    pair = ptcc.as_graph([(1, 2, -1)])
+    numbered = pair, ptcc.final_state(pair, [3, 5]), ptcc.simulate(pair, PROTOCOL, [3, 5], times=[0])
+    for one in numbered:
+        assert 1 in one and "2" in one and 3 not in one and len(one) == len(list(one)) == 2
     for one in (final, cert.trajectory):
         with pytest.raises(ParameterError, match="no agent is called 'joe'; there are ann, bob, eve"):
             one["joe"]
@@ -194,7 +205,12 @@ def test_vector_valued_states_have_one_certificate_for_each_component(tmp_path):
     assert len(certs) == 2 and certs.verdict == "certified"
     assert np.abs(run.final_state - certs.final_state).max() < 1e-6
     assert not certs.compare(run).violated
-    assert all(ptcc.check(path).accepted for path in certs.save(tmp_path / "c.json"))
+    for name in ("c.json", "c"):
+        paths = certs.save(tmp_path / name)
+        assert [path.name for path in paths] == ["c.1.json", "c.2.json"] and all(ptcc.check(p).accepted for p in paths)
+    for none in (5, "", "/"):
+        with pytest.raises(FormatError, match="names no file"):
+            certs.save(none)
     before = run.remaining > 0
     norm = np.linalg.norm(run.error, axis=(0, 1))[before]
     assert (norm <= certs.norm_bound(run.remaining[before]) + 1e-9).all()

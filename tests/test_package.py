@@ -40,6 +40,8 @@ def test_rooms_are_loaded_when_they_are_named():
     assert ptcc_certify.bounds.input.effort.Effort and issubclass(ptcc_certify.errors.GraphError, ValueError)
     with pytest.raises(AttributeError, match="nothing"):
         _ = ptcc_certify.bounds.nothing
+    for name in ("a.b", "errors.GraphError", "graphs.digraph", "a b", "", "\0"):
+        assert not hasattr(ptcc_certify, name) and not hasattr(ptcc_certify.graphs, name), name
 
 
 def test_no_module_bears_the_name_of_an_export():

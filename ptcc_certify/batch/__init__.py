@@ -21,7 +21,7 @@ from typing import Any
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.output import Journal, Table, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
+from ptcc_certify.batch.settings import LARGEST_SETTING, Reading, Settings
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, PTCCError
@@ -81,7 +81,7 @@ def certify_many(
         - ``method="best"``, ``simulation=False``, ``time_limit=None`` (seconds for each graph), ``expect=None``,
           ``min_rate=None``, ``initial_bound=None``;
         - ``orientation=None``, ``duplicates="refuse"``, ``drop_self_loops=False``, ``undirected=False``: how files are
-          read, see :func:`ptcc_certify.read_graph`.
+          read, see :func:`ptcc_certify.read_graph`; of graphs in memory only ``orientation`` can be told.
 
         :class:`ptcc_certify.batch.Settings` tells all about each.
 
@@ -114,7 +114,7 @@ def certify_many(
     path = None if output is None else Path(output)
     if path is not None and not path.name:
         raise ParameterError(f'output = "{shorten(os.fspath(path))}" names no file; name a .csv or .parquet file')
-    selection = chosen_sources(sources, () if path is None else (path, journal_path(path)))
+    selection = chosen_sources(sources, request.reading, () if path is None else (path, journal_path(path)))
     rows: dict[int, Row] = {}
     with ExitStack() as stack:
         journal = None
@@ -180,7 +180,7 @@ def write_graphs(sources: Any, folder: str | os.PathLike[str], *, restart: bool 
     if not os.fspath(folder):
         raise ParameterError("the name of the folder is empty; name a folder")
     targets: dict[Path, tuple[Ensemble, int]] = {}
-    for source in chosen_sources(sources):
+    for source in chosen_sources(sources, Reading()):
         if not isinstance(source.origin, tuple):
             raise ParameterError(f"{shorten(source.name, 200)}: is a graph already; only those of a .toml are written")
         ensemble, i = source.origin

@@ -7,17 +7,18 @@ import json
 import os
 import re
 from collections.abc import Hashable, Iterator, Mapping, Sequence, Set, ValuesView
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ptcc_certify.batch.settings import Reading
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.ensembles import Ensemble
-from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.io import as_graph, read_graph
 from ptcc_certify.graphs.io.files import read_bytes
-from ptcc_certify.graphs.io.packaged import GRAPHS, graph_path
+from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged, graph_path
 from ptcc_certify.graphs.rationals import shorten
 
 #: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
@@ -66,7 +67,7 @@ class Source:
         return f"file {self.name}"
 
 
-def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
+def chosen_sources(sources: Any, reading: Reading, own: Sequence[Path] = ()) -> list[Source]:
     """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
     several = Sequence | Set | Mapping | ValuesView | Iterator  # graphs, matrices and tables are none of these
     if isinstance(sources, str) or not isinstance(sources, several):
@@ -75,7 +76,7 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
     graphs = ensembles = 0
     named = sources if isinstance(sources, Mapping) else {}
     for name, graph in named.items():
-        graph = as_graph(graph)
+        graph = _given(graph, reading)
         key = ("named", str(name))
         selection[key] = Source(str(name), graph, key, _mark_of_graph(graph))
     for source in () if named else sources:
@@ -86,14 +87,26 @@ def chosen_sources(sources: Any, own: Sequence[Path] = ()) -> list[Source]:
         elif isinstance(source, str | os.PathLike):
             own_sources = _expand(os.fspath(source), own)
         else:
-            graph = as_graph(source)
+            graph = _given(source, reading)
             own_sources = [Source(f"graph#{graphs}", graph, ("graph", graphs), _mark_of_graph(graph))]
             graphs += 1
         for one in own_sources:
             selection.setdefault(one.key, one)
     if not selection:
         raise ParameterError("there are no graphs; name files or patterns")
+    if reading != Reading() and all(isinstance(one.origin, tuple) for one in selection.values()):
+        raise ParameterError(f"{', '.join(asdict(reading))} tell how files are read; ensembles have keys of their own")
     return list(selection.values())
+
+
+def _given(graph: Any, reading: Reading) -> SignedDigraph:
+    """Return a graph that has a name, or is in memory; of the latter only its orientation can be told."""
+    if isinstance(graph, str | os.PathLike):
+        return read_graph(file_or_packaged(os.fspath(graph)), **asdict(reading))
+    for name in ("duplicates", "drop_self_loops", "undirected"):
+        if getattr(reading, name) != getattr(Reading, name):
+            raise ParameterError(f"{name} tells how files are read; beside graphs in memory leave it out")
+    return as_graph(graph, reading.orientation)
 
 
 def _expand(text: str, own: Sequence[Path]) -> list[Source]:

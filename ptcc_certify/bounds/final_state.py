@@ -356,6 +356,9 @@ class FinalState(Mapping[str, Number]):
     def __iter__(self) -> Iterator[str]:
         return iter(self.labels)
 
+    def __contains__(self, label: object) -> bool:
+        return str(label) in self._by_label
+
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array([float(x) for x in self.states], dtype=dtype)
 

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.checking import check, read_and_check
 from ptcc_certify.certificate.format import certificate_document, read_document
-from ptcc_certify.certificate.format_vectors import Writer, side_file_names, side_files
+from ptcc_certify.certificate.format_vectors import Writer, read_side_files
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
@@ -209,29 +207,17 @@ class Certificate(Content, Shown):
         if path.suffix.lower() not in ("", ".json"):
             other = ", a page or LaTeX by write_report, a figure by save_figure"
             raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
-        if self.source is None:
-            document, out = self._document(self.verdict)
-            for name, content in out.files.items():
-                write_atomically(path.parent / name, content)
-        else:
-            document = dict(self.source.document)
-            for name in set(side_file_names(document)):
-                if not (path.parent / name).exists():
-                    shutil.copyfile(self.source.path.parent / name, path.parent / name)
+        document, files = self.for_check()
+        for name, content in files.items():
+            write_atomically(path.parent / name, content)
         write_atomically(path, _bytes(document))
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
-        """Return the JSON and the contents of its side files, as the independent check takes them.
-
-        Raises
-        ------
-        FormatError
-            The certificate was read, and a side file is no longer there.
-        """
-        if self.source is None:
-            document, out = self._document(self.verdict)
-            return document, out.files
-        return self.document, side_files(self.document, self.source.path.parent)
+        """Return the JSON and the contents of its side files, as the independent check takes them."""
+        if self.source is not None:
+            return self.source.document, self.source.files
+        document, out = self._document(self.verdict)
+        return document, out.files
 
     def plot(self, what: str = "decay", **keywords: Any) -> Any:
         """Draw a figure of the certificate.
@@ -323,20 +309,19 @@ def read_certificate(
     >>> saved.with_simulation(samples=11).comparison.violated
     False
     """
+    files = None
     if not isinstance(path, str | Path | Mapping) and hasattr(path, "for_check"):
-        with TemporaryDirectory() as folder:  # for its side files
-            path.save(Path(folder, "certificate.json"))
-            return read_certificate(Path(folder, "certificate.json"), stdlib=stdlib, memory=memory)
+        path, files = path.for_check()
     if isinstance(path, Mapping):
         try:
             path = json.loads(_json(dict(path)))
         except (TypeError, ValueError, RecursionError):
             raise FormatError("the mapping is no JSON object; parse the file with json.load") from None
-        document, report = read_and_check(path, stdlib=stdlib, memory=memory)
+        document, report = read_and_check(path, files=files, stdlib=stdlib, memory=memory)
         file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
         if not report.accepted:
             raise RejectedCertificate(file, report)
-        return _accepted(file, document, sha256, report)
+        return accepted_certificate(file, document, sha256, report, files or {})
     refuse_no_path(path)
     path = Path(path)  # type: ignore[arg-type]
     sha256 = _file_hash(path)
@@ -345,7 +330,7 @@ def read_certificate(
         raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
     if not report.accepted:
         raise RejectedCertificate(path, report)
-    return _accepted(path, document, sha256, report)
+    return accepted_certificate(path, document, sha256, report, read_side_files(document, path.parent))
 
 
 def read_graph_certificate(path: Any, *, memory: float = 1) -> Certificate:
@@ -362,14 +347,15 @@ def read_graph_certificate(path: Any, *, memory: float = 1) -> Certificate:
     return certificate
 
 
-def _accepted(
-    path: Path, document: dict[str, Any], sha256: str, report: CheckReport
+def accepted_certificate(
+    path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
 ) -> Certificate | FamilyCertificate:
+    """Return the certificate, of a graph or a family, whose file the independent check accepts."""
     if "modes" in document["graph"]:
         from ptcc_certify.certificate.read_family_certificate import read_family_certificate
 
-        return read_family_certificate(Source(path, sha256, document, report, None, ()))
-    return Certificate(**read_document(path, document, sha256, report))
+        return read_family_certificate(Source(path, sha256, document, report, None, (), files))
+    return Certificate(**read_document(path, document, sha256, report, files))
 
 
 def _file_hash(path: Path) -> str:

@@ -96,6 +96,8 @@ class Source:
         What is proved about the input.
     obligations : tuple of Obligation
         What was proved, with witnesses as the JSON has them.
+    files : mapping of str to bytes
+        The side files that stood beside it, by name.
     """
 
     path: Path
@@ -104,6 +106,7 @@ class Source:
     report: CheckReport
     effort: Effort | None
     obligations: tuple[Obligation, ...]
+    files: Mapping[str, bytes] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

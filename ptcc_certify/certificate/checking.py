@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptcc_certify import checker
-from ptcc_certify.errors import FormatError, ParameterError
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.rationals import number_within, shorten
 
 
 def check(
@@ -66,8 +66,7 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker
     >>> read_and_check({"schema": "ptcc-certificate/2"})[0]
     {'schema': 'ptcc-certificate/2'}
     """
-    if not (isinstance(memory := options.get("memory", 1), int | float) and memory > 0):
-        raise ParameterError(f"memory = {shorten(repr(memory))} is outside its domain; it must be > 0, in GB")
+    options["memory"] = number_within(options.get("memory", 1), "memory in GB", 1e-9, 1e8)
     if hasattr(source, "for_check"):
         source, options["files"] = source.for_check()
     elif not isinstance(source, str | os.PathLike | Mapping):

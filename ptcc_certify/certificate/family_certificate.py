@@ -20,7 +20,6 @@ from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
-from ptcc_certify.certificate.format_vectors import side_files
 from ptcc_certify.certificate.request import (
     Expectations,
     listener,
@@ -101,7 +100,7 @@ class FamilyCertificate(FamilyContent, Shown):
     def _document(self) -> tuple[dict[str, Any], Mapping[str, bytes]]:
         """The JSON, and its side files by name."""
         if self.source is not None:
-            return dict(self.source.document), side_files(self.source.document, self.source.path.parent)
+            return dict(self.source.document), self.source.files
         document, out = family_document(self, files=True)
         return document, out.files
 

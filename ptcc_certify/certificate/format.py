@@ -81,10 +81,12 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
-def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport) -> dict[str, Any]:
+def read_document(
+    path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
+) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
-    graph = certificate_graph(document, path.parent)
-    structure, protocol, data = analyse(graph), read_protocol(document["protocol"]), Reader(graph.labels, path.parent)
+    graph = certificate_graph(document, files)
+    structure, protocol, data = analyse(graph), read_protocol(document["protocol"]), Reader(graph.labels, files)
     proof = tuple(_read_obligation(step) for step in document["proof"])
     steps = {(step.kind, step.of): step for step in proof}
     paper, functions = document["paper"], document["lyapunov"]["functions"]
@@ -113,7 +115,7 @@ def read_document(path: Path, document: Mapping[str, Any], sha256: str, report: 
         "matrix": None,
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
-        "source": Source(path, sha256, document, report, effort, proof),
+        "source": Source(path, sha256, document, report, effort, proof, files),
     }
 
 

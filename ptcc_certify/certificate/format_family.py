@@ -143,24 +143,24 @@ def _edges(mode: Mode, out: Writer) -> Any:
     return {"count": mode.n_edges, "source": source, "target": target, **ends}
 
 
-def certificate_family(section: Mapping[str, Any], folder: Path = Path()) -> Family:
-    """Return the family of an accepted certificate; ``folder`` holds its side files.
+def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -> Family:
+    """Return the family of an accepted certificate; ``files`` are its side files.
 
     Examples
     --------
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
-    >>> certificate_family(family_sections(family, decide(family))["graph"]) == family
+    >>> certificate_family(family_sections(family, decide(family))["graph"], {}) == family
     True
     """
-    labels, modes, files = tuple(section["nodes"]), [], SideFiles(folder, None)
+    labels, modes, side = tuple(section["nodes"]), [], SideFiles(Path(), files)
     index = {label: v for v, label in enumerate(labels)}
     for mode in section["modes"]:
         rows = mode["edges"]
         if isinstance(rows, dict):
             count = rows["count"]
-            source, target = (np.array(files.integers(rows[key], key, count)) for key in ("source", "target"))
-            least, largest = (files.numbers(rows[key], key, count) for key in ("least", "largest"))
+            source, target = (np.array(side.integers(rows[key], key, count)) for key in ("source", "target"))
+            least, largest = (side.numbers(rows[key], key, count) for key in ("least", "largest"))
             ends = list(zip(least, largest, strict=True))
         else:
             source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))

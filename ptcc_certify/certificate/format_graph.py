@@ -51,15 +51,15 @@ def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
     }
 
 
-def certificate_graph(document: Mapping[str, Any], folder: Path) -> SignedDigraph:
+def certificate_graph(document: Mapping[str, Any], files: Mapping[str, bytes]) -> SignedDigraph:
     """Return the graph of an accepted certificate.
 
     Parameters
     ----------
     document : mapping
         The parsed JSON.
-    folder : Path
-        Of its side files.
+    files : mapping of str to bytes
+        Its side files.
 
     Returns
     -------
@@ -69,14 +69,14 @@ def certificate_graph(document: Mapping[str, Any], folder: Path) -> SignedDigrap
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
-    >>> certificate_graph(document, Path()) == foes
+    >>> certificate_graph(document, {}) == foes
     True
     """
-    section, files = document["graph"], SideFiles(folder, None)
+    section, side = document["graph"], SideFiles(Path(), files)
     labels, edges = section["nodes"], section["edges"]
     if isinstance(edges, dict):
         source, target, weight = (
-            np.array(files.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
+            np.array(side.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
         )
         scale = exact(edges["scale"])
         values, codes = np.unique(weight, return_inverse=True)

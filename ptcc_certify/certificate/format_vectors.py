@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles, beside
+from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.rationals import format_exact, writable
 from ptcc_certify.graphs.structure import Structure
@@ -96,25 +98,6 @@ class Writer:
         return dict(zip(self.labels, map(format_exact, state), strict=True))
 
 
-def side_files(document: Any, folder: Path) -> dict[str, bytes]:
-    """Return the contents of the side files that a document names, by name.
-
-    Raises
-    ------
-    FormatError
-        One is no longer there.
-    """
-    return {name: read_bytes(folder / name, name) for name in set(side_file_names(document))}
-
-
-def side_file_names(value: Any) -> Iterator[str]:
-    """Yield the names of the side files of a document."""
-    if isinstance(value, dict) and {"file", "sha256"} <= set(value):
-        yield value["file"]
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from side_file_names(part)
-
-
 class Reader:
     """Reads the vectors of an accepted document; the check has verified that every part is there.
 
@@ -122,12 +105,12 @@ class Reader:
     ----------
     labels : sequence of str
         Of the nodes.
-    folder : Path
-        Of the side files.
+    files : mapping of str to bytes
+        The side files.
     """
 
-    def __init__(self, labels: Sequence[str], folder: Path):
-        self.files, self._count = SideFiles(folder, None), len(labels)
+    def __init__(self, labels: Sequence[str], files: Mapping[str, bytes]):
+        self.files, self._count = SideFiles(Path(), files), len(labels)
         self._index = {label: i for i, label in enumerate(labels)}
 
     def nodes(self, section: Any) -> tuple[int, ...]:
@@ -152,6 +135,30 @@ class Reader:
     def agents(self, section: Any) -> tuple[Fraction, ...]:
         """Read one number of each agent, which is there."""
         return self.state(section) or ()
+
+
+def read_side_files(document: Mapping[str, Any], folder: Path) -> dict[str, bytes]:
+    """Return the side files of a document that was accepted, by name; what is ``unverified`` names none.
+
+    Raises
+    ------
+    FormatError
+        One was changed or removed since the check.
+    """
+    named = dict(_side_files([part for key, part in document.items() if key != "unverified"]))
+    files = {name: read_bytes(folder / name, name) for name in named}
+    for name, content in files.items():
+        if hashlib.sha256(content).hexdigest() != named[name]:
+            raise FormatError(f"{name}: was changed while the certificate was read; try again")
+    return files
+
+
+def _side_files(value: Any) -> Iterator[tuple[str, str]]:
+    """Yield name and hash of every side file; two numbers of agents called ``file`` and ``sha256`` are none."""
+    if isinstance(value, dict) and re.fullmatch("[0-9a-f]{64}", str(value.get("sha256"))) and "file" in value:
+        yield value["file"], value["sha256"]
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _side_files(part)
 
 
 def text(value: Fraction | None) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,20 +31,20 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     The decision is made anew; no upper bound on the rate is taken from the file, which does not prove it.
     """
     document = source.document
-    family = certificate_family(document["graph"], source.path.parent)
+    family = certificate_family(document["graph"], source.files)
     claims = [document["claim"]] if document["claim"] is not None else [c["claim"] for c in document["components"]]
     components = [
         component if component.behaviour == claim["behaviour"] else replace(component, behaviour=claim["behaviour"])
         for component, claim in zip(decide(family), claims, strict=True)
     ]
-    files = SideFiles(source.path.parent, None)
+    files = SideFiles(Path(), source.files)
     functions: list[list[FamilyFunction | FollowerFunction]] = [[] for _ in components]
     for k, section in enumerate(document["lyapunov"]["functions"]):
         number = section["component"]
         of = f"lyapunov.functions[{k}]"
         functions[number].append(_read_function(of, section, components[number], document["proof"], files))
     parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
-    state = Reader(family.labels, source.path.parent).state(document["initial_state"])
+    state = Reader(family.labels, source.files).state(document["initial_state"])
     expectations = _read_expectations(document["unverified"].get("asked"))
     return FamilyCertificate(family, read_protocol(document["protocol"]), parts, state, expectations, source=source)
 

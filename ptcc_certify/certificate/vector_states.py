@@ -17,6 +17,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph, as_states
+from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -109,9 +110,10 @@ class VectorCertificate:
         return self.components[0].envelope.compare(run)
 
     def save(self, path: str | Path) -> list[Path]:
-        """Write one certificate per component, ``c.1.json`` .. ``c.S.json`` for ``c.json``, and return their paths."""
+        """Write a certificate per component, ``c.1.json`` .. ``c.S.json`` for ``c`` or ``c.json``; return the paths."""
+        refuse_no_path(path)
         whole = Path(path)
-        paths = [whole.with_name(f"{whole.stem}.{j}{whole.suffix}") for j in range(1, len(self) + 1)]
+        paths = [whole.with_name(f"{whole.stem}.{j}{whole.suffix or '.json'}") for j in range(1, len(self) + 1)]
         for one, file in zip(self.components, paths, strict=True):
             one.save(file)
         return paths

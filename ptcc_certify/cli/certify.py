@@ -80,8 +80,6 @@ def _certify_graph(
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    if options["x0"] == "random" and options["initial_bound"] is not None:
-        x0 = [x * options["initial_bound"] / 10 for x in x0]  # drawn within 10: now of the set that is asked about
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
     origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:

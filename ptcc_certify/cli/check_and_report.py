@@ -51,7 +51,7 @@ def check(
     how: dict[str, str] = {}
     if graph and report.accepted:
         if "modes" in document["graph"]:
-            report, how = same_family(report, document, graph, options)
+            report, how = same_family(certificate, document, report, graph, options)
         elif len(graph) > 1:
             raise ParameterError("this certificate is of one graph; name one")
         else:
@@ -74,6 +74,7 @@ def _same_graph(
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
     from ptcc_certify.certificate.format_graph import certificate_graph
+    from ptcc_certify.certificate.format_vectors import read_side_files
     from ptcc_certify.graphs.difference import difference
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
@@ -85,7 +86,8 @@ def _same_graph(
     how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
     if signed.sha256 == report.sha256:
         return report, how
-    reason = f"another graph than {graph}: {difference(certificate_graph(document, Path(certificate).parent), signed)}"
+    checked = certificate_graph(document, read_side_files(document, Path(certificate).parent))
+    reason = f"another graph than {graph}: {difference(checked, signed)}"
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how
 
 

@@ -12,6 +12,8 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.kinds_of_file import refuse_as_graph
+from ptcc_certify.cli.scenario import is_scenario
 from ptcc_certify.errors import ExitCode, ParameterError
 
 
@@ -34,10 +36,15 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
 
     if graph == "-":
         raise ParameterError("-: the code that the explorer shows reads the graph again; save it and name the file")
-    name, explorer = graph, Explorer()
+    if is_scenario(graph):
+        refuse_as_graph(graph)
+    name, explorer, how = graph, Explorer(), dict(options)
+    source = reading_of(graph, how.pop("edges"), **how)
     if shared.graph_file(graph) == graph:  # no packaged one
-        given, how, name = shared.read(graph, options), dict(options), Path(graph).name
-        explorer = Explorer(given, name, reading_of(graph, how.pop("edges"), **how))
+        name = Path(graph).name
+        explorer = Explorer(shared.read(graph, options), name, source)
+    elif len(source) > 1:
+        raise ParameterError(f"{graph}: is a packaged graph, shown as it is; leave out how it is read")
     server = open_server(explorer, Settings(name), port)
     try:
         if server.server_port != port:

@@ -237,12 +237,13 @@ def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyC
 
 
 def same_family(
-    report: CheckReport, document: dict[str, Any], graphs: tuple[str, ...], options: shared.Options
+    certificate: str, document: dict[str, Any], report: CheckReport, graphs: tuple[str, ...], options: shared.Options
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare the family of an accepted certificate with that of files; return the report, and how these were read."""
     from dataclasses import replace
 
     from ptcc_certify.certificate.format_family import certificate_family
+    from ptcc_certify.certificate.format_vectors import read_side_files
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.family_difference import family_difference
 
@@ -256,5 +257,6 @@ def same_family(
     how = {"graph_read": f"{name}, {read}"}
     if family.sha256 == report.sha256:
         return report, how
-    reason = f"another family than {name}: {family_difference(certificate_family(document['graph']), family)}"
+    checked = certificate_family(document["graph"], read_side_files(document, Path(certificate).parent))
+    reason = f"another family than {name}: {family_difference(checked, family)}"
     return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how

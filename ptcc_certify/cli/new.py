@@ -81,13 +81,18 @@ def template(options: Mapping[str, click.Parameter], graph: str | None = None, l
         lines += ["", f"[{section}]  # {title}"]
         for key, (option, example) in keys.items():
             if key == "file" and graph is not None:
-                example = json.dumps(graph, ensure_ascii=False).replace("\x7f", "\\u007f")
+                example = _quoted(graph)
             line = f"{'' if option in _WRITTEN else '# '}{key} = {example}"
             lines.append(f"{line:<32}  # {_meaning(options.get(option))}")
             if key == "x0" and 0 < len(labels) <= 12:
-                values = ", ".join(f"{json.dumps(label, ensure_ascii=False)} = 1" for label in labels)
+                values = ", ".join(f"{_quoted(label)} = 1" for label in labels)
                 lines.append(f"# x0 = {{ {values} }}")
     return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """Return a text as TOML has it, in values and in comments."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _meaning(option: click.Parameter | None) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
+from contextlib import suppress
 from decimal import Context, Decimal, Inexact
 from fractions import Fraction
 from numbers import Integral, Rational, Real
@@ -106,7 +107,7 @@ def whole_number(value: Any, name: str, least: int, most: int) -> int:
 
 
 def number_within(value: Any, name: str, least: float, most: float) -> float:
-    """Return a float from ``least`` to ``most``; refuse anything else by name.
+    """Return the float of a number from ``least`` to ``most``, NumPy's included; refuse anything else by name.
 
     Raises
     ------
@@ -119,8 +120,9 @@ def number_within(value: Any, name: str, least: float, most: float) -> float:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: past = 1/2 is outside its domain; it must be a number from 0 to 1
     """
-    if isinstance(value, int | float | Fraction) and least <= value <= most:
-        return float(value)
+    with suppress(NumberError):
+        if not isinstance(value, str) and least <= as_fraction(value) <= most:
+            return float(value)
     domain = f"a number from {least:g} to {most:g}"
     raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
 

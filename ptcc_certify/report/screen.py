@@ -152,17 +152,15 @@ def _file_claim(claim: Mapping[str, str]) -> str:
 
 def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
     """Return the short screen of an accepted certificate, of a graph or a family, as its file says it."""
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.certificate_data import Source
-    from ptcc_certify.certificate.format import read_document
-    from ptcc_certify.certificate.read_family_certificate import read_family_certificate
+    from ptcc_certify.certificate.certificate import Certificate, accepted_certificate
+    from ptcc_certify.certificate.format_vectors import read_side_files
 
     origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
-    if "modes" in document["graph"]:
-        return family_summary(
-            read_family_certificate(Source(Path(path), "", document, report, None, ())), path, origins
-        )
-    return summary_lines(Certificate(**read_document(Path(path), document, "", report)), path, origins)
+    files = read_side_files(document, Path(path).parent)
+    certificate = accepted_certificate(Path(path), document, "", report, files)
+    if isinstance(certificate, Certificate):
+        return summary_lines(certificate, path, origins)
+    return family_summary(certificate, path, origins)
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.errors import SimulationError
+from ptcc_certify.graphs.rationals import number_within
 from ptcc_certify.simulation.interrupt import interruptible
 
 if TYPE_CHECKING:
@@ -44,13 +45,10 @@ class Tolerances(NamedTuple):
     rtol: float
     atol: float
 
-    def check(self) -> None:
+    @classmethod
+    def within(cls, rtol: Any, atol: Any) -> Tolerances:
         """Refuse tolerances that CVODES cannot serve."""
-        for name, tolerance in self._asdict().items():
-            if not isinstance(tolerance, int | float) or not 1e-15 <= tolerance <= 0.1:
-                raise ParameterError(
-                    f"{name} = {tolerance} is outside its domain; {name} must be between 1e-15 and 0.1"
-                )
+        return cls(*(number_within(x, name, 1e-15, 0.1) for name, x in (("rtol", rtol), ("atol", atol))))
 
 
 @dataclass(frozen=True)

@@ -274,12 +274,11 @@ def simulate_family(
     >>> run.signal, run.deadline_resolved, run.final_state.round(9) + 0
     ('worst case', True, array([0., 0.]))
     """
-    begin, tolerances = time.perf_counter(), Tolerances(rtol, atol)
+    begin, tolerances = time.perf_counter(), Tolerances.within(rtol, atol)
     family = as_family(family)
     refuse_no_protocol(protocol)
     if protocol.reaching is not None:
         raise ParameterError("families run under the nominal protocol; give NominalProtocol(..)")
-    tolerances.check()
     graph = family.modes[0].mandatory
     x = np.array([[float(value) for value in row] for row in as_states(x0, graph, "x0")])
     if x.shape[1] > 1:

@@ -72,7 +72,7 @@ def simulate(
         With ``rho2 = 0`` the run is on the plain clock ``t``, without a deadline.
     x0 : state-like, or N rows of S numbers
         The initial state in the order of ``graph.labels``, or by label where there are labels: whatever
-        :func:`ptcc_certify.as_state` takes. S columns are S initial states, or the S components of vector-valued
+        :func:`ptcc_certify.as_state` takes. S > 1 columns are S initial states, or the S components of vector-valued
         agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode: one column.
     orientation : {"information", "listens"}, optional
         Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
@@ -138,11 +138,11 @@ def simulate(
     (array([ 0.5, -0.5]), True)
     """
     begin = time.perf_counter()
-    graph, tolerances = as_graph(graph, orientation), Tolerances(rtol, atol)
+    graph = as_graph(graph, orientation)
     refuse_no_protocol(protocol)
     initial_state = _floats(x0, graph, "x0")
     manifold = None if sigma0 is None else _floats(sigma0, graph, "sigma0")
-    tolerances.check()
+    tolerances = Tolerances.within(rtol, atol)
     other = "sliding-mode"
     foreign: dict[str, Any] = {"sigma0": manifold, "boundary_layer": boundary_layer}
     if protocol.reaching is not None:
@@ -178,6 +178,6 @@ def simulate(
 
 
 def _floats(values: Any, graph: SignedDigraph, name: str) -> np.ndarray:
-    """Return a state as an (N,) array, or N rows of S numbers as an (N, S) array."""
+    """Return a state as an (N,) array, N rows of S > 1 numbers as an (N, S) array."""
     states = np.array([[float(x) for x in row] for row in as_states(values, graph, name)])
-    return states if states.shape[1] > 1 or getattr(values, "ndim", 1) == 2 else states[:, 0]
+    return states if states.shape[1] > 1 else states[:, 0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -162,7 +161,7 @@ class Trajectory(ByValue, Shown):
         ParameterError
             No instant of the trajectory is there: give it to :func:`simulate` as one of ``times``.
         """
-        fraction = number_within(fraction, "fraction", 0, math.inf)
+        fraction = number_within(fraction, "fraction", 0, 1e300)
         if fraction == 1 and self.deadline_index is not None:
             return self.final_state
         wanted = fraction * float(self.protocol.T)
@@ -176,10 +175,13 @@ class Trajectory(ByValue, Shown):
         return self.states[position(label, self.labels)]
 
     def __len__(self) -> int:
-        return self.t.size
+        return len(self.labels)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.labels)
+
+    def __contains__(self, label: object) -> bool:
+        return str(label) in self.labels
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.states, dtype=dtype)

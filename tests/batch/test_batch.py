@@ -254,7 +254,7 @@ def test_bad_specs_are_refused_in_one_line(spec: str, says: str):
 @pytest.mark.parametrize(
     "options",
     [
-        ("--T", "0.6", "--rho2", "0.3", "--simulation"),
+        ("--T", "0.6", "--rho2", "0.3", "--initial-bound", "1", "--simulation"),
         (
             "--protocol",
             "sliding-mode",
@@ -283,6 +283,7 @@ def test_a_row_is_what_certify_says(options: tuple[str, ...]):
         assert Fraction(row["optimality_ratio"]) <= rate / Fraction(row["upper_bound"]) * (1 + Fraction(1, 10**15))
         assert Fraction(row["paper_rate"]) <= Fraction(said["rates"]["paper"])
         assert row["obligations"] == len(said["proof"])
+        assert [*said["initial_state"].values()] == [str(x) for (x,) in random_states(row["seed"], row["nodes"])]
         assert row["worst_ratio"] == said["unverified"]["simulation"]["worst_ratio"]
         assert row["bound_kept"] is True
         assert (row["reaching_time"] is not None) == ("sliding-mode" in options)
@@ -509,6 +510,37 @@ def test_a_graph_that_is_named_twice_has_one_row():
     assert [row["graph"] for row in rows] == ["a.csv", "fig1a", *(f"spec.toml#{i}" for i in range(8))]
     rows = quickly(["./a.csv", Path("a.csv").absolute(), ".//spec.toml", Path("spec.toml").absolute()])
     assert [row["graph"] for row in rows] == ["a.csv", *(f"spec.toml#{i}" for i in range(8))]
+
+
+def test_graphs_are_read_alike_however_they_are_given():
+    Path("rated.csv").write_text("a,b,1\nb,c,-2\nc,b,1\n")
+    edges = [("a", "b", 1), ("b", "c", -2), ("c", "b", 1)]
+    rated, both = (
+        {row["sha256"] for given in ("rated.csv", *more) for row in quickly(given, **how)}
+        for more, how in (
+            (({"rated": "rated.csv"}, [edges], {"mine": edges}), {"orientation": "listens"}),
+            (({"rated": Path("rated.csv")},), {"undirected": True, "duplicates": "sum"}),
+        )
+    )
+    assert rated == {read_graph("rated.csv", orientation="listens").sha256} and len(both) == 1
+    (row,) = quickly([np.array([[0, 1], [-1, 0]])], orientation="listens")
+    assert row["verdict"] == "certified"
+
+
+@pytest.mark.parametrize(
+    ("sources", "how"),
+    [
+        ([TRIANGLE], {"orientation": "listens"}),
+        ([[("a", "b", 1)]], {"undirected": True}),
+        ({"mine": TRIANGLE}, {"duplicates": "sum"}),
+        ({"mine": TRIANGLE}, {"drop_self_loops": True}),
+        ("spec.toml", {"undirected": True}),
+        (Ensemble(count=1, nodes=6), {"orientation": "listens"}),
+    ],
+)
+def test_how_files_are_read_is_refused_where_it_has_no_effect(sources: Any, how: dict[str, Any]):
+    with pytest.raises(ParameterError, match=next(iter(how))):
+        quickly(sources, **how)
 
 
 def test_a_file_that_is_named_like_a_graph_of_an_ensemble_has_a_row_of_its_own():
@@ -831,9 +863,9 @@ def test_other_settings_than_the_journals_are_refused(more: dict[str, Any], says
     journal = begin(3)
     before = journal.read_bytes()
     with pytest.raises(ParameterError, match=says):
-        quickly("spec.toml", output="t.csv", **more)
+        quickly(["spec.toml", "fig1a"], output="t.csv", **more)
     assert journal.read_bytes() == before
-    assert len(quickly("spec.toml", output="t.csv", restart=True, **more)) == 8
+    assert len(quickly(["spec.toml", "fig1a"], output="t.csv", restart=True, **more)) == 9
 
 
 def test_another_protocol_or_version_than_the_journals_is_refused():

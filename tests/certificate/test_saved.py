@@ -186,6 +186,24 @@ def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert np.array_equal(saved.norm_bound(REMAINING), made.norm_bound(REMAINING))
 
 
+def test_side_files_go_with_a_certificate_that_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(vectors, "LONG", 3)
+    weights = [("file", "sha256", -1), ("sha256", "file", -1), ("file", "c", 1), ("c", "d", 1)]
+    made = ptcc.certify(ptcc.as_graph(weights), NOMINAL, [3, 1, 2, 4], method="perron", simulation=False)
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir(), second.mkdir()
+    saved = written(made, first)
+    files = {path.name: path.read_bytes() for path in first.glob("*.npy")}
+    for path in first.iterdir():
+        (second / path.name).write_bytes(b"half a copy")
+        path.unlink()
+    for one in (saved, read_certificate(made), read_certificate(saved)):
+        assert ptcc.check(one).accepted and one.sha256 == saved.sha256
+        one.save(second / "c.json")
+        assert {path.name: path.read_bytes() for path in second.glob("*.npy")} == files != {}
+        assert ptcc.check(second / "c.json").accepted
+
+
 @pytest.mark.parametrize("number", [2, 4, 6])
 def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Path):
     example = EXAMPLES[number]

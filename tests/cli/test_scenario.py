@@ -196,6 +196,9 @@ def test_what_new_writes_certifies(folder: Path):
     assert ptcc("new", "my data/team.csv", "-o", "my data/new one.toml").code == 0
     assert read_scenario("my data/new one.toml").sections["graph"] == {"file": "team.csv"}
     assert ptcc("certify", "my data/new one.toml", "--no-simulation").code == 0
+    Path("odd.csv").write_text("a\x7fb,c,1\nc,a\x7fb,1\n")
+    assert ptcc("new", "odd.csv", "-o", "odd.toml").code == 0
+    assert read_scenario("odd.toml").sections["graph"] == {"file": "odd.csv"}
 
 
 def test_new_replaces_nothing_unless_told_to():
@@ -225,8 +228,12 @@ def test_every_key_is_an_option_with_a_meaning_and_an_example_that_is_read():
 
 
 def test_without_its_comments_every_line_of_the_template_is_toml():
-    lines = [line.removeprefix("# ") for line in template(PARAMETERS, "a b.csv", ["é", 'say "x"']).splitlines()[2:]]
+    lines = [
+        line.removeprefix("# ") for line in template(PARAMETERS, "a b.csv", ["é", 'say "x"', "a\x7fb"]).splitlines()[2:]
+    ]
     once = [line for line in lines if not line.startswith("x0 = {")]
     sections = tomllib.loads("\n".join(once))
     assert {name: set(keys) for name, keys in sections.items()} == {k: set(keys) for k, (_, keys) in SECTIONS.items()}
-    assert tomllib.loads(next(line for line in lines if line not in once)) == {"x0": {"é": 1, 'say "x"': 1}}
+    assert tomllib.loads(next(line for line in lines if line not in once)) == {
+        "x0": {"é": 1, 'say "x"': 1, "a\x7fb": 1}
+    }

@@ -149,7 +149,9 @@ STATES = {
 @pytest.mark.parametrize("form", STATES)
 def test_a_state_is_the_same_in_whatever_form_it_is_given(form):
     assert as_state(STATES[form], TEAM) == [5, 2, -4]
-    assert ptcc.simulate(TEAM, PROTOCOL, STATES[form], samples=3).states.reshape(3, -1)[:, 0].tolist() == [5, 2, -4]
+    assert ptcc.simulate(TEAM, PROTOCOL, STATES[form], samples=3).states[:, 0].tolist() == [5, 2, -4]
+    sliding = ptcc.simulate(TEAM, ptcc.SlidingModeProtocol(), STATES[form], sigma0=STATES[form], times=[0])
+    assert sliding.states[:, 0].tolist() == sliding.sigma0.tolist() == [5, 2, -4]
 
 
 def test_a_state_is_read_from_series_frames_and_files(tmp_path):

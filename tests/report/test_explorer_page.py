@@ -118,6 +118,11 @@ def test_who_does_not_come_from_the_printed_address_gets_no_answer(
     assert "Access-Control-Allow-Origin" not in answer
 
 
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_a_browser_leaves_out_port_80_of_the_address(server: ExplorerServer, name: str):
+    assert get(server, server.root, Host=name, Origin=f"http://{name}")[0] == 200
+
+
 def test_only_this_machine_reaches_the_server_and_only_by_reading(server: ExplorerServer):
     assert server.server_address[0] == "127.0.0.1"
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=60)
@@ -194,9 +199,14 @@ def test_no_port_at_all_is_one_line(monkeypatch: pytest.MonkeyPatch):
         (["--port", "http"], "'--port'"),
         (["no_such_graph.csv"], "no_such_graph.csv"),
         (["-"], "save it and name the file"),
+        (["asked.toml"], "is a scenario, not a graph; ptcc certify"),
+        (["fig1b", "--undirected"], "is a packaged graph, shown as it is"),
     ],
 )
-def test_bad_arguments_are_one_line(arguments: list[str], says: str):
+def test_bad_arguments_are_one_line(arguments: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("asked.toml").write_text('[graph]\nfile = "fig1b"\n')
+    monkeypatch.setattr(ExplorerServer, "serve_forever", lambda served: None)
     done = ptcc("explore", "--no-browser", *arguments)
     assert done.code == 2 and done.out == ""
     assert says in done.err and len(done.err.splitlines()) == 1

@@ -374,6 +374,16 @@ def test_options_outside_their_domain_are_named(options, words):
         simulate(example("fig1a"), EXAMPLE_1, X0, **options)
 
 
+def test_numbers_of_numpy_are_options():
+    graph, start = example("fig1b"), np.arange(6)
+    options = {"remaining": np.float32(0.5), "past": np.int64(1), "rtol": np.float32(1e-6), "atol": Fraction(1, 10**6)}
+    run = simulate(graph, EXAMPLE_1, start, samples=np.int64(3), **options)
+    assert run.t[-1] == 1.2 and (run.at(np.int64(1)) == run.final_state).all()
+    for none in (True, "1", float("inf"), 10**400, np.ones(1), None):
+        with pytest.raises(ParameterError, match="fraction"):
+            run.at(none)
+
+
 def test_fractions_are_a_start():
     start = [Fraction(v, 3) for v in X0]
     run = simulate(example("fig1a"), EXAMPLE_1, start, samples=3)

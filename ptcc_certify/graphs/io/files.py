@@ -43,7 +43,7 @@ def refuse_no_path(path: object) -> None:
     Traceback (most recent call last):
     ptcc_certify.errors.FormatError: 5 names no file; give a path
     """
-    if not isinstance(path, str | os.PathLike):
+    if not isinstance(path, str | os.PathLike) or not Path(path).name:
         raise FormatError(f"{shorten(repr(path))} names no file; give a path")
 
 

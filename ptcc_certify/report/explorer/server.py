@@ -236,7 +236,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _foreign(self, path: str) -> str | None:
         """Tell why a request is not answered: it does not come from a browser to which the address was given."""
         host = self.headers.get("Host", "")
-        if host.rpartition(":")[0] not in HOSTS:
+        if host.split(":")[0] not in HOSTS:
             return "this server answers under the names 127.0.0.1 and localhost only"
         if self.headers.get("Origin") not in (None, f"http://{host}"):
             return "this server does not answer pages of other sites"
