@@ -31,6 +31,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary
 from ptcc_certify.graphs.family import Family
@@ -191,7 +192,7 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, another than the nominal one, or an initial state that does not fit.
+        No protocol, another than the nominal one, an initial state that does not fit, or more than 1,000 modes.
 
     Examples
     --------
@@ -206,6 +207,11 @@ def certify_family(
         raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    if len(family.modes) > MANY_MODES:
+        mend = "put modes whose edges have the same signs into one, with intervals that hold them all; ptcc classify"
+        raise ParameterError(
+            f"{len(family.modes):,} modes, and a certificate holds {MANY_MODES:,} at most; {mend} and decide take any"
+        )
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
