@@ -12,7 +12,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import family_options, same_family
-from ptcc_certify.cli.terminal import Screen, print_json, progress, screen_options
+from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
         with progress(("independent check", "simulation", "report")) as begin:
             verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
     except RejectedCertificate as error:
-        click.echo(f"rejected: {error}", err=True)
+        print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
-    click.echo(f"{verdict:<10} {output}")
+    print_lines(f"{verdict:<10} {output}")
     return {"certified": ExitCode.OK, "undecided": ExitCode.UNDECIDED}.get(verdict, ExitCode.VIOLATED)

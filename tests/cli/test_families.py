@@ -259,3 +259,18 @@ def test_what_new_writes_tells_of_families():
 def test_modes_are_called_by_their_files():
     assert [mode.name for mode in read_family(["day.csv", "night.csv"]).modes] == ["day", "night"]
     assert "day, night: 2 modes" in ptcc("classify", *BOTH).out
+
+
+def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
+    odd = "day\x1bc.csv"
+    Path(odd).write_text(FILES["day.csv"])
+    both = (odd, "night.csv", "--switching")
+    out = "c\x1bc.json"
+    for words in (
+        *(("classify", *both), ("classify", *both, "-v"), ("certify", *both, "-v", "-o", out), ("certify", *both)),
+        *(("check", out, *both), ("check", out, *both, "-v"), ("check", out, *BOTH, "-v"), ("check", out, *BOTH)),
+        *(("check", out, odd), ("simulate", *both, "-o", "r\x1b.csv"), ("certify", odd, "night.csv")),
+        *(("certify", *both, "--expect", "stability"), ("classify", odd, "spoiled.csv", "--switching", "-v")),
+    ):
+        run = ptcc(*words)
+        assert "\x1b" not in run.out + run.err and len(run.out + run.err) > 10, words
