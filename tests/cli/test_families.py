@@ -116,6 +116,7 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*BOTH, "--expect", "consensus"), 3, "refuted: consensus"),
         ((*BOTH, "--min-rate", "0.1"), 0, "met: rate >= 0.1"),
         ((*BOTH, "--min-rate", "100"), 3, "refuted: rate >= 100 (upper bound"),
+        ((*BOTH, "--min-rate", "1"), 4, "left open: rate >= 1 (proved: 0.955"),
         ((*BOTH, "--kappa", "3", "--max-input", "1000"), 0, "met: |u_k| <= 1000"),
         ((*BOTH, "--kappa", "3", "--max-input", "1"), 3, "it is up to 57.888 at the start, proved"),
         ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
@@ -148,6 +149,8 @@ def test_what_is_not_decided_says_what_to_try_and_writes_nothing():
     assert ptcc("classify", "many.csv", "--expect", "stability").code == 3
     run = ptcc("certify", "many.csv", "-o", "c.json")
     assert run.code == 4 and "undecided: " in run.out and not Path("c.json").exists()
+    run = ptcc("certify", "many.csv", "--min-rate", "0.001")
+    assert run.code == 4 and "left open: rate >= 0.001" in " ".join(run.out.split()), run
 
 
 @pytest.mark.parametrize("command", ["plot", "design", "explore"])
@@ -178,6 +181,11 @@ BAD = {
     "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: its least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
     "two signs in one mode": (_rows("a,b,1,2", "a,b,-2,-1"), (), "line 3: second row .* two files \\(modes\\), or one"),
+    "both directions of an undirected edge": (
+        _rows("a,b,1,2", "b,c,1,1", "b,a,1,2"),
+        ("--undirected",),
+        "bad.csv, line 4: second row for edge b -> a .the first is line 2.; --undirected makes each row both",
+    ),
     "one end": (_rows("a,b,1", header="source,target,weight_min"), (), "one end of the intervals"),
     "no number": (_rows("a,b,1,x"), (), 'line 2: edge a -> b: "x" is not a number'),
     "empty end": (_rows("a,b,,2"), (), "line 2: edge a -> b"),
@@ -203,6 +211,8 @@ BAD = {
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
+    "a rate of constant signals": (_rows("a,b,1,2"), ("--signal", "constant", "--min-rate", "1"), "leave them out"),
+    "an input of constant signals": (_rows("a,b,1,2"), ("--signal", "constant", "--max-input", "9"), "leave them out"),
     "sliding mode": (_rows("a,b,1,2"), ("--protocol", "sliding-mode"), "nominal protocol alone"),
     "no deadline": (_rows("a,b,1,2"), ("--rho2", "0"), "rho2 = 0 gives no deadline"),
     "another length": (_rows("a,b,1,2"), ("--x0", "1,2,3"), "3 values for 2 nodes"),

@@ -81,7 +81,7 @@ def read_family(
     named: dict[str, Family] = {}
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
-        rows = _interval_rows(path, orientation or "information", share)
+        rows = _interval_rows(path, orientation or "information", share, undirected)
         name = stem = Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
         again = number
         while name in named:  # no mode may take the place of another
@@ -167,7 +167,9 @@ def _may_fail(row: Row) -> Row:
     return row[0], row[1], min(row[2], Fraction(0)), max(row[3], Fraction(0))
 
 
-def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[list[str], list[Row]] | None:
+def _interval_rows(
+    path: Source, orientation: str, share: Fraction, undirected: bool
+) -> tuple[list[str], list[Row]] | None:
     """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files."""
     name, ending = name_and_ending(path)
     if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
@@ -197,11 +199,11 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
             continue
         edge = _row(row, ends, (low, high, may_fail), where, share)
         nodes |= dict.fromkeys(edge[:2])
-        if edge[:2] in rows:
+        if again := next((rows[pair] for pair in _both(edge[:2], undirected) if pair in rows), None):
             mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
-            raise FormatError(
-                f"{where}: second row for edge {_text(edge)} (the first is line {rows[edge[:2]][0]}); {mend}"
-            )
+            if again[1][:2] != edge[:2]:
+                mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
+            raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
     if not nodes:
         raise FormatError(f"{name}: no edge and no node below the header; give rows")
