@@ -106,6 +106,7 @@ def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     return {
         "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
         "asked": {"behaviour": expectations.behaviour},
+        "read": dict(certificate.family.read) or None,
         "origins": dict(certificate.origins),
         "scenario": certificate.scenario,
         "notes": list(certificate.notes),

@@ -35,9 +35,9 @@ def check(
 
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
     certificate says that it was read, which is printed; the options about reading override that. Of a family name all
-    its graphs, with the options that made it. Prints claim and
-    verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected,
-    4 if the certificate itself says undecided. `python -m ptcc_certify.checker` does the same, without other packages.
+    its graphs, in any order. Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0
+    if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided.
+    `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
     from ptcc_certify.report.screen import check_summary
@@ -51,7 +51,7 @@ def check(
     how: dict[str, str] = {}
     if graph and report.accepted:
         if "modes" in document["graph"]:
-            report, how = same_family(report, document, graph, options)
+            report, how = same_family(report, document, certificate, graph, options)
         elif len(graph) > 1:
             raise ParameterError("this certificate is of one graph; name one")
         else:

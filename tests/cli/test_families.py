@@ -70,20 +70,53 @@ def test_standard_input_holds_intervals_or_a_mode():
     assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
 
 
-def test_what_is_written_is_checked_against_the_files_in_their_order():
+def test_what_is_written_is_checked_against_the_files():
     assert ptcc("certify", *BOTH, "--kappa", "3", "-o", "c.json").code == 0
     checked = ptcc("check", "c.json")
     assert checked.code == 0 and "bipartite consensus at T = 1 for every signal" in checked.out
-    assert ptcc("check", "c.json", *BOTH).code == 0
     for words, why in (
-        (("night.csv", "day.csv", "--switching"), "the modes are in another order"),
-        (("day.csv", "spoiled.csv", "--switching"), "in mode night"),
-        ((*BOTH, "--uncertainty", "1%"), "in mode day"),
+        (("day.csv", "spoiled.csv"), "in mode night (spoiled of the files) the certificate alone has"),
+        ((*BOTH, "--uncertainty", "1%"), "in mode day (one of 2 that differ)"),
         (("day.csv",), "2 modes in the certificate, 1 in the files"),
         (("other.csv", "--uncertainty", "1%"), "the certificate alone has node c"),
+        (("day.csv", "day.csv"), "in mode night (day (2) of the files) the certificate alone has"),
     ):
         run = ptcc("check", "c.json", *words)
         assert run.code == 1 and why in " ".join(run.out.split()), run
+    assert ptcc("check", "c.json", "day.csv", "nowhere.csv").code == 2
+
+
+def test_modes_are_the_same_in_any_order_and_by_any_name():
+    """Which file is which is told where names or order are others; no claim rests on them."""
+    assert ptcc("certify", *BOTH, "-o", "c.json").code == 0
+    plain = ptcc("check", "c.json", "day.csv", "night.csv")
+    assert plain.code == 0 and "modes" not in plain.out
+    turned = ptcc("check", "c.json", "night.csv", "day.csv")
+    assert turned.code == 0 and "in another order than in the certificate, day, night" in turned.out
+    Path("noon.csv").write_text(FILES["night.csv"])
+    named = ptcc("check", "c.json", "day.csv", "noon.csv")
+    assert named.code == 0 and "modes day, noon are called day, night in the certificate" in named.out
+    Path("day.csv").write_text(FILES["night.csv"])
+    Path("night.csv").write_text(FILES["day.csv"])
+    swapped = ptcc("check", "c.json", *BOTH)
+    assert swapped.code == 0 and "modes night, day are called day, night" in swapped.out
+
+
+def test_files_are_read_as_the_certificate_says():
+    options = ("--uncertainty", "5%", "--edges", "listens", "--optional", "c,b", "--undirected")
+    assert ptcc("certify", *BOTH, *options, "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", "day.csv", "night.csv")
+    said = "read as the certificate says: --edges listens --undirected --uncertainty 1/20 --optional c,b"
+    assert run.code == 0 and said in " ".join(run.out.split())
+    assert ptcc("check", "c.json", *BOTH, *options[:3], "listens").code == 0
+    for other in (("--uncertainty", "1%"), ("--optional", "a,b")):
+        assert ptcc("check", "c.json", *BOTH, *other).code == 1
+    Path("s.toml").write_text('[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\noptional = ["a,b"]\n')
+    assert ptcc("certify", "s.toml", "-o", "d.json").code == 0
+    assert ptcc("check", "d.json", "s.toml").code == ptcc("check", "d.json", "day.csv", "night.csv").code == 0
+    assert ptcc("check", "c.json", "s.toml").code == ptcc("check", "d.json", "s.toml", "--uncertainty", "1%").code == 1
+    Path("e.json").write_text(Path("c.json").read_text().replace('"1/20",\n   "optional"', '[],\n   "optional"'))
+    assert ptcc("check", "e.json").code == 0 and ptcc("check", "e.json", *BOTH).code == 1
 
 
 def test_a_scenario_lists_the_graphs_of_a_family():
