@@ -13,20 +13,22 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
+from ptcc_certify.checker.family_bounds import deviations, peaks
+from ptcc_certify.checker.family_limits import limits
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.family_kernel import UNKNOWN
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,24 @@ class ComponentProof:
     def rate(self) -> Fraction | None:
         """The largest proved rate for every signal; None if there is none."""
         return max((V.rate for V in self.functions if V.rate > 0), default=None)
+
+    @cached_property
+    def leading_groups(self) -> tuple[LeadingGroup, ...]:
+        """The leading group of every column of the common kernel."""
+        return leading_groups(self.component)
+
+    @property
+    def kernel_rows(self) -> dict[int, dict[int, Fraction]]:
+        """The rows of the basis of the common kernel, without zeros, by nodes of the component."""
+        kernel = self.component.kernel
+        assert kernel is not None, "the component has a common kernel"
+        rows: dict[int, dict[int, Fraction]] = {}
+        for v, code in enumerate(kernel.codes.tolist()):
+            if code == UNKNOWN:
+                rows[v] = {j: b for j, b in enumerate(kernel.row(v)) if b}
+            else:
+                rows[v] = {abs(code) - 1: Fraction(1 if code > 0 else -1)} if code else {}
+        return rows
 
 
 @dataclass(frozen=True)
@@ -151,16 +171,10 @@ class FamilyContent:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
         if component.behaviour == DEPENDS:
             return dict.fromkeys(range(n))
+        groups = dict(enumerate(part.leading_groups))
+        means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
         moves = deviations(self._bound_functions(part), False, x)
-        if component.behaviour == BIPARTITE_CONSENSUS:
-            assert component.gauge is not None
-            camps = dict(enumerate(component.gauge.tolist()))
-            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
-        largest = max(map(abs, x))
-        return {
-            k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
-            for k in range(n)
-        }
+        return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, moves, x))
 
     @property
     def bounded(self) -> bool | None:
