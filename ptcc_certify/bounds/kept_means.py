@@ -3,7 +3,8 @@
 Let a component of a family have a common kernel with basis ``B``. The pivot of column ``j`` and all agents that it
 hears have rows ``g_k e_j'``: a *leading group* with camps ``g``, which ends at ``g c_j``. If ``p' M(L) = 0`` for every
 member, ``p`` supported on the group, then ``c_j = p' G X(0) / p' 1`` for every signal. Only the left null vector of the
-mandatory graph of the first mode can be such a ``p``: ones for undirected graphs.
+mandatory graph of the first mode can be such a ``p``: ones for undirected graphs. Where there is none, a Lyapunov
+function keeps ``p' G X`` near its first value, nearest for a ``p`` that is nearly one for all members.
 
 References
 ----------
@@ -14,15 +15,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
+from ptcc_certify.bounds.family_final_state import middle_left_vector
 from ptcc_certify.checker.family_limits import agents_heard
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.lyapunov.family_function import MARGIN, FamilyFunction, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.lemmas import exact_left_vector
 
@@ -87,6 +91,34 @@ def leading_groups(component: FamilyComponent) -> tuple[LeadingGroup, ...]:
         vector = _kept_vector(family, nodes, np.array(c.nodes)) if nodes.size > 1 else (1,)
         result.append(LeadingGroup(tuple(groups[j]), tuple(camps), vector))
     return tuple(result)
+
+
+def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[LeadingGroup]) -> FamilyFunction:
+    """Add to a function of positive rate a weighted mean of each leading group that keeps none exactly.
+
+    Examples
+    --------
+    >>> from ptcc_certify.lyapunov.family_search import search_family
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> (component,) = decide(Family.from_intervals([("a", "b", 9, 11), ("b", "a", 9, 11)]))
+    >>> quotient = Quotient.of(component)
+    >>> V = with_means(search_family(quotient).functions[0], quotient, leading_groups(component))
+    >>> [str(p) for p in V.means[0][0]]
+    ['1/2', '1/2']
+    """
+    if function.rate <= 0:
+        return function
+    means = []
+    for group in groups:
+        if group.vector is None:
+            q = [Fraction(0)] * quotient.family.n_nodes
+            p = middle_left_vector(quotient.family.restricted(np.array(group.nodes)))
+            for v, g, weight in zip(group.nodes, group.camps, p, strict=True):
+                q[v] = g * weight
+            constant = mean_constant(function, quotient, q)
+            if constant is not None:
+                means.append((tuple(q), rounded_up(constant * MARGIN)))
+    return replace(function, means=tuple(means))
 
 
 def _kept_vector(family: Family, nodes: np.ndarray, leaders: np.ndarray) -> tuple[int, ...] | None:

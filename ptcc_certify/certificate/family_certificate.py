@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -38,6 +39,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
 from ptcc_certify.lyapunov.follower_function import follower_functions
@@ -219,11 +221,25 @@ def certify_family(
     parts, notes = [], list(family.notes)
     with deadline.time_limit(seconds):
         for component in components:
-            parts.append(_prove(component, notes, progress))
+            part = _prove(component, notes, progress)
+            parts.append(part if initial_state is None else _with_means(part))
     progress(STEPS[3])
     told = origins_of(None, x0, None) | dict(origins or {})
     kept: dict[str, Any] = {"origins": told, "scenario": scenario}
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
+
+
+def _with_means(part: ComponentProof) -> ComponentProof:
+    """Add weighted means to the functions, where groups of leaders keep none exactly."""
+    if all(group.vector is not None for group in part.leading_groups):
+        return part
+    forms = {k: V for k, V in enumerate(part.functions) if isinstance(V, FamilyFunction)}
+    quotient = Quotient.of(part.component) if forms else None
+    functions = list(part.functions)
+    for k, V in forms.items():
+        assert quotient is not None
+        functions[k] = with_means(V, quotient, part.leading_groups)
+    return replace(part, functions=tuple(functions))
 
 
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:

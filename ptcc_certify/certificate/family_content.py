@@ -16,8 +16,8 @@ import numpy as np
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.family_bounds import deviations, peaks
-from ptcc_certify.checker.family_limits import limits
+from ptcc_certify.checker.family_bounds import deviations, mean_intervals, peaks
+from ptcc_certify.checker.family_limits import WeightedMean, limits
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -93,6 +93,17 @@ class BoundFunction:
     def coordinates(self) -> Mapping[int, Fraction]:
         """``xi_k^2 <= coordinates[k] V``."""
         return dict(zip(self.function.nodes, self.function.coordinate_constants, strict=True))
+
+    @property
+    def means(self) -> list[WeightedMean]:
+        """Weighted means of leading groups, with their constants."""
+        codes, result = self.quotient.kernel.codes, []
+        for q, constant in self.function.means:
+            weights = {v: w for v, w in enumerate(q) if w}
+            signs = {v: int(codes[v]) for v in weights}
+            size = sum((w if signs[v] > 0 else -w for v, w in weights.items()), Fraction(0))
+            result.append(WeightedMean(abs(signs[min(signs)]) - 1, weights, size, constant))
+        return result
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state of the component."""
@@ -173,8 +184,9 @@ class FamilyContent:
             return dict.fromkeys(range(n))
         groups = dict(enumerate(part.leading_groups))
         means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
-        moves = deviations(self._bound_functions(part), False, x)
-        return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, moves, x))
+        functions = self._bound_functions(part)
+        near, moves = mean_intervals(functions, x), deviations(functions, False, x)
+        return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, near, moves, x))
 
     @property
     def bounded(self) -> bool | None:

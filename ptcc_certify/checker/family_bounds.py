@@ -18,7 +18,7 @@ from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import STABILITY, Component, Family
-from ptcc_certify.checker.family_limits import check_means, limits
+from ptcc_certify.checker.family_limits import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
@@ -45,6 +45,10 @@ class Function(Protocol):
     def coordinates(self) -> Mapping[int, Fraction]:
         """Constants of coordinates."""
 
+    @property
+    def means(self) -> Sequence[WeightedMean]:
+        """Weighted means, with their constants."""
+
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
 
@@ -62,6 +66,18 @@ def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction
             bounds[k] = min(bounds[k], root_above(c * value))
         least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
     return least
+
+
+def mean_intervals(functions: Iterable[Function], x: Sequence[Fraction]) -> list[tuple[int, Interval]]:
+    """Return columns of the basis with ends of their ``c_j``, from the means of functions of one component."""
+    result = []
+    for V in functions:
+        if V.means and V.rate > 0:
+            value = rounded(V.value(x), BITS, up=True)
+            for mean in V.means:
+                spend(EACH_ROOT + 10 * len(mean.weights), what="means of many agents")
+                result.append((mean.column, mean.interval(x, 2 * root_above(mean.constant * value) / V.rate)))
+    return result
 
 
 def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> dict[int, Fraction]:
@@ -96,7 +112,8 @@ def final_states(
         longest(x[v].numerator for v in component.nodes),
     )
     spend(8 * component.size, bits, own, "final states")
-    return dict(limits(component.kernel, groups, means, deviations(functions, False, x), x))
+    near = mean_intervals(functions, x)
+    return dict(limits(component.kernel, groups, means, near, deviations(functions, False, x), x))
 
 
 # ---------------------------------------------------------------------- the check

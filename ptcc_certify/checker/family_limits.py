@@ -7,12 +7,14 @@ heard, so the extremes of ``g_k x_k`` over ``A_j`` only move inwards, and ``c_j`
 
 If ``q' L = 0`` for every member, ``q`` supported on ``A_j``, then ``q' X`` is kept by every signal, and
 ``c_j = q' X(0) / sum_k q_k g_k``: exactly. Of edges ``s -> t`` with ``w- < w+`` this asks ``q_t = 0``, or if both
-directions change together, ``q_t = sign q_s``.
+directions change together, ``q_t = sign q_s``. If only ``|q' L X|^2 <= m V`` for every member, ``V`` a Lyapunov
+function of rate ``r``, then ``|q' X(0) - q' X(T)| <= (2/r) sqrt(m V(0))``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -25,6 +27,32 @@ from ptcc_certify.checker.reading import Interval, entries, exact, need
 
 #: What a witness says of a vector that is the camps.
 EQUAL = "equal"
+
+
+@dataclass(frozen=True)
+class WeightedMean:
+    """A weighted mean that a Lyapunov function keeps near its first value: ``|q' L X|^2 <= constant V``.
+
+    Attributes
+    ----------
+    column : int
+        All agents of ``weights`` have rows of ``B`` that are 1 or -1 in this column, and 0 elsewhere.
+    weights : dict of int to Fraction
+        ``q``,
+    size : Fraction
+        with the sum ``sum_k q_k g_k``, not 0.
+    constant : Fraction
+    """
+
+    column: int
+    weights: Mapping[int, Fraction]
+    size: Fraction
+    constant: Fraction
+
+    def interval(self, x: Sequence[Fraction], deviation: Fraction) -> Interval:
+        """Return ends of ``c_j``; ``q' X`` moves by at most ``deviation``."""
+        middle, radius = sum((q * x[v] for v, q in self.weights.items()), Fraction(0)), deviation / abs(self.size)
+        return middle / self.size - radius, middle / self.size + radius
 
 
 def agents_heard(pairs: Iterable[tuple[int, int]], pivots: Mapping[int, int]) -> dict[int, list[int]]:
@@ -47,18 +75,21 @@ def limits(
     kernel: Mapping[int, Mapping[int, Fraction]],
     groups: Mapping[int, Sequence[int]],
     means: Mapping[int, Fraction],
+    near: Iterable[tuple[int, Interval]],
     moves: Mapping[int, Fraction],
     x: Sequence[Fraction],
 ) -> dict[int, Interval]:
     """Return ends of ``x_k(T)`` of every agent.
 
     ``kernel`` has the rows of ``B`` without zeros, ``groups`` the sets ``A_j``, ``means`` the ``c_j`` that are known
-    exactly, ``moves`` bounds of ``|x_k(0) - x_k(T)|``.
+    exactly, ``near`` other columns with ends of theirs, ``moves`` bounds of ``|x_k(0) - x_k(T)|``.
     """
     ends: dict[int, Interval] = {}
     for j, group in groups.items():
         values = [kernel[v][j] * x[v] for v in group]
         ends[j] = (means[j], means[j]) if j in means else (min(values), max(values))
+    for j, (low, high) in near:
+        ends[j] = max(low, ends[j][0]), min(high, ends[j][1])
     units = {v: item for v, row in kernel.items() if len(row) == 1 and abs((item := next(iter(row.items())))[1]) == 1}
     for v, d in moves.items():
         if v in units:
