@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -16,6 +17,7 @@ from ptcc_certify.bounds.kept_means import leading_groups
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.checker import check, digest
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -136,6 +138,50 @@ def test_followers_of_leaders_that_keep_their_values_end_at_a_point():
     certificate = certify_family(family, PROTOCOL, [1, 5, 99, -99, 0])
     assert certificate.verdict == "certified"
     assert certificate.final_states == tuple((Fraction(v),) * 2 for v in (1, 5, 4, 4, Fraction(-5, 2)))
+
+
+def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
+    """The ends without the mean are those of deviations of single agents; the mean narrows them to half and less."""
+    rng = random.Random(2)
+    cycle = [(k, (k + 1) % 5, 3, 3) for k in range(5)] + [(0, 2, 1, 1)]
+    family = Family.from_intervals([(s, t, low * Fraction(19, 20), low * Fraction(21, 20)) for s, t, low, _ in cycle])
+    x = [Fraction(v) for v in (5, -3, 8, 0, -9)]
+    certificate = certify_family(family, PROTOCOL, x)
+    bare = replace(certificate, parts=tuple(replace(p, functions=stripped(p)) for p in certificate.parts))
+    assert certificate.verdict == bare.verdict == "certified"
+    assert certificate.final_states is not None and bare.final_states is not None
+    (low, high), (before, after) = (ends for c in (certificate, bare) if (ends := c.final_states[0]) is not None)
+    assert before <= low < high <= after and high - low < (after - before) / 2
+    for _ in range(5):
+        assert low - 1e-6 <= end_of_a_signal(rng, family, x)[0] <= high + 1e-6
+    data = certificate.to_dict()
+    data["lyapunov"]["functions"][0]["means"][0]["constant"] = "0"
+    assert "of an input or a mean" in str(answer(data))
+
+
+def stripped(part: ComponentProof) -> tuple[FamilyFunction, ...]:
+    return tuple(replace(V, means=()) for V in part.functions if isinstance(V, FamilyFunction))
+
+
+@pytest.mark.parametrize(
+    ("mean", "why"),
+    [
+        ({"weights": {}, "constant": "1"}, "weights of a mean"),
+        ({"weights": {"1": "0"}, "constant": "1"}, "weight 0"),
+        ({"weights": {"1": "1", "3": "1"}, "constant": "9999"}, "several groups"),
+        ({"weights": {"1": "1", "2": "1"}, "constant": "9999"}, "several groups"),
+        ({"weights": {"1": "1", "4": "1"}, "constant": "9999"}, None),
+        ({"weights": {"1": "1"}, "constant": "0"}, None),
+        ({"weights": {"1": "1"}}, "constant"),
+    ],
+)
+def test_a_mean_is_of_agents_of_one_group(mean: dict[str, Any], why: str | None):
+    """1 and 2 lead, 3 hears both, 4 hears 1."""
+    family = Family.from_intervals([(1, 3, 1, 1), (2, 3, 1, 1), (1, 4, 1, 2)])
+    data = certify_family(family, PROTOCOL, [1, 2, 3, 4]).to_dict()
+    data["lyapunov"]["functions"][0]["means"] = [mean]
+    found = answer(data)
+    assert found is None if why is None else why in str(found)
 
 
 # ---------------------------------------------------------------------- the check
