@@ -180,7 +180,7 @@ class FamilyContent:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
-        if component.behaviour == DEPENDS:
+        if component.behaviour in (DEPENDS, None):
             return dict.fromkeys(range(n))
         groups = dict(enumerate(part.leading_groups))
         means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
