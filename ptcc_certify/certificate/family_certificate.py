@@ -110,10 +110,10 @@ class FamilyCertificate(FamilyContent, Shown):
 
     @cached_property
     def checked(self) -> CheckReport | None:
-        """What the independent check says; None where a behaviour is not decided."""
+        """What the independent check says; None where a behaviour is not decided, or takes too many rows."""
         if self.source is not None:
             return self.source.report
-        if any(part.component.behaviour is None for part in self.parts):
+        if not all(part.certifiable for part in self.parts):
             return None
         document, files = self._document
         return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
@@ -243,8 +243,9 @@ def _with_means(part: ComponentProof) -> ComponentProof:
 
 
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
-    if component.kernel is None or component.nodes.size == 1:
-        return ComponentProof(component)
+    bare = ComponentProof(component)
+    if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
+        return bare
     if component.nodes.size > EXACT_NODES:
         progress(STEPS[2])
         with share_of_time(1.0, STEPS[2], notes):

@@ -53,6 +53,12 @@ class ComponentProof:
         """The largest proved rate for every signal; None if there is none."""
         return max((V.rate for V in self.functions if V.rate > 0), default=None)
 
+    @property
+    def certifiable(self) -> bool:
+        """Whether the behaviour is decided, and the rows of a common kernel are few enough to be written."""
+        kernel = self.component.kernel
+        return self.component.behaviour is not None and (kernel is None or kernel.has_rows)
+
     @cached_property
     def leading_groups(self) -> tuple[LeadingGroup, ...]:
         """The leading group of every column of the common kernel."""
@@ -180,7 +186,7 @@ class FamilyContent:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
-        if component.behaviour in (DEPENDS, None):
+        if component.behaviour == DEPENDS or not part.certifiable:
             return dict.fromkeys(range(n))
         groups = dict(enumerate(part.leading_groups))
         means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}

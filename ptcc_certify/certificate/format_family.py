@@ -207,6 +207,8 @@ def _witness(family: Family, component: FamilyComponent, number: Mapping[int, in
     labels = [family.labels[v] for v in nodes]
     if component.behaviour in (BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS):
         assert component.kernel is not None
+        if not component.kernel.has_rows:
+            return None
         structure = component.kernel.structure
         columns = [str(number[nodes[c.nodes[0]]]) for c in structure.closed_components if c.balanced]
         rows = {v: zip(columns, component.kernel.row(v), strict=True) for v in structure.followers.tolist()}
