@@ -225,6 +225,10 @@ class FamilyOracle:
                     for v, c in zip(nodes, constants, strict=True):
                         y = [L[v][u] for u in free]
                         self.require(self.form(G, y) <= c, "the constant of an input")
+                    for mean in said["means"]:
+                        q = [(self.index[label], number(w)) for label, w in mean["weights"].items()]
+                        y = [sum((w * L[v][u] for v, w in q), Fraction(0)) for u in free]
+                        self.require(self.form(G, y) <= number(mean["constant"]), "the constant of a mean")
             self.require(list(said["coordinates"]) == said["nodes"], "coordinates by agent")
             for i, c in enumerate(said["coordinates"].values()):
                 self.require(G[i][i] <= number(c), "the constant of a coordinate")

@@ -11,7 +11,8 @@ and the mirror image for ``-l``, and let ``d``, ``alpha`` be those of :mod:`ptcc
 
 at the largest, ``x_l <= u_l + rho d_l`` and ``x_l >= l_l - rho d_l``; add both conditions of its row. Policy iteration
 finds the smallest such box: solve for ``u``, take the worst weights, again until they stand. If some rows fail by a
-little, ``u + e d`` repairs them, since every row of ``d`` is at least ``alpha d_k``.
+little, ``u + e v`` repairs them with ``v > 0`` of which every row is about its largest total weight: what rounding
+leaves of a row is in proportion to its weights. (``d`` would do, but near the largest ``alpha`` its range is huge.)
 
 References
 ----------
@@ -27,10 +28,12 @@ from math import frexp
 
 import numpy as np
 
+from lmi.dyadic import dyadic_array
 from lmi.sparse_h_matrix import solve
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import find_camps, weak_components
+from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.family_rows import FollowerDecay, least_rate
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
 
@@ -156,14 +159,12 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     unit, z = _outside(intervals)
     with np.errstate(all="ignore"):
         y, policy = _largest(lifted, z)
-    d_twice = np.concatenate([d, d])
-    zeros = np.zeros(lifted.outside, dtype=np.int64).astype(object)
-    rate = least_rate(lifted, d_twice) / rows.unit
-    if rate <= 0:
+    if least_rate(rows, d) <= 0:
         raise ValueError("the vector proves no decay of these followers")
-    # sum |w| (y_k - y_l) + e sum |w| (d_k - d_l) >= 0 with e alpha d_k >= what is missing
-    needed = _missing(lifted.pull(np.concatenate([y, z])), d_twice) / rate
-    upper = _shifted(y, d_twice, needed)
+    v = np.tile(_repair(rows, d), 2)
+    v_all = np.concatenate([v, np.zeros(lifted.outside, dtype=np.int64).astype(v.dtype)])
+    # the least sum |w| (y_k - y_l) + e sum |w| (v_k - v_l) is at least the sum of both least ones
+    upper = _shifted(y, v, _missing(lifted.pull(np.concatenate([y, z])), lifted.pull(v_all)))
     if not (lifted.pull(np.concatenate([upper, z * 2**_PLACES])) >= 0).all():
         raise ArithmeticError("a row of a box fails, against what was proved")
     fine = unit / 2**_PLACES
@@ -171,9 +172,8 @@ def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, In
     if not _is_attained(family, rows):
         return box
     pull = lifted.pull_of(policy, np.concatenate([y, z]))
-    spare = lifted.pull_of(policy, np.concatenate([d_twice.astype(object), zeros]))
-    surplus = _missing(-pull, d_twice) / least_quotient(spare, d_twice)
-    return replace(box, attained=_ends(_shifted(y, d_twice, -surplus), fine))
+    surplus = _missing(-pull, lifted.pull_of(policy, v_all))
+    return replace(box, attained=_ends(_shifted(y, v, -surplus), fine))
 
 
 def _ends(y: np.ndarray, unit: Fraction) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
@@ -209,15 +209,34 @@ def _largest(lifted: IntervalRows, z: np.ndarray) -> tuple[np.ndarray, Policy]:
     return np.array([int(v) for v in np.rint(y).tolist()], dtype=object), policy
 
 
-def _missing(pull: np.ndarray, d: np.ndarray) -> Fraction:
-    """Return the least ``e >= 0`` with ``pull + e d >= 0`` in all rows."""
-    return max(Fraction(0), -least_quotient(pull.ravel(), np.tile(d, pull.size // d.size)))
+def _repair(rows: IntervalRows, d: np.ndarray) -> np.ndarray:
+    """Return integers ``v > 0`` of which every least row is positive, about its largest total weight; else ``d``."""
+    none = np.zeros(rows.outside)
+    total = rows.largest_pushes(np.ones(rows.n + rows.outside)).max(axis=0)
+    policy = rows.worst(np.concatenate([np.ones(rows.n), none]))
+    with np.errstate(all="ignore"):
+        for _ in range(_ROUNDS):
+            M, _ = rows.system(policy)
+            v = solve(M, total, M.diagonal(), _RESIDUAL)
+            if not (np.isfinite(v).all() and (v > 0).all()):
+                return d
+            new = rows.worst(np.concatenate([v, none]))
+            if new == policy:
+                break
+            policy = new
+    whole, _ = dyadic_array(round_array(v))
+    return whole if least_rate(rows, whole) > 0 else d
 
 
-def _shifted(y: np.ndarray, d: np.ndarray, e: Fraction) -> np.ndarray:
-    """Return integers ``2^_PLACES (y + e d)``, ``e`` rounded away from 0."""
+def _missing(pull: np.ndarray, spare: np.ndarray) -> Fraction:
+    """Return the least ``e >= 0`` with ``pull + e spare >= 0`` in all rows."""
+    return max(Fraction(0), -least_quotient(pull.ravel(), spare.ravel()))
+
+
+def _shifted(y: np.ndarray, v: np.ndarray, e: Fraction) -> np.ndarray:
+    """Return integers ``2^_PLACES (y + e v)``, ``e`` rounded away from 0."""
     steps = -((-abs(e) * 2**_PLACES).__floor__())
-    return y.astype(object) * 2**_PLACES + (steps if e > 0 else -steps) * d.astype(object)
+    return y.astype(object) * 2**_PLACES + (steps if e > 0 else -steps) * v.astype(object)
 
 
 def _is_attained(family: Family, rows: IntervalRows) -> bool:

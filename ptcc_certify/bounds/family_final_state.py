@@ -32,7 +32,7 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.family_function import FamilyFunction, inverse_forms, root_above, rounded_up
+from ptcc_certify.lyapunov.family_function import FamilyFunction, mean_constant, root_above, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_kernel import reached
@@ -284,27 +284,11 @@ def weighted_mean_interval(
     if sum(p, Fraction(0)) != 1:
         raise HypothesisError("the sum of the weights is not 1")
     signed = [weight * camp for weight, camp in zip(p, camps, strict=True)]
-    zero = Fraction(0)
-    vectors, factors = [], []
-    for mode in quotient.modes:
-        row = [
-            sum((s * r for s, r in zip(signed, column, strict=True) if s and r), zero)
-            for column in zip(*mode.rows, strict=True)
-        ]
-        terms = [(Fraction(1), row)]
-        for part in mode.parts:
-            size = abs(sum((signed[k] * sign for k, sign in part.effect.items()), zero))
-            if size:
-                terms.append((part.radius * size, list(part.h)))
-        factors.append([factor for factor, _ in terms])
-        vectors += [vector for _, vector in terms]
-    squares = inverse_forms(function.matrix, vectors)
-    if squares is None:
+    constant = mean_constant(function, quotient, signed)
+    if constant is None:
         raise HypothesisError("the matrix of the function is not proved definite")
-    norms = iter([root_above(y) for y in squares])
-    kappa = max(sum((factor * next(norms) for factor in own), zero) for own in factors)
-    mean = sum((s * y for s, y in zip(signed, x, strict=True)), zero)
-    reach = 2 * kappa / function.rate * root_above(function.value(quotient.coordinates(x)))
+    mean = sum((s * y for s, y in zip(signed, x, strict=True)), Fraction(0))
+    reach = 2 / function.rate * root_above(constant * function.value(quotient.coordinates(x)))
     reach = rounded_up(reach)
     return mean - reach, mean + reach
 

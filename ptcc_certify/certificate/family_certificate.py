@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -30,12 +31,14 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
 from ptcc_certify.lyapunov.follower_function import follower_functions
@@ -106,10 +109,10 @@ class FamilyCertificate(FamilyContent, Shown):
 
     @cached_property
     def checked(self) -> CheckReport | None:
-        """What the independent check says; None where a behaviour is not decided."""
+        """What the independent check says; None where a behaviour is not decided, or takes too many rows."""
         if self.source is not None:
             return self.source.report
-        if any(part.component.behaviour is None for part in self.parts):
+        if not all(part.certifiable for part in self.parts):
             return None
         document, files = self._document
         return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
@@ -190,7 +193,7 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, another than the nominal one, or an initial state that does not fit.
+        No protocol, another than the nominal one, an initial state that does not fit, or more than 1,000 modes.
 
     Examples
     --------
@@ -205,6 +208,11 @@ def certify_family(
         raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    if len(family.modes) > MANY_MODES:
+        mend = "put modes whose edges have the same signs into one, with intervals that hold them all; ptcc classify"
+        raise ParameterError(
+            f"{len(family.modes):,} modes, and a certificate holds {MANY_MODES:,} at most; {mend} and decide take any"
+        )
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
@@ -212,16 +220,31 @@ def certify_family(
     parts, notes = [], list(family.notes)
     with deadline.time_limit(seconds):
         for component in components:
-            parts.append(_prove(component, notes, progress))
+            part = _prove(component, notes, progress)
+            parts.append(part if initial_state is None else _with_means(part))
     progress(STEPS[3])
     told = origins_of(None, x0, None) | dict(origins or {})
     kept: dict[str, Any] = {"origins": told, "scenario": scenario}
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
 
 
+def _with_means(part: ComponentProof) -> ComponentProof:
+    """Add weighted means to the functions, where groups of leaders keep none exactly."""
+    if all(group.vector is not None for group in part.leading_groups):
+        return part
+    forms = {k: V for k, V in enumerate(part.functions) if isinstance(V, FamilyFunction)}
+    quotient = Quotient.of(part.component) if forms else None
+    functions = list(part.functions)
+    for k, V in forms.items():
+        assert quotient is not None
+        functions[k] = with_means(V, quotient, part.leading_groups)
+    return replace(part, functions=tuple(functions))
+
+
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
-    if component.kernel is None or component.nodes.size == 1:
-        return ComponentProof(component)
+    bare = ComponentProof(component)
+    if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
+        return bare
     if component.nodes.size > EXACT_NODES:
         progress(STEPS[2])
         with share_of_time(1.0, STEPS[2], notes):

@@ -13,20 +13,22 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
+from ptcc_certify.checker.family_bounds import deviations, mean_intervals, peaks
+from ptcc_certify.checker.family_limits import WeightedMean, limits
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.family_kernel import UNKNOWN
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,30 @@ class ComponentProof:
         """The largest proved rate for every signal; None if there is none."""
         return max((V.rate for V in self.functions if V.rate > 0), default=None)
 
+    @property
+    def certifiable(self) -> bool:
+        """Whether the behaviour is decided, and the rows of a common kernel are few enough to be written."""
+        kernel = self.component.kernel
+        return self.component.behaviour is not None and (kernel is None or kernel.has_rows)
+
+    @cached_property
+    def leading_groups(self) -> tuple[LeadingGroup, ...]:
+        """The leading group of every column of the common kernel."""
+        return leading_groups(self.component)
+
+    @property
+    def kernel_rows(self) -> dict[int, dict[int, Fraction]]:
+        """The rows of the basis of the common kernel, without zeros, by nodes of the component."""
+        kernel = self.component.kernel
+        assert kernel is not None, "the component has a common kernel"
+        rows: dict[int, dict[int, Fraction]] = {}
+        for v, code in enumerate(kernel.codes.tolist()):
+            if code == UNKNOWN:
+                rows[v] = {j: b for j, b in enumerate(kernel.row(v)) if b}
+            else:
+                rows[v] = {abs(code) - 1: Fraction(1 if code > 0 else -1)} if code else {}
+        return rows
+
 
 @dataclass(frozen=True)
 class BoundFunction:
@@ -73,6 +99,17 @@ class BoundFunction:
     def coordinates(self) -> Mapping[int, Fraction]:
         """``xi_k^2 <= coordinates[k] V``."""
         return dict(zip(self.function.nodes, self.function.coordinate_constants, strict=True))
+
+    @property
+    def means(self) -> list[WeightedMean]:
+        """Weighted means of leading groups, with their constants."""
+        codes, result = self.quotient.kernel.codes, []
+        for q, constant in self.function.means:
+            weights = {v: w for v, w in enumerate(q) if w}
+            signs = {v: int(codes[v]) for v in weights}
+            size = sum((w if signs[v] > 0 else -w for v, w in weights.items()), Fraction(0))
+            result.append(WeightedMean(abs(signs[min(signs)]) - 1, weights, size, constant))
+        return result
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state of the component."""
@@ -149,18 +186,13 @@ class FamilyContent:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
-        if component.behaviour == DEPENDS:
+        if component.behaviour == DEPENDS or not part.certifiable:
             return dict.fromkeys(range(n))
-        moves = deviations(self._bound_functions(part), False, x)
-        if component.behaviour == BIPARTITE_CONSENSUS:
-            assert component.gauge is not None
-            camps = dict(enumerate(component.gauge.tolist()))
-            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
-        largest = max(map(abs, x))
-        return {
-            k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
-            for k in range(n)
-        }
+        groups = dict(enumerate(part.leading_groups))
+        means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
+        functions = self._bound_functions(part)
+        near, moves = mean_intervals(functions, x), deviations(functions, False, x)
+        return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, near, moves, x))
 
     @property
     def bounded(self) -> bool | None:

@@ -24,6 +24,11 @@ NEXT_STEP = (
     "whether rest states agree is not decided: it takes exact rows of more than 120 agents; round the weights to few "
     "digits, or take out what is uncertain between agents that hear several leader groups"
 )
+#: What is told where it is decided without these rows.
+DECIDED_ALONE = (
+    "the behaviour is decided on edges, and not certified: a certificate holds exact rows of agents that hear several "
+    "leader groups, of 120 at most; ptcc classify shows the decision"
+)
 
 
 def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Assessment:
@@ -43,7 +48,9 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     answers += [] if asked.max_input is None else [_judge_input(certificate, asked.max_input)]
     if report is None or not report.accepted:
         why = (
-            NEXT_STEP if report is None else f"the independent check does not accept {report.rejected}: {report.reason}"
+            _without_report(components)
+            if report is None
+            else f"the independent check does not accept {report.rejected}: {report.reason}"
         )
         return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
     useful, caveat, advice = _usefulness(certificate), "", ""
@@ -55,6 +62,10 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
             advice = f"--rho2 {up(2 / (rate * kappa), 3)} bounds it"
     remark = "" if useful is not False else "little is proved by 0.99 T"
     return Assessment(CERTIFIED, False, useful, remark, advice, tuple(answers), caveat)
+
+
+def _without_report(components: Sequence[FamilyComponent]) -> str:
+    return NEXT_STEP if any(component.behaviour is None for component in components) else DECIDED_ALONE
 
 
 def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str) -> Answer:

@@ -17,6 +17,7 @@ from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
+from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import Weights
@@ -91,8 +92,28 @@ def _proof(
     for k, (_, V) in enumerate(functions):
         own = (rows_steps if V.kind == "rows" else form_steps)(f"lyapunov.functions[{k}]", V)
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
-    steps += [_step("family-final-state", "final_state")] * (certificate.final_states is not None)
+    if certificate.final_states is not None:
+        steps.append(_step("family-final-state", "final_state", _means(certificate)))
     return steps + [_step("family-input", "input")] * (certificate.bounded is not None)
+
+
+def _means(certificate: FamilyContent) -> list[Any] | None:
+    """Return the means that every signal keeps, by component and closed component; None if there is none."""
+    first = analyse(certificate.family.modes[0].mandatory)
+    number = {c.nodes[0]: str(k) for k, c in enumerate(first.closed_components, start=1)}
+    result: list[Any] = []
+    for part in certificate.parts:
+        nodes = part.component.nodes
+        labels = [certificate.family.labels[v] for v in nodes.tolist()]
+        means = {}
+        for group in part.leading_groups:
+            if group.vector is not None and len(group.nodes) > 1:
+                pivot = next(v for v in group.nodes if int(nodes[v]) in number)
+                terms = zip(group.nodes, group.camps, group.vector, strict=True)
+                q = {labels[v]: format_exact(Fraction(g * p)) for v, g, p in terms if p}
+                means[number[int(nodes[pivot])]] = EQUAL if set(group.vector) == {1} else q
+        result.append(means or None)
+    return result if any(result) else None
 
 
 def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, Any]:
@@ -106,6 +127,7 @@ def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     return {
         "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
         "asked": {"behaviour": expectations.behaviour},
+        "read": dict(certificate.family.read) or None,
         "origins": dict(certificate.origins),
         "scenario": certificate.scenario,
         "notes": list(certificate.notes),
@@ -185,6 +207,8 @@ def _witness(family: Family, component: FamilyComponent, number: Mapping[int, in
     labels = [family.labels[v] for v in nodes]
     if component.behaviour in (BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS):
         assert component.kernel is not None
+        if not component.kernel.has_rows:
+            return None
         structure = component.kernel.structure
         columns = [str(number[nodes[c.nodes[0]]]) for c in structure.closed_components if c.balanced]
         rows = {v: zip(columns, component.kernel.row(v), strict=True) for v in structure.followers.tolist()}

@@ -26,6 +26,13 @@ def form_entry(labels: list[str], number: int, V: FamilyFunction) -> dict[str, A
         "rate": format_exact(V.rate),
         "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
         "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
+        "means": [
+            {
+                "weights": {label: format_exact(w) for label, w in zip(labels, q, strict=True) if w},
+                "constant": format_exact(constant),
+            }
+            for q, constant in V.means
+        ],
     }
 
 

@@ -83,6 +83,10 @@ def _read_form(of: str, section: Mapping[str, Any], labels: Sequence[str], proof
         *ends,
         input_constants=tuple(map(exact, section["inputs"].values())),
         coordinate_constants=tuple(map(exact, section["coordinates"].values())),
+        means=tuple(
+            (tuple(exact(mean["weights"].get(label, "0")) for label in labels), exact(mean["constant"]))
+            for mean in section["means"]
+        ),
     )
 
 

@@ -4,7 +4,8 @@ With ``V <= e^(-r s) V(0)`` and ``|(L X)_k|^2 <= c_k V`` for every member, for e
 
     |u_k| <= gain sqrt(c_k V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) sqrt(c_k V(0)) e^(-r s / 2)
 
-and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``.
+and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``. Where agents end by the common kernel is in
+:mod:`~ptcc_certify.checker.family_limits`.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from fractions import Fraction
 from typing import Protocol
 
 from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.family import CONSENSUS, STABILITY, Component, Family
+from ptcc_certify.checker.family import STABILITY, Component, Family
+from ptcc_certify.checker.family_limits import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
@@ -42,6 +45,10 @@ class Function(Protocol):
     def coordinates(self) -> Mapping[int, Fraction]:
         """Constants of coordinates."""
 
+    @property
+    def means(self) -> Sequence[WeightedMean]:
+        """Weighted means, with their constants."""
+
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
 
@@ -61,19 +68,16 @@ def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction
     return least
 
 
-def final_interval(
-    nodes: Sequence[int],
-    camps: Mapping[int, int],
-    deciding: Iterable[int],
-    moves: Mapping[int, Fraction],
-    x: Sequence[Fraction],
-) -> dict[int, Interval]:
-    """Return ends of ``x_k(T)`` of a component that comes to consensus, from the deciding nodes and all deviations."""
-    values = [camps[k] * x[k] for k in deciding]
-    low, high = min(values), max(values)
-    for k, d in moves.items():
-        low, high = max(low, camps[k] * x[k] - d), min(high, camps[k] * x[k] + d)
-    return {k: (low, high) if camps[k] > 0 else (-high, -low) for k in nodes}
+def mean_intervals(functions: Iterable[Function], x: Sequence[Fraction]) -> list[tuple[int, Interval]]:
+    """Return columns of the basis with ends of their ``c_j``, from the means of functions of one component."""
+    result = []
+    for V in functions:
+        if V.means and V.rate > 0:
+            value = rounded(V.value(x), BITS, up=True)
+            for mean in V.means:
+                spend(EACH_ROOT + 10 * len(mean.weights), what="means of many agents")
+                result.append((mean.column, mean.interval(x, 2 * root_above(mean.constant * value) / V.rate)))
+    return result
 
 
 def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> dict[int, Fraction]:
@@ -89,25 +93,12 @@ def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) ->
     return least
 
 
-def deciding_nodes(family: Family, component: Component) -> list[int]:
-    """Return the nodes that may have a say in the consensus: what reaches a closed component through any edges."""
-    part = component.part
-    heard: dict[int, set[int]] = {v: set() for v in part.nodes}
-    pairs = zip(family.modes, part.closed, strict=True)
-    found = [v for mode, numbers in pairs for k in numbers for v in mode.structure.closed[k]]
-    for edges in part.edges:
-        for s, t, _, _, _ in edges:
-            heard[t].add(s)
-    seen = set(found)
-    for v in found:
-        new = heard[v] - seen
-        seen |= new
-        found.extend(new)
-    return sorted(seen)
-
-
 def final_states(
-    family: Family, component: Component, functions: Sequence[Function], x: Sequence[Fraction]
+    component: Component,
+    functions: Sequence[Function],
+    groups: Mapping[int, Sequence[int]],
+    means: Mapping[int, Fraction],
+    x: Sequence[Fraction],
 ) -> dict[int, Interval | None]:
     """Return the ends between which every agent of a component is at the deadline; None: no limit is claimed."""
     zero = Fraction(0)
@@ -115,16 +106,14 @@ def final_states(
         return dict.fromkeys(component.nodes, (zero, zero))
     if component.depends:
         return dict.fromkeys(component.nodes)
-    moves = deviations(functions, False, x)
-    if component.behaviour == CONSENSUS:
-        camps = component.part.camps or {}
-        return dict(final_interval(component.nodes, camps, deciding_nodes(family, component), moves, x))
-    largest = max(abs(x[v]) for v in component.nodes)
-    result: dict[int, Interval | None] = {}
-    for k in component.nodes:
-        d = moves.get(k, 2 * largest)
-        result[k] = max(-largest, x[k] - d), min(largest, x[k] + d)
-    return result
+    whole, _ = component.whole
+    bits, own = (
+        longest(b for row in whole.values() for b in row.values()),
+        longest(x[v].numerator for v in component.nodes),
+    )
+    spend(8 * component.size, bits, own, "final states")
+    near = mean_intervals(functions, x)
+    return dict(limits(component.kernel, groups, means, near, deviations(functions, False, x), x))
 
 
 # ---------------------------------------------------------------------- the check
@@ -138,10 +127,10 @@ def check_family_bounds(
     final = doc.section("final_state")
     need((final is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
-        doc.open("family-final-state", "final_state")
+        witness = doc.open("family-final-state", "final_state", witness=True)["witness"]
         known: dict[int, Interval | None] = {}
-        for component in family.components:
-            known |= final_states(family, component, [V for V in functions if V.component is component], x)
+        for component, kept in zip(family.components, check_means(doc, family, witness, x), strict=True):
+            known |= final_states(component, [V for V in functions if V.component is component], *kept, x)
         for v, entry in enumerate(ordered(labels, final, "final_state").values()):
             need((known[v] is None) == (entry is None), "a final state that is not claimed, or one that is")
             if (ends := known[v]) is not None:

@@ -17,7 +17,9 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.family import Component, Edge, Family
+from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows, times, transposed
@@ -26,7 +28,9 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, 
 
 Vector = dict[int, Fraction]
 Whole = dict[int, int]
-KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates")
+KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates", "means")
+#: Means of one function.
+MANY_MEANS = 100
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,7 @@ class FamilyFunction:
         ``|(L X)_k|^2 <= inputs[k] V`` for every member.
     coordinates : dict of int to Fraction
         ``xi_k^2 <= coordinates[k] V``.
+    means : list of WeightedMean
     """
 
     component: Component
@@ -81,6 +86,7 @@ class FamilyFunction:
     rate: Fraction
     inputs: Vector
     coordinates: Vector
+    means: list[WeightedMean]
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
@@ -122,9 +128,26 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
     inputs = dict(zip(own, map(exact, ordered(list(own.values()), entry["inputs"], "inputs").values()), strict=True))
     some = [labels[v] for v in nodes]
     coordinates = dict(zip(nodes, map(exact, ordered(some, entry["coordinates"], "coordinates").values()), strict=True))
-    _constants(doc.exact, modes, (P, scale), inputs, coordinates)
-    doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates")
-    return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates)
+    means = [_mean(doc, graph, component, mean) for mean in entries(entry["means"], "means")]
+    need(len(means) <= MANY_MEANS, f"more than {MANY_MEANS} means")
+    _constants(doc.exact, modes, (P, scale), inputs, coordinates, means)
+    doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates" + f", {len(means)} means" * bool(means))
+    return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates, means)
+
+
+def _mean(doc: Document, graph: Digraph, component: Component, entry: Any) -> WeightedMean:
+    """Return a weighted mean of agents whose rows of the basis are 1 or -1 in one column, and 0 elsewhere."""
+    fields(entry, ("weights", "constant"), "a mean")
+    need(isinstance(entry["weights"], dict) and bool(entry["weights"]), "weights of a mean")
+    nodes = positions(doc, graph, list(entry["weights"]), "a mean")
+    need(set(nodes) <= set(component.nodes), "a mean of other agents")
+    rows = [component.kernel[v] for v in nodes]
+    column = next(iter(rows[0]), 0)
+    need(all([*row] == [column] and abs(row[column]) == 1 for row in rows), "a mean of agents of several groups")
+    weights = [exact(text) for text in entry["weights"].values()]
+    size = sum((q * row[column] for q, row in zip(weights, rows, strict=True)), Fraction(0))
+    need(size != 0, "a mean of weight 0")
+    return WeightedMean(column, dict(zip(nodes, weights, strict=True)), size, exact(entry["constant"]))
 
 
 # ---------------------------------------------------------------------- the quotient
@@ -267,12 +290,17 @@ def _least_weights(P: Matrix, parts: Sequence[Part]) -> Matrix:
 
 
 def _constants(
-    judge: Arithmetic, modes: Sequence[QuotientMode], form: tuple[Matrix, int], inputs: Vector, coordinates: Vector
+    judge: Arithmetic,
+    modes: Sequence[QuotientMode],
+    form: tuple[Matrix, int],
+    inputs: Vector,
+    coordinates: Vector,
+    means: Sequence[WeightedMean],
 ) -> None:
-    """Verify what ``V`` says of inputs and coordinates, for every member of every mode.
+    """Verify what ``V`` says of inputs, coordinates and means, for every member of every mode.
 
     ``|(L X)_k| <= (|y| + sum_e radius_e |effect_ek| |h_e|) sqrt(V)``, ``y`` the row ``k`` of ``L_0 C^r`` and
-    ``|z| = sqrt(z' P^-1 z)``.
+    ``|z| = sqrt(z' P^-1 z)``; of a mean ``q' L X``, ``y`` and ``effect_e`` are combinations by ``q``.
     """
     (P, scale), n = form, len(form[0])
     vectors: dict[tuple[tuple[int, int], ...], int] = {}
@@ -286,7 +314,10 @@ def _constants(
         for part in mode.parts:
             for k in part.effect:
                 terms[k].append((part.radius, number(part.h)))
-        sums += [(k, mode.unit, some) for k, some in terms.items()]
+        sums += [(c, mode.unit, some) for c, some in zip(inputs.values(), terms.values(), strict=True)]
+        for mean in means:
+            unit, row, factors = _mean_terms(mode, mean)
+            sums.append((mean.constant, unit, [(1, number(row)), *((size, number(h)) for size, h in factors)]))
     units = [number({i: 1}) for i in range(n)]
     sized(len(vectors) * n, max(64, longest(x for vector in vectors for _, x in vector)), "the inputs of a family")
     above = judge.above(P, [[vector.get(i, 0) for i in range(n)] for vector in map(dict, vectors)])
@@ -295,8 +326,21 @@ def _constants(
     squares = [x * scale for x in above]
     norms = [root_above(x) if x else Fraction(0) for x in squares]
     spend(80 * sum(len(some) for _, _, some in sums), 128, 2 * max(mode.unit for mode in modes).bit_length())
-    for k, unit, some in sums:
+    for c, unit, some in sums:
         total = sum((factor * norms[place] for factor, place in some), Fraction(0)) / unit
-        need(total**2 <= inputs[k], "the constant of an input is not proved")
+        need(total**2 <= c, "the constant of an input or a mean is not proved")
     for (v, c), place in zip(coordinates.items(), units, strict=True):
         need(squares[place] <= c, f"the constant of coordinate {v} is not proved")
+
+
+def _mean_terms(mode: QuotientMode, mean: WeightedMean) -> tuple[int, Whole, list[tuple[int, Whole]]]:
+    """Return of ``q' L``, over one unit: that, ``q' L_0 C^r``, and of every part ``radius |q' effect|`` and ``h``."""
+    (values,), scale = integers([[*mean.weights.values()]])
+    whole, row = dict(zip(mean.weights, values, strict=True)), Whole()
+    count = sum(len(mode.rows[v]) for v in whole) + 2 * len(mode.parts)
+    spend(count, longest(values), longest(x for v in whole for x in mode.rows[v].values()), "means of a family")
+    for v, q in whole.items():
+        for i, x in mode.rows[v].items():
+            row[i] = row.get(i, 0) + q * x
+    pushes = ((abs(sum(whole.get(k, 0) * x for k, x in part.effect.items())), part) for part in mode.parts)
+    return mode.unit * scale, row, [(part.radius * size, part.h) for size, part in pushes if size]

@@ -24,6 +24,7 @@ from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family, Part
 from ptcc_certify.checker.family_function import FamilyFunction, check_form
+from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, same
@@ -70,6 +71,11 @@ class FollowerFunction:
     rate: Fraction
     inputs: dict[int, Fraction]
     coordinates: dict[int, Fraction]
+
+    @property
+    def means(self) -> tuple[WeightedMean, ...]:
+        """None."""
+        return ()
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``W^2`` of a state, rounded up."""

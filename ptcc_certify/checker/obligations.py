@@ -96,7 +96,10 @@ class CheckReport:
         }
 
     def lines(self) -> list[str]:
-        """Return the report as text, one line for each obligation."""
+        """Return the report as text, one line for each obligation; what would steer a terminal is ``?``."""
+        return ["".join(c if c.isprintable() else "?" for c in line) for line in self._lines()]
+
+    def _lines(self) -> list[str]:
         lines = [f"verified   {o.kind} of {o.of}: {o.detail} ({o.lemma})" for o in self.obligations]
         if self.accepted:
             count = f"{len(self.obligations)} proof obligation{'s' * (len(self.obligations) != 1)}"

@@ -14,7 +14,7 @@ from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.options import READING
-from ptcc_certify.cli.terminal import counting
+from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
 
 #: Options that are settings of a row by the same name.
@@ -75,7 +75,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
         for flag, value in (("-o", output), ("--scheduler", scheduler), ("--workers", workers)):
             if value is not None:
                 raise ParameterError(f"{flag} has no effect beside --write-graphs; leave it out")
-        click.echo(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
+        print_lines(f"written    {many.write_graphs(pattern, write_graphs, restart=restart)} graphs to {write_graphs}")
         return ExitCode.OK
     if scheduler is not None and workers is not None:
         raise ParameterError("--workers is for this machine, --scheduler for a cluster; leave one out")
@@ -111,7 +111,7 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
         counts = [f"{sum(row['verdict'] == v for row in rows)} {v}" for v in ("certified", "undecided")]
         failed = sum(row["error"] is not None for row in rows)
         click.echo(f"rows       {len(rows)}: {', '.join(counts)}, {failed} with an error")
-        click.echo(f"written    {output}")
+        print_lines(f"written    {output}")
     return _exit_code(rows)
 
 

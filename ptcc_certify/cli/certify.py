@@ -93,7 +93,7 @@ def _certify_graph(
     if as_json:
         print_json(certificate.to_dict())
         if assessment.exit_code and not screen.quiet:
-            click.echo(f"verdict    {assessment.text}", err=True)
+            click.echo(f"verdict    {one_line(assessment.text)}", err=True)
         return assessment.exit_code
     case = certificate, graph, origins
     screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))

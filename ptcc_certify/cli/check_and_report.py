@@ -12,7 +12,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import family_options, same_family
-from ptcc_certify.cli.terminal import Screen, print_json, progress, screen_options
+from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ def check(
 
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
     certificate says that it was read, which is printed; the options about reading override that. Of a family name all
-    its graphs, with the options that made it. Prints claim and
-    verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if it is rejected,
-    4 if the certificate itself says undecided. `python -m ptcc_certify.checker` does the same, without other packages.
+    its graphs, in any order. Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0
+    if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided.
+    `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
     from ptcc_certify.report.screen import check_summary
@@ -113,7 +113,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
         with progress(("independent check", "simulation", "report")) as begin:
             verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
     except RejectedCertificate as error:
-        click.echo(f"rejected: {error}", err=True)
+        print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
-    click.echo(f"{verdict:<10} {output}")
+    print_lines(f"{verdict:<10} {output}")
     return {"certified": ExitCode.OK, "undecided": ExitCode.UNDECIDED}.get(verdict, ExitCode.VIOLATED)

@@ -8,7 +8,7 @@ import click
 
 from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
-from ptcc_certify.cli.terminal import Screen, print_json, screen_options
+from ptcc_certify.cli.terminal import Screen, print_json, print_lines, screen_options
 from ptcc_certify.errors import ExitCode
 
 
@@ -45,7 +45,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
 
     answer = judge_behaviour(structure, expect)
     if answer.status != MET:
-        click.echo(f"{answer.status}: {answer}", err=True)
+        print_lines(f"{answer.status}: {answer}", err=True)
         return ExitCode.REFUTED
     if len(structure.components) > 1:
         click.echo(f"note: {expect} holds in each of the components by itself", err=True)

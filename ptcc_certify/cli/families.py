@@ -28,12 +28,18 @@ _NOT_OF_FAMILIES = (
     *("sigma0", "disturbance", "delta", "noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation"),
     *("T_r", "T_s", "mu1", "mu2", "mu3"),
 )
+#: Options that tell how files of families are read, and the keywords of read_family.
+_READING = {"edges": "orientation"} | {n: n for n in (*shared.READING[1:], "uncertainty", "optional")}
 
 
 def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Return the edges that ``--optional`` names."""
+    return () if context.resilient_parsing else _pairs(texts)
+
+
+def _pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     pairs = []
-    for text in () if context.resilient_parsing else texts:
+    for text in texts:
         ends = [end.strip() for row in csv.reader([text]) for end in row]
         if len(ends) != 2 or not all(ends):
             raise ParameterError(f"--optional: {text} is no edge; write SOURCE,TARGET, such as a,b")
@@ -82,9 +88,7 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
         named = shorten(", ".join(graphs), 200)
         mend = "add --switching if any of them may act at any time; ptcc batch takes many, each by itself"
         raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
-    if graphs.count("-") > 1:
-        raise ParameterError("- stands for standard input, which is one graph; name files for the others")
-    files = [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
+    files = _files(graphs)
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
         return shared.read(files[0], options)
@@ -94,6 +98,12 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
     if family.graph is None:
         return family
     return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
+
+
+def _files(graphs: tuple[str, ...]) -> list[Any]:
+    if graphs.count("-") > 1:
+        raise ParameterError("- stands for standard input, which is one graph; name files for the others")
+    return [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
 
 
 def _standard_input() -> BytesIO:
@@ -239,24 +249,50 @@ def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyC
 def same_family(
     certificate: str, document: dict[str, Any], report: CheckReport, graphs: tuple[str, ...], options: shared.Options
 ) -> tuple[CheckReport, dict[str, str]]:
-    """Compare the family of an accepted certificate with that of files; return the report, and how these were read."""
+    """Compare the family of an accepted certificate with that of files; return the report, and how these were read.
+
+    They are read as the certificate says, but for what options or a scenario say. The order of files does not count.
+    """
     from dataclasses import replace
 
     from ptcc_certify.certificate.format_family import certificate_family
     from ptcc_certify.certificate.format_vectors import read_side_files
-    from ptcc_certify.graphs.family import Family
-    from ptcc_certify.graphs.family_difference import family_difference
+    from ptcc_certify.graphs.family_difference import family_difference, mode_order
 
+    graphs, family, how = _read_again(document["unverified"].get("read"), graphs, options)
+    name = ", ".join(graphs)
+    meant = certificate_family(document["graph"], read_side_files(document, Path(certificate).parent))
+    order = mode_order(meant, family)
+    if order is None:
+        reason = f"another family than {name}: {family_difference(meant, family)}"
+        return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {"graph_read": how}
+    told = {"graph_read": how}
+    named, own = ([mode.name for mode in modes] for modes in ([family.modes[k] for k in order], meant.modes))
+    if len(order) > 1 and named != own:
+        told["modes"] = f"modes {', '.join(named)} are called {', '.join(own)} in the certificate"
+    elif order != tuple(range(len(order))):
+        told["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
+    return report, told
+
+
+def _read_again(read: Any, graphs: tuple[str, ...], options: shared.Options) -> tuple[tuple[str, ...], Family, str]:
+    """Read files as a certificate says, a scenario as it says itself, either but for the options of this call."""
+    from ptcc_certify.graphs.io.family_files import family_flags, keywords_of, read_family
+
+    source = click.get_current_context().get_parameter_source
+    given = {name for name in _READING if source(name) is ParameterSource.COMMANDLINE}
+    way = "as the options say"
+    keywords = keywords_of(read)
     if len(graphs) == 1 and is_scenario(graphs[0]):
         scenario = read_scenario(graphs[0])
-        given = {name: value for name, value in scenario.options.items() if name in options}
-        graphs, options = scenario.graphs, {**options, **given, "switching": len(scenario.graphs) > 1}
-    read_back = read_graph_or_family(graphs, options)
-    family = read_back if isinstance(read_back, Family) else Family.from_graph(read_back)
-    name, read = _names(graphs, family, options)
-    how = {"graph_read": f"{name}, {read}"}
-    if family.sha256 == report.sha256:
-        return report, how
-    checked = certificate_family(document["graph"], read_side_files(document, Path(certificate).parent))
-    reason = f"another family than {name}: {family_difference(checked, family)}"
-    return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how
+        own = {name: value for name, value in scenario.options.items() if name in _READING and name not in given}
+        own |= {"optional": _pairs(own["optional"])} if "optional" in own else {}
+        graphs, options, given, way = scenario.graphs, {**options, **own}, {*_READING}, "as the scenario says"
+    elif keywords and not given:
+        way = "as the certificate says"
+    now = {_READING[name]: options[name] for name in (given if keywords else _READING)}
+    if "uncertainty" in now:
+        now["uncertainty"] = now["uncertainty"] or 0
+    keywords |= now
+    family = read_family(_files(graphs), **keywords)
+    return graphs, family, f"{', '.join(graphs)}, read {way}: {family_flags(family.read, graphs[0])}"

@@ -13,6 +13,7 @@ from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.kinds_of_file import kind_of, shell_word
 from ptcc_certify.cli.options import graph_file
 from ptcc_certify.cli.scenario import SECTIONS, is_scenario
+from ptcc_certify.cli.terminal import print_lines
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 
@@ -54,7 +55,7 @@ def new(context: click.Context, graph: str | None, output: str | None, force: bo
     if os.path.exists(output) and not force:  # noqa: PTH110 - Path.exists may raise
         raise ParameterError(f"{output}: is there already; name another file, or replace it with --force")
     write_atomically(output, text)
-    click.echo(f"written    {output}; now: ptcc certify {shell_word(output)}")
+    print_lines(f"written    {output}; now: ptcc certify {shell_word(output)}")
     return 0
 
 

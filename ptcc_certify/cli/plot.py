@@ -13,7 +13,7 @@ from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.scenario import graph_of
-from ptcc_certify.cli.terminal import FIGURES, progress, refuse_output
+from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
@@ -74,10 +74,10 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
     try:
         subject = _of_certificate(graph, what, options) if certified else _of_graph(graph, what, options)
     except RejectedCertificate as error:
-        click.echo(f"rejected: {error}", err=True)
+        print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
     save_figure(_drawn(what, subject, wide, time_unit), output)
-    click.echo(f"written    {output}")
+    print_lines(f"written    {output}")
     return ExitCode.OK
 
 

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
-from ptcc_certify.cli.terminal import FIGURES, refuse_output
+from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         if sys.stdout.isatty():
             click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
     if output:
-        click.echo(f"written    {output}")
+        print_lines(f"written    {output}")
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK

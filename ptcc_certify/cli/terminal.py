@@ -49,12 +49,12 @@ class Screen:
 
         if not self.quiet:
             width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
-            click.echo("\n".join(wrap_lines(long(), width) if self.verbose else short()))
+            print_lines(*(wrap_lines(long(), width) if self.verbose else short()))
 
     def note(self, text: str) -> None:
         """Print one more line on standard output."""
         if not self.quiet:
-            click.echo(text)
+            print_lines(*text.split("\n"))
 
 
 def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -71,6 +71,13 @@ def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:
             return command(*args, screen=Screen(verbose, quiet), **options)
 
     return wrapped
+
+
+def print_lines(*lines: str, err: bool = False) -> None:
+    """Print lines; what would steer a terminal, in the name of a file or a node, is shown as ``?``."""
+    from ptcc_certify.report.text_layout import printable
+
+    click.echo("\n".join(map(printable, lines)), err=err)
 
 
 def _on_terminal(stream: Any) -> bool:

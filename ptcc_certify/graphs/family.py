@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -179,6 +179,8 @@ class Family(Shown):
         At least one; all have the same nodes in the same order.
     notes : tuple of str
         What was read in a larger sense than it was written.
+    read : mapping
+        The keywords with which :func:`ptcc_certify.read_family` reads its files again; empty if it is from none.
 
     References
     ----------
@@ -196,6 +198,7 @@ class Family(Shown):
 
     modes: tuple[Mode, ...]
     notes: tuple[str, ...] = field(default=())
+    read: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -232,7 +235,7 @@ class Family(Shown):
         Lines of UTF-8, ``\n`` after each: ``[label]`` of every node, sorted; then the modes in their order, a line
         ``{}`` between two, each with the lines of its edges (:meth:`Mode.lines`), numbers as ``p`` or ``p/q`` in lowest
         terms. Before the edges of a mode that are undirected, some of them uncertain, a line ``{"undirected": true}``:
-        both directions change together. That of one graph is the graph's own.
+        both directions change together. Names of modes do not count. That of one graph is the graph's own.
         """
         nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
         modes = "{}\n".join("".join(f"{line}\n" for line in mode.marked_lines()) for mode in self.modes)

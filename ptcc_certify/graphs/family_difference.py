@@ -1,13 +1,36 @@
-"""In what two families of graphs differ; one line that says which."""
+"""Whether two families of graphs have the same modes, in any order; if not, one line that says in what they differ."""
 
 from __future__ import annotations
+
+from collections import defaultdict
 
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import shorten
 
 
+def mode_order(one: Family, other: Family) -> tuple[int, ...] | None:
+    """Return the positions in ``other`` of the modes of ``one``; None if these are not the same modes.
+
+    A family is the same in any order of its modes, whatever these are called.
+
+    Examples
+    --------
+    >>> day, night = (Family.from_intervals([("a", "b", w, w)]) for w in (1, 2))
+    >>> mode_order(Family.switching([day, night]), Family.switching([night, day]))
+    (1, 0)
+    >>> mode_order(day, night) is None
+    True
+    """
+    if one.sha256 == other.sha256:
+        return tuple(range(len(one.modes)))
+    if sorted(one.labels) != sorted(other.labels) or len(one.modes) != len(other.modes):
+        return None
+    order = _matches(one, other)
+    return None if None in order else tuple(k for k in order if k is not None)
+
+
 def family_difference(one: Family, other: Family) -> str | None:
-    """Tell in what a family differs from another: nodes, modes, edges; None if they are equal.
+    """Tell in what a family differs from another: nodes, modes, edges; None if they have the same modes.
 
     Parameters
     ----------
@@ -21,22 +44,47 @@ def family_difference(one: Family, other: Family) -> str | None:
     >>> family_difference(Family.from_intervals([("a", "b", 1, 2)]), Family.from_intervals([("a", "b", 1, 3)]))
     'the certificate alone has ["a", "b", "1", "2"], and the files alone ["a", "b", "1", "3"]'
     """
-    if one.sha256 == other.sha256:
+    if mode_order(one, other) is not None:
         return None
     if odd := sorted(set(one.labels) ^ set(other.labels)):
         return f"the {'certificate' if odd[0] in one.labels else 'files'} alone has node {shorten(odd[0])}"
     if len(one.modes) != len(other.modes):
         return f"{len(one.modes)} modes in the certificate, {len(other.modes)} in the files"
-    rows = [[tuple(mode.lines()) for mode in family.modes] for family in (one, other)]
-    if sorted(rows[0]) == sorted(rows[1]):
-        names = ", ".join(shorten(mode.name) for mode in one.modes)
-        return f"the modes are in another order, in the certificate {names}"
-    number = next(k for k, (first, second) in enumerate(zip(*rows, strict=True)) if first != second)
-    first, second = (set(part[number]) for part in rows)
+    pairs = _different_modes(one, other)
+    number, place = pairs[0]
+    first, second = (set(f.modes[k].marked_lines()) for f, k in ((one, number), (other, place)))
     alone = [
         f"the {where} alone {'has ' if k == 0 or not first - second else ''}{shorten(min(some), 120)}"
         for k, (where, some) in enumerate((("certificate", first - second), ("files", second - first)))
         if some
     ]
-    mode = f"in mode {shorten(one.modes[number].name)} " if len(one.modes) > 1 else ""
-    return mode + ", and ".join(alone)
+    return _mode_text(one, other, pairs) + ", and ".join(alone)
+
+
+def _matches(one: Family, other: Family) -> list[int | None]:
+    """Return for every mode of a family the position of an equal one in another, each taken once; None without."""
+    places = defaultdict(list)
+    for number, mode in enumerate(other.modes):
+        places[tuple(mode.marked_lines())].append(number)
+    equal = [places[tuple(mode.marked_lines())] for mode in one.modes]
+    return [numbers.pop(0) if numbers else None for numbers in equal]
+
+
+def _different_modes(one: Family, other: Family) -> list[tuple[int, int]]:
+    """Return pairs of positions of modes that differ: those of one name, then the others as they come."""
+    order = _matches(one, other)
+    mine = [k for k, place in enumerate(order) if place is None]
+    theirs = [k for k in range(len(other.modes)) if k not in order]
+    named = {other.modes[k].name: k for k in theirs}
+    pairs = [(k, named[one.modes[k].name]) for k in mine if one.modes[k].name in named]
+    rest = [k for k in mine if k not in {first for first, _ in pairs}]
+    return pairs + list(zip(rest, [k for k in theirs if k not in {second for _, second in pairs}], strict=True))
+
+
+def _mode_text(one: Family, other: Family, pairs: list[tuple[int, int]]) -> str:
+    """Name the first of two modes that differ, and tell how many more do."""
+    if len(one.modes) == 1:
+        return ""
+    name, also = (shorten(family.modes[k].name) for family, k in zip((one, other), pairs[0], strict=True))
+    remarks = [f"{also} of the files"] * (also != name) + [f"one of {len(pairs)} that differ"] * (len(pairs) > 1)
+    return f"in mode {name} " + f"({', '.join(remarks)}) " * bool(remarks)

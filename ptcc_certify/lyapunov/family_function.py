@@ -22,7 +22,7 @@ from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, inte
 #: Significant bits of constants, which are rounded up.
 _CONSTANT_BITS = 53
 #: Room for a check that forms the constants with other roundings.
-_MARGIN = 1 + Fraction(1, 2**40)
+MARGIN = 1 + Fraction(1, 2**40)
 #: Against the entries of a mode: bounds of growth that are tried where a rate is about 0.
 _NEARLY_ZERO = (1e-9, 1e-7, 1e-5)
 
@@ -60,6 +60,8 @@ class FamilyFunction:
         ``xi_k^2 <= coordinate_constants[k] V``.
     numerical_rate : float or None
         Of the search, before the matrix was rounded.
+    means : tuple of (tuple of N Fraction, Fraction)
+        Vectors ``q``, each with a constant: ``|q' L X|^2 <= constant V`` for every member.
     """
 
     kind: str
@@ -75,6 +77,7 @@ class FamilyFunction:
     input_constants: tuple[Fraction, ...] = ()
     coordinate_constants: tuple[Fraction, ...] = ()
     numerical_rate: float | None = None
+    means: tuple[tuple[tuple[Fraction, ...], Fraction], ...] = ()
 
     @property
     def rate(self) -> Fraction:
@@ -210,9 +213,42 @@ def with_constants(function: FamilyFunction, quotient: Quotient) -> FamilyFuncti
         largest = [max(pair) for pair in zip(largest, sizes, strict=True)]
     return replace(
         function,
-        input_constants=tuple(rounded_up(x * x * _MARGIN) for x in largest),
-        coordinate_constants=tuple(rounded_up(squares[vectors[unit]] * _MARGIN) for unit in units),
+        input_constants=tuple(rounded_up(x * x * MARGIN) for x in largest),
+        coordinate_constants=tuple(rounded_up(squares[vectors[unit]] * MARGIN) for unit in units),
     )
+
+
+def mean_constant(function: FamilyFunction, quotient: Quotient, q: Sequence[Fraction]) -> Fraction | None:
+    """Return a constant with ``|q' L X|^2 <= constant V`` for every member; None if ``P > 0`` is not proved.
+
+    With ``|z| = sqrt(z' P^-1 z)``, ``|q' L X| <= (|q' L_0 C^r| + sum_e radius_e |q' effect_e| |h_e|) sqrt(V)``.
+
+    References
+    ----------
+    docs/theory/families.md, "Where it ends".
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.lyapunov.undirected_family import undirected_function
+    >>> pair = Quotient(Family.from_intervals([("a", "b", 1, 3)], undirected=True))
+    >>> mean_constant(undirected_function(pair), pair, [Fraction(1), Fraction(1)])
+    Fraction(0, 1)
+    """
+    zero = Fraction(0)
+    terms = []
+    for mode in quotient.modes:
+        columns = zip(*mode.rows, strict=True)
+        own = [(Fraction(1), [sum((w * r for w, r in zip(q, c, strict=True) if w and r), zero) for c in columns])]
+        for part in mode.parts:
+            if size := abs(sum((q[k] * sign for k, sign in part.effect.items()), zero)):
+                own.append((part.radius * size, list(part.h)))
+        terms.append(own)
+    squares = inverse_forms(function.matrix, [vector for own in terms for _, vector in own])
+    if squares is None:
+        return None
+    norms = iter([root_above(y) for y in squares])
+    return max(sum((factor * next(norms) for factor, _ in own), zero) for own in terms) ** 2
 
 
 def inverse_forms(P: Matrix, vectors: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:

@@ -120,6 +120,7 @@ class FollowerFunction:
 
     kind = "rows"
     optimal = False
+    means = ()
 
     @property
     def overshoot(self) -> Fraction:

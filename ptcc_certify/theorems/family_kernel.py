@@ -105,6 +105,11 @@ class Kernel:
         unknown = np.flatnonzero(self.codes == UNKNOWN)
         return np.unique(np.abs(self.numbers[unknown]) - self.dimension - 1).tolist()
 
+    @property
+    def has_rows(self) -> bool:
+        """Whether all rows are told by edges, or few enough to be solved for."""
+        return len(self._unsolved) <= EXACT_NODES
+
     @cached_property
     def _solved(self) -> dict[int, list[Fraction]]:
         """The rows that the edges alone do not tell, by their numbers."""

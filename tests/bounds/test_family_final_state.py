@@ -184,15 +184,16 @@ def box_along_signals(seed: int) -> int:
     assert rows_hold(family, lower, upper, nodes)
     if box.attained is not None:
         low, high = box.attained
-        assert max(a - b for a, b in zip(box.upper, high, strict=True)) < 1e-5
-        assert max(a - b for a, b in zip(low, box.lower, strict=True)) < 1e-5
+        assert max(a - b for a, b in zip(box.upper, high, strict=True)) < 1e-9
+        assert max(a - b for a, b in zip(low, box.lower, strict=True)) < 1e-9
     X, s, start = np.array([float(v) for v in x]), 0.0, float(box.excess(x))
     for _ in range(12):
         mode = rng.choice(family.modes)
         h = rng.choice([0.01, 0.1, 1])
         X, s = expm(-laplacian(mode, random_vertex(rng, mode)) * h) @ X, s + h
         excess = float(box.excess([Fraction(v) for v in X.tolist()]))
-        assert excess <= start * np.exp(-float(decay.rate) * s) * (1 + 1e-6) + 1e-9 / float(decay.vector.min())
+        floats = 1e-10 / float(decay.vector.min())  # the motion is one in floats
+        assert excess <= start * np.exp(-float(decay.rate) * s) * (1 + 1e-9) + floats
     return 1
 
 
@@ -203,6 +204,21 @@ def test_boxes_attract_followers_along_random_signals():
 @pytest.mark.campaign
 def test_boxes_attract_followers_along_more_signals():
     assert sum(box_along_signals(seed) for seed in range(15, 400)) > 200
+
+
+def test_a_box_is_as_close_where_the_vector_of_the_decay_has_a_huge_range():
+    """At 1 - 1e-6 of the largest rate one agent is 3e9 times another one in ``d``; the box does not care."""
+    edges = [(0, 2, -1350, -270), (1, 2, "-5/2", "-1/2"), (4, 2, 2, 2), (0, 3, "-13/100", "-13/500")]
+    edges += [(0, 4, -5, "-5/2"), (1, 5, "9/5", "9/5"), (3, 5, "-6/5", "-3/5"), (4, 5, "-2/25", 0)]
+    family = Family.from_intervals(edges, nodes=range(6))
+    decay = follower_decay(family, np.arange(2, 6))
+    ends = {0: (Fraction(-8, 3), Fraction(-8, 3)), 1: (Fraction(6, 7), Fraction(6, 7))}
+    box = attracting_box(family, decay, ends)
+    assert decay.overshoot > 1e9
+    low, high = box.attained
+    assert max(a - b for a, b in zip(box.upper, high, strict=True)) < 1e-12
+    assert max(a - b for a, b in zip(low, box.lower, strict=True)) < 1e-12
+    assert float(box.upper[1]) == pytest.approx(8 / 3)
 
 
 def test_constant_weights_attain_a_box_of_one_mode_with_camps():

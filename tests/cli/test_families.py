@@ -70,20 +70,53 @@ def test_standard_input_holds_intervals_or_a_mode():
     assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
 
 
-def test_what_is_written_is_checked_against_the_files_in_their_order():
+def test_what_is_written_is_checked_against_the_files():
     assert ptcc("certify", *BOTH, "--kappa", "3", "-o", "c.json").code == 0
     checked = ptcc("check", "c.json")
     assert checked.code == 0 and "bipartite consensus at T = 1 for every signal" in checked.out
-    assert ptcc("check", "c.json", *BOTH).code == 0
     for words, why in (
-        (("night.csv", "day.csv", "--switching"), "the modes are in another order"),
-        (("day.csv", "spoiled.csv", "--switching"), "in mode night"),
-        ((*BOTH, "--uncertainty", "1%"), "in mode day"),
+        (("day.csv", "spoiled.csv"), "in mode night (spoiled of the files) the certificate alone has"),
+        ((*BOTH, "--uncertainty", "1%"), "in mode day (one of 2 that differ)"),
         (("day.csv",), "2 modes in the certificate, 1 in the files"),
         (("other.csv", "--uncertainty", "1%"), "the certificate alone has node c"),
+        (("day.csv", "day.csv"), "in mode night (day (2) of the files) the certificate alone has"),
     ):
         run = ptcc("check", "c.json", *words)
         assert run.code == 1 and why in " ".join(run.out.split()), run
+    assert ptcc("check", "c.json", "day.csv", "nowhere.csv").code == 2
+
+
+def test_modes_are_the_same_in_any_order_and_by_any_name():
+    """Which file is which is told where names or order are others; no claim rests on them."""
+    assert ptcc("certify", *BOTH, "-o", "c.json").code == 0
+    plain = ptcc("check", "c.json", "day.csv", "night.csv")
+    assert plain.code == 0 and "modes" not in plain.out
+    turned = ptcc("check", "c.json", "night.csv", "day.csv")
+    assert turned.code == 0 and "in another order than in the certificate, day, night" in turned.out
+    Path("noon.csv").write_text(FILES["night.csv"])
+    named = ptcc("check", "c.json", "day.csv", "noon.csv")
+    assert named.code == 0 and "modes day, noon are called day, night in the certificate" in named.out
+    Path("day.csv").write_text(FILES["night.csv"])
+    Path("night.csv").write_text(FILES["day.csv"])
+    swapped = ptcc("check", "c.json", *BOTH)
+    assert swapped.code == 0 and "modes night, day are called day, night" in swapped.out
+
+
+def test_files_are_read_as_the_certificate_says():
+    options = ("--uncertainty", "5%", "--edges", "listens", "--optional", "c,b", "--undirected")
+    assert ptcc("certify", *BOTH, *options, "-o", "c.json").code == 0
+    run = ptcc("check", "c.json", "day.csv", "night.csv")
+    said = "read as the certificate says: --edges listens --undirected --uncertainty 1/20 --optional c,b"
+    assert run.code == 0 and said in " ".join(run.out.split())
+    assert ptcc("check", "c.json", *BOTH, *options[:3], "listens").code == 0
+    for other in (("--uncertainty", "1%"), ("--optional", "a,b")):
+        assert ptcc("check", "c.json", *BOTH, *other).code == 1
+    Path("s.toml").write_text('[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\noptional = ["a,b"]\n')
+    assert ptcc("certify", "s.toml", "-o", "d.json").code == 0
+    assert ptcc("check", "d.json", "s.toml").code == ptcc("check", "d.json", "day.csv", "night.csv").code == 0
+    assert ptcc("check", "c.json", "s.toml").code == ptcc("check", "d.json", "s.toml", "--uncertainty", "1%").code == 1
+    Path("e.json").write_text(Path("c.json").read_text().replace('"1/20",\n   "optional"', '[],\n   "optional"'))
+    assert ptcc("check", "e.json").code == 0 and ptcc("check", "e.json", *BOTH).code == 1
 
 
 def test_a_scenario_lists_the_graphs_of_a_family():
@@ -116,6 +149,7 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*BOTH, "--expect", "consensus"), 3, "refuted: consensus"),
         ((*BOTH, "--min-rate", "0.1"), 0, "met: rate >= 0.1"),
         ((*BOTH, "--min-rate", "100"), 3, "refuted: rate >= 100 (upper bound"),
+        ((*BOTH, "--min-rate", "1"), 4, "left open: rate >= 1 (proved: 0.955"),
         ((*BOTH, "--kappa", "3", "--max-input", "1000"), 0, "met: |u_k| <= 1000"),
         ((*BOTH, "--kappa", "3", "--max-input", "1"), 3, "it is up to 57.888 at the start, proved"),
         ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
@@ -148,6 +182,8 @@ def test_what_is_not_decided_says_what_to_try_and_writes_nothing():
     assert ptcc("classify", "many.csv", "--expect", "stability").code == 3
     run = ptcc("certify", "many.csv", "-o", "c.json")
     assert run.code == 4 and "undecided: " in run.out and not Path("c.json").exists()
+    run = ptcc("certify", "many.csv", "--min-rate", "0.001")
+    assert run.code == 4 and "left open: rate >= 0.001" in " ".join(run.out.split()), run
 
 
 @pytest.mark.parametrize("command", ["plot", "design", "explore"])
@@ -178,6 +214,11 @@ BAD = {
     "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: its least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
     "two signs in one mode": (_rows("a,b,1,2", "a,b,-2,-1"), (), "line 3: second row .* two files \\(modes\\), or one"),
+    "both directions of an undirected edge": (
+        _rows("a,b,1,2", "b,c,1,1", "b,a,1,2"),
+        ("--undirected",),
+        "bad.csv, line 4: second row for edge b -> a .the first is line 2.; --undirected makes each row both",
+    ),
     "one end": (_rows("a,b,1", header="source,target,weight_min"), (), "one end of the intervals"),
     "no number": (_rows("a,b,1,x"), (), 'line 2: edge a -> b: "x" is not a number'),
     "empty end": (_rows("a,b,,2"), (), "line 2: edge a -> b"),
@@ -203,6 +244,8 @@ BAD = {
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
+    "a rate of constant signals": (_rows("a,b,1,2"), ("--signal", "constant", "--min-rate", "1"), "leave them out"),
+    "an input of constant signals": (_rows("a,b,1,2"), ("--signal", "constant", "--max-input", "9"), "leave them out"),
     "sliding mode": (_rows("a,b,1,2"), ("--protocol", "sliding-mode"), "nominal protocol alone"),
     "no deadline": (_rows("a,b,1,2"), ("--rho2", "0"), "rho2 = 0 gives no deadline"),
     "another length": (_rows("a,b,1,2"), ("--x0", "1,2,3"), "3 values for 2 nodes"),
@@ -259,3 +302,18 @@ def test_what_new_writes_tells_of_families():
 def test_modes_are_called_by_their_files():
     assert [mode.name for mode in read_family(["day.csv", "night.csv"]).modes] == ["day", "night"]
     assert "day, night: 2 modes" in ptcc("classify", *BOTH).out
+
+
+def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
+    odd = "day\x1bc.csv"
+    Path(odd).write_text(FILES["day.csv"])
+    both = (odd, "night.csv", "--switching")
+    out = "c\x1bc.json"
+    for words in (
+        *(("classify", *both), ("classify", *both, "-v"), ("certify", *both, "-v", "-o", out), ("certify", *both)),
+        *(("check", out, *both), ("check", out, *both, "-v"), ("check", out, *BOTH, "-v"), ("check", out, *BOTH)),
+        *(("check", out, odd), ("simulate", *both, "-o", "r\x1b.csv"), ("certify", odd, "night.csv")),
+        *(("certify", *both, "--expect", "stability"), ("classify", odd, "spoiled.csv", "--switching", "-v")),
+    ):
+        run = ptcc(*words)
+        assert "\x1b" not in run.out + run.err and len(run.out + run.err) > 10, words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from fractions import Fraction
 
@@ -11,7 +12,9 @@ import pytest
 from ptcc_certify.errors import GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.family_difference import family_difference, mode_order
 from ptcc_certify.graphs.io import as_family, read_family
+from ptcc_certify.graphs.io.family_files import keywords_of
 from tests.families import KINDS, random_family
 
 GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
@@ -122,3 +125,42 @@ def test_no_file_takes_the_place_of_another_of_the_same_name(tmp_path):
 def test_intervals_take_no_uncertainty_besides():
     with pytest.raises(ParameterError, match="give intervals themselves"):
         as_family([("a", "b", 1, 2)], uncertainty="50%")
+
+
+def test_the_names_of_modes_do_not_count_and_their_order_counts_for_the_hash_alone():
+    day, night = ([("a", "b", 1)], [("b", "a", -1)])
+    one, named = as_family({"day": day, "night": night}), as_family({"1": day, "2": night})
+    turned, other = as_family({"night": night, "day": day}), as_family({"day": day, "night": day})
+    assert one == named and one != turned
+    assert mode_order(one, turned) == (1, 0) and family_difference(one, turned) is None
+    assert mode_order(one, other) is None
+    assert family_difference(one, other) == (
+        'in mode night the certificate alone has ["b", "a", "-1"], and the files alone ["a", "b", "1"]'
+    )
+
+
+def test_families_that_differ_in_how_often_a_mode_occurs_are_told_apart():
+    day, night = ([("a", "b", 1)], [("b", "a", -1)])
+    one, other = (as_family(dict(zip("123", modes, strict=True))) for modes in ((day, day, night), (day, night, night)))
+    assert "in mode 2 " in family_difference(one, other)
+    edge = ("a", "b", 1, 2)
+    tied = Family.from_intervals([edge], undirected=True)
+    apart = Family.from_intervals([edge, ("b", "a", 1, 2)])
+    assert family_difference(tied, apart) == 'the certificate alone has {"undirected": true}'
+
+
+def test_a_family_knows_how_its_files_were_read(tmp_path):
+    path = tmp_path / "net.csv"
+    path.write_text("a,b,1\nb,c,2\n")
+    family = read_family([path], uncertainty="10%", optional=[("b", "a")], undirected=True, orientation="listens")
+    assert read_family([path], **family.read) == family
+    assert family.read == keywords_of(json.loads(json.dumps(family.read)))
+    assert Family.from_intervals([("a", "b", 1, 2)]).read == {}
+
+
+@pytest.mark.parametrize(
+    "read",
+    [None, [], {"format": "csv"}, {"uncertainty": 0.1}, {"optional": [["a"]]}, {"optional": "ab"}, {"undirected": 1}],
+)
+def test_what_no_certificate_writes_is_no_way_of_reading(read):
+    assert keywords_of(read) == {}

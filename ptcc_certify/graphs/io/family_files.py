@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,21 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
-from ptcc_certify.graphs.io.graph_files import is_edge_list, read_graph
-from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.io.graph_files import MATRICES, is_edge_list, read_graph
+from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
 _OPTIONAL = ("optional", "may_fail")
+#: Keywords of :func:`read_family` and of what type they are in a certificate.
+_KEYWORDS: dict[str, Any] = {
+    "orientation": (str, type(None)),
+    "duplicates": str,
+    "drop_self_loops": bool,
+    "undirected": bool,
+    "uncertainty": str,
+    "optional": list,
+}
 _YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
 
 Pair = tuple[Hashable, Hashable]
@@ -59,6 +69,7 @@ def read_family(
     Returns
     -------
     Family
+        ``family.read`` has the keywords that read the files again.
 
     Raises
     ------
@@ -81,7 +92,7 @@ def read_family(
     named: dict[str, Family] = {}
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
-        rows = _interval_rows(path, orientation or "information", share)
+        rows = _interval_rows(path, orientation or "information", share, undirected)
         name = stem = Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
         again = number
         while name in named:  # no mode may take the place of another
@@ -101,7 +112,46 @@ def read_family(
     if missing:
         source, target = min(missing)
         raise GraphError(f"optional edge {shorten(source)} -> {shorten(target)} is in no file; check the labels")
-    return Family.switching(named)
+    read = {"orientation": orientation, "undirected": undirected, **options}
+    read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
+    return replace(Family.switching(named), read=read)
+
+
+def keywords_of(read: Any) -> dict[str, Any]:
+    """Return the keywords of :func:`read_family` that a certificate tells; none where it tells anything else.
+
+    Examples
+    --------
+    >>> keywords_of(read_family(StringIO("a,b,1"), uncertainty="10%").read)
+    {'orientation': None, 'undirected': False, 'uncertainty': '1/10', 'optional': []}
+    >>> keywords_of({"uncertainty": [1]})
+    {}
+    """
+    if not isinstance(read, Mapping) or not all(name in _KEYWORDS for name in read):
+        return {}
+    fits = all(isinstance(value, _KEYWORDS[name]) for name, value in read.items())
+    pairs = read.get("optional", []) if fits else []
+    texts = all(isinstance(p, list) and len(p) == 2 and all(isinstance(end, str) for end in p) for p in pairs)
+    return dict(read) if fits and texts else {}
+
+
+def family_flags(read: Mapping[str, Any], path: str = "") -> str:
+    """Return how a family was read from files, one of them ``path``, as flags of the command line.
+
+    Examples
+    --------
+    >>> family_flags(read_family(StringIO("a,b,1"), uncertainty="10%", optional=[("a", "b")]).read)
+    '--edges information --uncertainty 1/10 --optional a,b'
+    """
+    way = read.get("orientation")
+    matrix = way is None and name_and_ending(path)[1] in MATRICES
+    words = ["a matrix" if matrix else f"--edges {way or 'information'}"]
+    merged = read.get("duplicates", "refuse")
+    words += [f"--duplicates {merged}"] * (merged != "refuse")
+    words += ["--drop-self-loops"] * bool(read.get("drop_self_loops"))
+    words += ["--undirected"] * bool(read.get("undirected"))
+    words += [f"--uncertainty {read['uncertainty']}"] * (read.get("uncertainty", "0") not in ("0", 0))
+    return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
 
 
 def is_family_file(path: Source) -> bool:
@@ -167,7 +217,9 @@ def _may_fail(row: Row) -> Row:
     return row[0], row[1], min(row[2], Fraction(0)), max(row[3], Fraction(0))
 
 
-def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[list[str], list[Row]] | None:
+def _interval_rows(
+    path: Source, orientation: str, share: Fraction, undirected: bool
+) -> tuple[list[str], list[Row]] | None:
     """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files."""
     name, ending = name_and_ending(path)
     if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
@@ -197,11 +249,11 @@ def _interval_rows(path: Source, orientation: str, share: Fraction) -> tuple[lis
             continue
         edge = _row(row, ends, (low, high, may_fail), where, share)
         nodes |= dict.fromkeys(edge[:2])
-        if edge[:2] in rows:
+        if again := next((rows[pair] for pair in _both(edge[:2], undirected) if pair in rows), None):
             mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
-            raise FormatError(
-                f"{where}: second row for edge {_text(edge)} (the first is line {rows[edge[:2]][0]}); {mend}"
-            )
+            if again[1][:2] != edge[:2]:
+                mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
+            raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
         rows[edge[:2]] = number, edge
     if not nodes:
         raise FormatError(f"{name}: no edge and no node below the header; give rows")

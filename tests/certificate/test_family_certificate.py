@@ -1,0 +1,45 @@
+"""What certificates of families hold and say, and what they refuse."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from ptcc_certify import NominalProtocol
+from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.report.family_screen import family_lines, family_summary
+from ptcc_certify.theorems.family_behaviour import decide
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+
+
+def test_more_modes_than_a_certificate_holds_are_refused_before_any_work():
+    one = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes[0]
+    many = Family((one,) * 1001)
+    start = time.process_time()
+    with pytest.raises(ParameterError, match="1,001 modes, and a certificate holds 1,000 at most; put modes"):
+        certify_family(many, PROTOCOL)
+    assert time.process_time() - start < 0.5
+    assert decide(many)[0].behaviour == "bipartite consensus"
+
+
+def test_what_is_decided_on_edges_alone_is_told_and_not_certified():
+    """300 agents hear two leaders; at night everybody listens twice as much."""
+    rows = [("left", "n1", 1), ("right", "n1", 2)]
+    for k in range(2, 301):
+        rows += [(f"n{k - 1}", f"n{k}", k), ("left", f"n{k}", 1), (f"n{k}", f"n{k - 1}", 3)]
+    day, night = (Family.from_intervals([(s, t, w * x, w * x) for s, t, w in rows]) for x in (1, 2))
+    family = Family.switching([day, night])
+    certificate = certify_family(family, PROTOCOL, [1] * 302, expectations="bipartite containment", time_limit=10)
+    assert certificate.behaviours == ("bipartite containment",) and certificate.verdict == "undecided"
+    assert (
+        certificate.assessment.exit_code == 4 and "decided on edges, and not certified" in certificate.assessment.text
+    )
+    assert certificate.final_states == (None,) * 302
+    text = "\n".join(
+        [*family_summary(certificate, "net"), *family_lines(certificate, "net"), str(certificate.to_dict())]
+    )
+    assert "containment at T = 1 for every signal" in text
