@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import random
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
@@ -32,7 +33,15 @@ Edge = tuple[int, int, Fraction, Fraction]
 def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
     """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
     oracle = FamilyOracle(data, files or {})
-    for claim in (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.finals, oracle.inputs):
+    for claim in (
+        oracle.graph,
+        oracle.structures,
+        oracle.behaviours,
+        oracle.functions,
+        oracle.finals,
+        oracle.inputs,
+        oracle.restricted,
+    ):
         claim()
     return oracle.false
 
@@ -387,3 +396,51 @@ class FamilyOracle:
             if s * abs(L).max() < 300:
                 u = (rho1 + pole / T * np.exp(z)) * L @ expm(-L * s) @ np.array([float(x) for x in self.start or ()])
                 self.require((abs(u) <= bounds * (1 + SLACK) + 1e-9 * bounds.max(initial=0)).all(), "a later peak")
+
+    # ------------------------------------------------------------------ restricted signals
+
+    def restricted(self) -> None:
+        """Rates of restricted signals, by members in rationals: the forms, their ratio, and what follows."""
+        for said in self.data.get("restricted", ()):
+            nodes = self.pieces[said["component"]]
+            basis = self.common_kernel(nodes)
+            if basis is None or len(nodes) == 1:
+                self.require(False, "a rate without a common kernel")
+                continue
+            rate, ratio, signals = number(said["rate"]), number(said["ratio"]), said["signals"]
+            self.require((said["bounded"] is True) == (rate * self.gain[2] >= 2), "a bounded input")
+            self.require(said["bounded"] in (True, None), "bounded")
+            dwell = None if signals == "constant" else number(signals["dwell"])
+            self.require(dwell is None or (dwell > 0 and signals["clock"] in ("t", "s")), "a dwell time")
+            if said["forms"] is None:
+                own = [number(V["rate"]) for V in self.data["lyapunov"]["functions"] if self.same_part(V, said)]
+                self.require(ratio == 1 and rate <= max(own), "a rate of restricted signals by functions")
+                continue
+            forms = [self.symmetric(lower) for lower in said["forms"]]
+            self.require(ratio >= 1 and (dwell is not None or ratio == 1), "a ratio")
+            if dwell is not None:
+                for P in forms:
+                    for Q in forms:
+                        S = [[ratio * x - y for x, y in zip(*rows, strict=True)] for rows in zip(P, Q, strict=True)]
+                        self.require(semidefinite(S), "the ratio of forms")
+                if signals["clock"] == "s":
+                    rate += Fraction(math.log(ratio) * (1 - SLACK)) / dwell
+            self.forms(nodes, basis, forms, rate)
+
+    @staticmethod
+    def same_part(one: Json, other: Json) -> bool:
+        return bool(one["component"] == other["component"])
+
+    def forms(self, nodes: list[int], basis: Matrix, forms: list[Matrix], rate: Fraction) -> None:
+        """Forms of each mode that all decay at a rate, in the coordinates of the first nodes of the leading groups."""
+        pivots = [c[0] for c in self.balanced_first(nodes)]
+        free = [v for v in nodes if v not in pivots]
+        to_zero = self.lift(basis, nodes, free, pivots)
+        for some, P in zip(self.members, forms, strict=True):
+            self.require(len(P) == len(free) and self.definite(P), "P is not definite")
+            for L in some:
+                own = self.part(L, nodes)
+                A = times(to_zero, [[row[nodes.index(v)] for v in free] for row in own])
+                PA = times(P, A)
+                S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
+                self.require(semidefinite(S), "a rate of restricted signals")

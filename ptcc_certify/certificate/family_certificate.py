@@ -29,6 +29,7 @@ from ptcc_certify.certificate.request import (
     read_initial_state,
     read_seconds,
 )
+from ptcc_certify.certificate.restricted_claims import STEP, claims_for
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError
@@ -44,8 +45,9 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.restricted_signals import SignalClass, read_signal
 
-STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
+STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
@@ -71,6 +73,10 @@ class FamilyCertificate(FamilyContent, Shown):
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
+    signal : "any", "constant" or DwellTime
+        The signals that it was asked for.
+    restricted : tuple of Claim
+        What holds for these beside what holds for every signal.
 
     References
     ----------
@@ -162,6 +168,7 @@ def certify_family(
     x0: Any = None,
     *,
     time_limit: float | None = None,
+    signal: SignalClass = "any",
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
@@ -178,6 +185,8 @@ def certify_family(
         The initial state; without it no final states and no peaks.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
+    signal : {"any", "constant"} or DwellTime
+        Restricted signals of which more is claimed, beside what holds for every signal.
     expectations : Expectations or str, optional
     scenario, origins : mapping, optional
         See :func:`ptcc_certify.certify`.
@@ -206,6 +215,7 @@ def certify_family(
         raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    signal = read_signal(signal)
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
@@ -214,9 +224,12 @@ def certify_family(
     with deadline.time_limit(seconds):
         for component in components:
             parts.append(_prove(component, notes, progress))
-    progress(STEPS[3])
+        if signal != "any":
+            progress(STEP)
+        kept: dict[str, Any] = {"signal": signal, "restricted": claims_for(signal, parts, protocol, notes)}
+    progress(STEPS[-1])
     told = origins_of(None, x0, None) | dict(origins or {})
-    kept: dict[str, Any] = {"origins": told, "scenario": scenario}
+    kept |= {"origins": told, "scenario": scenario}
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
 
 

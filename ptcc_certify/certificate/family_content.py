@@ -15,6 +15,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -27,6 +28,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.restricted_signals import SignalClass
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,8 @@ class FamilyContent:
     source: Source | None = None
     origins: Mapping[str, str] = field(default_factory=dict)
     scenario: Mapping[str, Any] | None = None
+    signal: SignalClass = "any"
+    restricted: tuple[Claim, ...] = ()
 
     @property
     def common(self) -> bool:
@@ -118,6 +122,19 @@ class FamilyContent:
         """The rate that every component has for every signal; None if some has none that is proved."""
         rates = [part.rate for part in self.parts if part.component.nodes.size > 1]
         return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def rate_of_signal(self) -> Fraction | None:
+        """The rate that every component has for the signals that were asked for; None if some has none."""
+        own = {claim.component: claim.rate for claim in self.restricted}
+        rates = [own.get(k, part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
+        return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def member_bound(self) -> Fraction | None:
+        """No rate for constant signals is larger; None if none is proved."""
+        bounds = (part.upper_bound for part in self.parts)
+        return min((b.value for b in bounds if b is not None and b.kind == "member"), default=None)
 
     @property
     def upper_bound(self) -> Fraction | None:

@@ -77,10 +77,12 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
 
 def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
-    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
+    if certificate.signal != "any":
+        bound = certificate.member_bound
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
         return Answer(MET, what)
-    if any(part.component.behaviour == DEPENDS for part in certificate.parts):
+    if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
         return Answer(OPEN, what, "whether rest states agree is not decided")

@@ -14,6 +14,7 @@ from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
+from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
@@ -54,6 +55,8 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         "proof": _proof(certificate, components, functions),
         "verdict": "certified",
     }
+    if certificate.restricted:
+        document["restricted"] = [claim_entry(claim) for claim in certificate.restricted]
     return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
 
 
@@ -92,7 +95,11 @@ def _proof(
         own = (rows_steps if V.kind == "rows" else form_steps)(f"lyapunov.functions[{k}]", V)
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
     steps += [_step("family-final-state", "final_state")] * (certificate.final_states is not None)
-    return steps + [_step("family-input", "input")] * (certificate.bounded is not None)
+    steps += [_step("family-input", "input")] * (certificate.bounded is not None)
+    for k, claim in enumerate(certificate.restricted):
+        own = claim_steps(f"restricted[{k}]", claim)
+        steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
+    return steps
 
 
 def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.families import certify_family, family_options, read_graph_or_family
+from ptcc_certify.cli.families import certify_family, family_options, read_graph_or_family, restricted_options
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @screen_options
 @shared.reading_options
 @family_options
+@restricted_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @shared.number_option(
     "--min-rate", metavar="R", help="Ask for a proved decay rate of at least R per unit of the stretched clock."

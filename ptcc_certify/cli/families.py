@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
+    from ptcc_certify.theorems.restricted_signals import SignalClass
 
 #: Options of certify that families do not take.
 _NOT_OF_FAMILIES = (
@@ -71,6 +72,29 @@ def mode_options(command: Any) -> Any:
     ):
         command = option(command)
     return command
+
+
+restricted_options = shared.options_of(
+    shared.number_option(
+        "--dwell", metavar="THETA", help="Families: at least so much time between switches; claim more for these."
+    ),
+    shared.number_option(
+        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
+    ),
+)
+
+
+def signals_of(options: shared.Options) -> SignalClass:
+    """Return the signals of which more is asked, or refuse two kinds of them at once."""
+    from ptcc_certify.theorems.restricted_signals import DwellTime
+
+    dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
+    given = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
+    if len(given) > 1:
+        raise ParameterError("--dwell is of time, --clock-dwell of the clock: give one of them")
+    if given and options["signal"] == "constant":
+        raise ParameterError("--signal constant never switches: leave --dwell and --clock-dwell out")
+    return given[0] if given else options["signal"]
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -178,12 +202,13 @@ def certify_family(
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
-    if options["signal"] == "constant" and (most is not None or options["min_rate"] is not None):
-        raise ParameterError("--min-rate and --max-input are judged for --signal any; leave them out with constant")
+    signal = signals_of(options)
     protocol = shared.protocol_of(options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
-    if options["signal"] == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
+    if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
+        if most is not None or options["min_rate"] is not None:
+            raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
         _show_decision(graphs, family, left, as_json, screen, options)
         code = _expected(left, options["expect"])
         if output:
@@ -197,7 +222,12 @@ def certify_family(
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **drawn}
-        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
+        limit = {
+            "time_limit": options["time_limit"],
+            "expectations": asked,
+            "scenario": scenario_record(),
+            "signal": signal,
+        }
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)

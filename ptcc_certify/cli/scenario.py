@@ -43,6 +43,8 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "uncertainty": ("uncertainty", '"10%"'),
             "optional": ("optional", '["a,b"]'),
             "signal": ("signal", '"any"'),
+            "dwell": ("dwell", '"0.1"'),
+            "clock_dwell": ("clock_dwell", '"0.1"'),
         },
     ),
     "protocol": (

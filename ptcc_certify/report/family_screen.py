@@ -12,6 +12,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -77,6 +78,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
         ("protocol", _protocol_text(certificate, origins)),
         *_claim_entries(components, f" at T = {near(T)}"),
         *_rate_entries(certificate),
+        *restricted_entries(certificate),
         *_final_entries(certificate),
         *_error_entries(certificate),
         *_input_entries(certificate),
@@ -119,7 +121,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + drawn))
     entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True)
-    entries += [*_rate_entries(certificate), *_function_entries(certificate), *_final_entries(certificate, long=True)]
+    entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
+    entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
     entries += [("note", note) for note in certificate.notes]
     entries.append(("proof", _proof_text(certificate)))

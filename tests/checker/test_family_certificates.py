@@ -34,6 +34,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -82,6 +83,18 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
+    return found + restricted_cases()
+
+
+def restricted_cases() -> list[tuple[str, Json]]:
+    """True certificates with claims for restricted signals: of both clocks, and of constant ones."""
+    found, draw = [], np.random.default_rng(3)
+    signals = {"time": DwellTime("0.3", clock="t"), "clock": DwellTime(4, clock="s"), "constant": "constant"}
+    for kind, share in (("stability", Fraction(1, 5)), ("consensus", Fraction(0)), ("consensus", Fraction(1, 5))):
+        family = with_common_kernel(draw, kind, 3, 2, share, 0.3)
+        for name, signal in signals.items():
+            made = certify_family(family, PROTOCOL, time_limit=5, signal=signal)
+            found.append((f"{name} {kind} {share}", {**made.to_dict(), "unverified": {}}))
     return found
 
 

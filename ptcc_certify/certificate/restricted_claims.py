@@ -1,0 +1,153 @@
+"""What is claimed of a family for restricted signals: under a dwell time, or if mode and weights never change.
+
+Each claim is about one component with common states at rest, and stands beside what is claimed for every signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from lmi.errors import LMIError
+from lmi.exact.elementary_enclosures import log, rounded
+from lmi.search_time import share_of_time
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_content import ComponentProof
+    from ptcc_certify.protocols import Protocol
+
+STEP = "restricted signals"
+#: 1 - t/T at which switches are weighed against the rate.
+_WEIGHED = 0.01
+#: Relative gain for which forms of their own are written, and bits of rates.
+_GAIN, _RATE_BITS = 1e-6, 60
+
+
+@dataclass(frozen=True, eq=False)
+class RateClaim:
+    """A decay rate of one component for restricted signals.
+
+    Let ``V`` be ``xi' P_i xi`` with the form of the present mode. For constant signals ``V <= e^(-rate s) V(0)``. Under
+    a dwell time in ``t``, ``V <= ratio^n e^(-rate s) V(0)`` after ``n`` switches; under one on the clock,
+    ``V <= ratio e^(-rate s) V(0)``.
+
+    Attributes
+    ----------
+    component : int
+        Its number.
+    signal : "constant" or DwellTime
+    forms : ModeForms or None
+        None: the functions for every signal have this rate.
+    rate : Fraction
+        Per unit of the stretched clock.
+    bounded : bool
+        Whether the rate times ``rho2 kappa`` is at least 2: then the input is bounded for all these signals.
+    """
+
+    component: int
+    signal: SignalClass
+    forms: ModeForms | None
+    rate: Fraction
+    bounded: bool
+
+    @property
+    def ratio(self) -> Fraction:
+        """The factor of ``V`` at a switch, at most; 1 for constant signals."""
+        return Fraction(1) if self.forms is None or self.signal == "constant" else self.forms.ratio
+
+
+Claim = RateClaim
+
+
+def claims_for(
+    signal: SignalClass, parts: Sequence[ComponentProof], protocol: Protocol, notes: list[str]
+) -> tuple[Claim, ...]:
+    """Return what is proved beside for restricted signals, component after component.
+
+    Parameters
+    ----------
+    signal : SignalClass
+    parts : sequence of ComponentProof
+        What was proved for every signal.
+    protocol : NominalProtocol
+    notes : list of str
+        Is told what the time limit cut off.
+    """
+    if signal == "any":
+        return ()
+    claims: list[Claim] = []
+    for number, part in enumerate(parts):
+        if part.component.nodes.size == 1 or part.component.behaviour in (None, DEPENDS):
+            continue
+        if (claim := _rate_claim(number, signal, part, protocol, notes)) is not None:
+            claims.append(claim)
+    return tuple(claims)
+
+
+def _rate_claim(
+    number: int, signal: SignalClass, part: ComponentProof, protocol: Protocol, notes: list[str]
+) -> RateClaim | None:
+    best, forms = part.rate, None
+    own = [V for V in part.functions if isinstance(V, FamilyFunction)]
+    with share_of_time(1.0, STEP, notes):
+        quotient = Quotient.of(part.component)
+        if within_reach(quotient):
+            try:
+                forms = _search(quotient, signal, own, protocol)
+            except LMIError as error:
+                if type(error).__name__ == "OutOfTime":
+                    raise
+    price = switch_price(signal, protocol)
+    if forms is not None and best is not None and _worth(forms, price) <= float(best) + _GAIN * abs(float(best)):
+        forms = None
+    rate = best if forms is None else own_rate(signal, forms)
+    return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
+
+
+def _search(
+    quotient: Quotient, signal: SignalClass, own: Sequence[FamilyFunction], protocol: Protocol
+) -> ModeForms | None:
+    if isinstance(signal, DwellTime):
+        return search_mode_forms(quotient, switch_price(signal, protocol), own)
+    return search_single_forms(quotient)
+
+
+def switch_price(signal: SignalClass, protocol: Protocol) -> float:
+    """Return the switches per unit of the stretched clock: all of them, or those until 0.99 T.
+
+    Examples
+    --------
+    >>> switch_price(DwellTime("0.5", clock="s"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
+    2.0
+    """
+    if not isinstance(signal, DwellTime):
+        return 0.0
+    if signal.clock == "s":
+        return float(1 / signal.least)
+    return signal.switches(protocol.T) / float(protocol.gain.clock_at_remaining(_WEIGHED))
+
+
+def _worth(forms: ModeForms, price: float) -> float:
+    return float(forms.rate) - price * float(log(forms.ratio)[1])
+
+
+def own_rate(signal: SignalClass, forms: ModeForms) -> Fraction:
+    """Return the rate that forms of each mode prove: the least of theirs, minus ``ln(ratio)/dwell`` on the clock.
+
+    Examples
+    --------
+    >>> forms = ModeForms((), (Fraction(3), Fraction(2)), (), Fraction(2))
+    >>> own_rate("constant", forms), float(own_rate(DwellTime(1, clock="s"), forms))
+    (Fraction(2, 1), 1.3068528194400546)
+    """
+    if not isinstance(signal, DwellTime) or signal.clock == "t":
+        return forms.rate
+    loss = log(forms.ratio)[1] / signal.least
+    return forms.rate - rounded(loss, _RATE_BITS, up=True)

@@ -1,0 +1,62 @@
+"""What the screen of a family's certificate tells of restricted signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_claims import RateClaim
+from ptcc_certify.report.text_layout import printable, shorten_label
+from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_content import FamilyContent
+
+CLOCK = {"t": "time", "s": "clock"}
+
+
+def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
+    """Yield what is proved for restricted signals, component after component.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
+    >>> print(*next(restricted_entries(cert)), sep=": ")
+    constant: if mode and weights never change: rate 1.99999, input bounded
+    """
+    if certificate.signal == "any":
+        return
+    head = signal_text(certificate.signal)
+    several = len(certificate.parts) > 1
+    if not certificate.restricted:
+        yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
+    for claim in certificate.restricted:
+        name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
+        where = f"component of {printable(name)}: " if several else ""
+        yield head[0], f"{where}{head[1]}: {_rate_text(certificate, claim)}"
+
+
+def signal_text(signal: SignalClass) -> tuple[str, str]:
+    """Name restricted signals: the word at the beginning of a line, and the condition.
+
+    Examples
+    --------
+    >>> signal_text(DwellTime("0.5", clock="t"))
+    ('dwell', 'at least 0.5 of time between switches')
+    """
+    if isinstance(signal, DwellTime):
+        return "dwell", f"at least {near(signal.least, 6)} of {CLOCK[signal.clock]} between switches"
+    return "constant", "if mode and weights never change"
+
+
+def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
+    text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
+    if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
+        text += f", V up to {up(claim.ratio, 3)} times"
+        if claim.signal.clock == "t":
+            text += f" at each of {claim.signal.switches(certificate.protocol.T)} switches at most"
+        else:
+            text += " V(0)"
+    return text + ", input bounded" * claim.bounded
