@@ -403,6 +403,9 @@ class FamilyOracle:
         """Rates of restricted signals, by members in rationals: the forms, their ratio, and what follows."""
         for said in self.data.get("restricted", ()):
             nodes = self.pieces[said["component"]]
+            if said["claim"] == "last mode":
+                self.last_mode(nodes, said)
+                continue
             basis = self.common_kernel(nodes)
             if basis is None or len(nodes) == 1:
                 self.require(False, "a rate without a common kernel")
@@ -444,3 +447,36 @@ class FamilyOracle:
                 PA = times(P, A)
                 S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
                 self.require(semidefinite(S), "a rate of restricted signals")
+
+    def last_mode(self, nodes: list[int], said: Json) -> None:
+        """What each mode does by itself, by kernels of its members, and where agents are under signals that switch."""
+        self.require(self.common_kernel(nodes) is None, "a last mode where every signal does the same")
+        constant = said["signals"] == "constant"
+        self.require(constant or said["signals"]["clock"] == "t", "infinitely many switches")
+        self.require(constant or number(said["signals"]["dwell"]) > 0, "a dwell time")
+        for k, told in enumerate(said["modes"]):
+            kernels = [kernel(self.part(L, nodes)) for L in self.members[k]]
+            first = kernels[0]
+            same = all(
+                len(own) == len(first) and not any(x for b in first for (x,) in times(L, [[y] for y in b]))
+                for own, L in zip(kernels, (self.part(L, nodes) for L in self.members[k]), strict=True)
+            )
+            uncertain = any(s in nodes and low < high for s, _, low, high in self.modes[k][0])
+            single = self.closed_components(k, nodes) == 1
+            camps = len(first) == 1 and len(set(map(abs, first[0]))) == 1
+            found = "stability" if not first else "bipartite consensus" if camps and single else None
+            if not same or (found is None and uncertain):
+                found = None
+            elif found is None:
+                found = "interval bipartite consensus" if single else "bipartite containment"
+            self.require(told == found, "a behaviour of the last mode")
+        ends = said["final_state"]
+        self.require((ends is None) == (self.start is None), "final states of the last mode")
+        if ends is not None:
+            self.require(list(ends) == [self.labels[v] for v in nodes], "final states by agent")
+            size = max(1.0, *(abs(float(z)) for z in self.start or ()))
+            for x in self.switched(nodes):
+                for entry, y in zip(ends.values(), x, strict=True):
+                    mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
+                    radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
+                    self.require(abs(y - float(mid)) <= float(radius) + 1e-7 * size, "an end of the last mode")

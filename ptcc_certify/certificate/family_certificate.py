@@ -226,7 +226,10 @@ def certify_family(
             parts.append(_prove(component, notes, progress))
         if signal != "any":
             progress(STEP)
-        kept: dict[str, Any] = {"signal": signal, "restricted": claims_for(signal, parts, protocol, notes)}
+        kept: dict[str, Any] = {
+            "signal": signal,
+            "restricted": claims_for(signal, parts, protocol, initial_state, notes),
+        }
     progress(STEPS[-1])
     told = origins_of(None, x0, None) | dict(origins or {})
     kept |= {"origins": told, "scenario": scenario}

@@ -15,7 +15,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import Claim
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -126,9 +126,14 @@ class FamilyContent:
     @property
     def rate_of_signal(self) -> Fraction | None:
         """The rate that every component has for the signals that were asked for; None if some has none."""
-        own = {claim.component: claim.rate for claim in self.restricted}
+        own = {claim.component: claim.rate for claim in self.restricted if isinstance(claim, RateClaim)}
         rates = [own.get(k, part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
         return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def last_modes(self) -> Mapping[int, LastModeClaim]:
+        """What is claimed of the last mode, by the number of the component."""
+        return {claim.component: claim for claim in self.restricted if isinstance(claim, LastModeClaim)}
 
     @property
     def member_bound(self) -> Fraction | None:

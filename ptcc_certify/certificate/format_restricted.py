@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.certificate.restricted_claims import Claim, RateClaim
-from ptcc_certify.checker.reading import exact, triangle
+from lmi.exact.numbers import longest
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim
+from ptcc_certify.checker.reading import exact, interval, triangle
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov.mode_forms import ModeForms
 from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
+#: Bits of the middles and radii of final states, which are rounded outwards.
+_BITS = 64
 Step = tuple[str, str, Any, dict[str, str]]
 
 
@@ -27,8 +31,33 @@ def signal_entry(signal: SignalClass) -> Any:
     return signal
 
 
-def claim_entry(claim: Claim) -> dict[str, Any]:
-    """Return a claim as JSON."""
+def enclosed(low: Fraction, high: Fraction) -> Any:
+    """Write ends as a middle and a radius, rounded outwards.
+
+    Examples
+    --------
+    >>> enclosed(Fraction(1), Fraction(1)), enclosed(Fraction(1), Fraction(2))
+    ('1', {'mid': '3/2', 'radius': '1/2'})
+    """
+    if low == high:
+        return format_exact(low)
+    size = max(abs(low), abs(high))
+    unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
+    below, above = low // unit, -(-high // unit)
+    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
+
+
+def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
+    """Return a claim about the component of the agents ``labels`` as JSON."""
+    if isinstance(claim, LastModeClaim):
+        ends = claim.final_states
+        return {
+            "claim": "last mode",
+            "signals": signal_entry(claim.signal),
+            "component": claim.component,
+            "modes": list(claim.behaviours),
+            "final_state": None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)},
+        }
     forms = claim.forms
     return {
         "claim": "rate",
@@ -47,6 +76,9 @@ def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
 
 def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
     """Yield kind, place, witness and numbers of the obligations of a claim."""
+    if isinstance(claim, LastModeClaim):
+        yield "last-mode", of, None, {}
+        return
     if claim.forms is not None:
         for mode, (rate, tau) in enumerate(zip(claim.forms.rates, claim.forms.multipliers, strict=True)):
             witness = {"multipliers": [format_exact(x) for x in tau]}
@@ -56,7 +88,11 @@ def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
 
 def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]]) -> Claim:
     """Return a claim of a certificate that was accepted."""
-    forms = None
+    said, forms = entry["signals"], None
+    signal = said if isinstance(said, str) else DwellTime(exact(said["dwell"]), clock=said["clock"])
+    if entry["claim"] == "last mode":
+        ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
+        return LastModeClaim(entry["component"], signal, tuple(entry["modes"]), ends)
     if (triangles := entry["forms"]) is not None:
         steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
         forms = ModeForms(
@@ -65,6 +101,4 @@ def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, A
             tuple(tuple(map(exact, step["witness"]["multipliers"])) for step in steps),
             exact(entry["ratio"]),
         )
-    said = entry["signals"]
-    signal = said if isinstance(said, str) else DwellTime(exact(said["dwell"]), clock=said["clock"])
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))

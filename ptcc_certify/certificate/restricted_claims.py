@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING
 from lmi.errors import LMIError
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.last_mode import last_mode_behaviours
 from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
 if TYPE_CHECKING:
@@ -63,11 +66,37 @@ class RateClaim:
         return Fraction(1) if self.forms is None or self.signal == "constant" else self.forms.ratio
 
 
-Claim = RateClaim
+@dataclass(frozen=True, eq=False)
+class LastModeClaim:
+    """Where the agents of a component without common states at rest end: where the last mode before ``T`` leads them.
+
+    Attributes
+    ----------
+    component : int
+        Its number.
+    signal : "constant" or DwellTime
+        The latter in ``t``: finitely many switches.
+    behaviours : tuple of str or None
+        Of each mode; None where agents need not come to rest as long as its weights move.
+    final_states : tuple of (Fraction, Fraction), or None
+        Of each node of the component: the ends between which it stays at all times.
+    """
+
+    component: int
+    signal: SignalClass
+    behaviours: tuple[str | None, ...]
+    final_states: tuple[Interval, ...] | None
+
+
+Claim = RateClaim | LastModeClaim
 
 
 def claims_for(
-    signal: SignalClass, parts: Sequence[ComponentProof], protocol: Protocol, notes: list[str]
+    signal: SignalClass,
+    parts: Sequence[ComponentProof],
+    protocol: Protocol,
+    state: Sequence[Fraction] | None,
+    notes: list[str],
 ) -> tuple[Claim, ...]:
     """Return what is proved beside for restricted signals, component after component.
 
@@ -77,6 +106,7 @@ def claims_for(
     parts : sequence of ComponentProof
         What was proved for every signal.
     protocol : NominalProtocol
+    state : sequence of N Fraction, or None
     notes : list of str
         Is told what the time limit cut off.
     """
@@ -84,9 +114,12 @@ def claims_for(
         return ()
     claims: list[Claim] = []
     for number, part in enumerate(parts):
-        if part.component.nodes.size == 1 or part.component.behaviour in (None, DEPENDS):
+        if part.component.nodes.size == 1 or part.component.behaviour is None:
             continue
-        if (claim := _rate_claim(number, signal, part, protocol, notes)) is not None:
+        if part.component.behaviour == DEPENDS:
+            if not isinstance(signal, DwellTime) or signal.clock == "t":
+                claims.append(_last_mode_claim(number, signal, part, state))
+        elif (claim := _rate_claim(number, signal, part, protocol, notes)) is not None:
             claims.append(claim)
     return tuple(claims)
 
@@ -109,6 +142,17 @@ def _rate_claim(
         forms = None
     rate = best if forms is None else own_rate(signal, forms)
     return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
+
+
+def _last_mode_claim(
+    number: int, signal: SignalClass, part: ComponentProof, state: Sequence[Fraction] | None
+) -> LastModeClaim:
+    component, bounds = part.component, None
+    if state is not None:
+        edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+        x = [state[v] for v in component.nodes.tolist()]
+        bounds = tuple(reachable_bounds(range(len(x)), edges, x).values())
+    return LastModeClaim(number, signal, last_mode_behaviours(component), bounds)
 
 
 def _search(

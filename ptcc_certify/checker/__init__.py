@@ -193,7 +193,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     functions = check_family_functions(doc, family)
     state = None if begin.state is None else list(begin.state)
     check_family_bounds(doc, family, functions, protocol.gains, state)
-    check_restricted(doc, family, functions, protocol.gains)
+    check_restricted(doc, family, functions, protocol.gains, state)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
     return _close(doc, True)

@@ -6,7 +6,7 @@ all members, and at a switch ``P_j <= ratio P_i`` bounds what it becomes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -14,23 +14,31 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import log
 from lmi.exact.numbers import integers
-from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
 from ptcc_certify.checker.family_rows import Function
+from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need, triangle
+from ptcc_certify.checker.reading import Interval, entries, exact, fields, interval, need, triangle
 
 #: Claims that are read.
 MANY_CLAIMS = 100
-KEYS = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
+RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
+LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
 #: Longest ratio, in bits, of which the logarithm is enclosed.
 RATIO_BITS = 4000
 
 Form = tuple[Matrix, int]
 
 
-def check_restricted(doc: Document, family: Family, functions: Sequence[Function], gains: dict[str, Fraction]) -> None:
+def check_restricted(
+    doc: Document,
+    family: Family,
+    functions: Sequence[Function],
+    gains: dict[str, Fraction],
+    x: Sequence[Fraction] | None,
+) -> None:
     """Verify every claim for restricted signals."""
     if "restricted" not in doc.data:
         return
@@ -38,9 +46,11 @@ def check_restricted(doc: Document, family: Family, functions: Sequence[Function
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
-        need(isinstance(entry, dict) and entry.get("claim") == "rate", "an unknown claim")
-        fields(entry, KEYS, "a claim")
-        _check_rate(doc, family, functions, gains, entry, of)
+        need(isinstance(entry, dict) and entry.get("claim") in ("rate", "last mode"), "an unknown claim")
+        if entry["claim"] == "rate":
+            _check_rate(doc, family, functions, gains, entry, of)
+        else:
+            _check_last_mode(doc, family, x, entry, of)
 
 
 def _component(family: Family, number: Any) -> Component:
@@ -61,6 +71,7 @@ def _dwell(entry: Any) -> tuple[Fraction, str] | None:
 def _check_rate(
     doc: Document, family: Family, functions: Sequence[Function], gains: dict[str, Fraction], entry: Any, of: str
 ) -> None:
+    fields(entry, RATE, "a claim")
     component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
     need(not component.depends and len(component.nodes) > 1, "a rate where nothing, or no common kernel, decays")
     ratio, rate = exact(entry["ratio"]), exact(entry["rate"])
@@ -118,3 +129,88 @@ def _check_ratio(judge: Arithmetic, forms: Sequence[Form], ratio: Fraction) -> N
             if i != j:
                 S = combined("the ratio of forms", (p * scale, P), (-q * unit, Q))
                 need(judge.definite(S), "the ratio of two forms is not proved")
+
+
+# ---------------------------------------------------------------------- the last mode
+
+
+def reachable_bounds(
+    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]], x: Sequence[Fraction]
+) -> dict[int, Interval]:
+    """Bound ``x_k(t)`` for every node and all times, under every signal.
+
+    ``+-x_l(0)`` reaches ``k`` with the sign of a path of edges of any modes; the largest that reaches it, also from
+    itself, is an upper bound of ``x_k``: in the graph with a node for each sign, no largest value of a set that hears
+    nobody else ever grows.
+
+    Examples
+    --------
+    >>> reachable_bounds([0, 1, 2], [(0, 1, -1), (1, 0, -1), (2, 2, 1)], [1, 2, 5])
+    {0: (-2, 1), 1: (-1, 2), 2: (5, 5)}
+    """
+    out: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign in edges:
+        out[s].append((t, sign))
+    best: dict[tuple[int, int], Fraction] = {}
+    for value, v, side in sorted(((side * x[v], v, side) for v in nodes for side in (1, -1)), reverse=True):
+        found = [(v, side)] if (v, side) not in best else []
+        best.update(dict.fromkeys(found, value))
+        for u, own in found:
+            for w, sign in out[u]:
+                if (w, own * sign) not in best:
+                    best[w, own * sign] = value
+                    found.append((w, own * sign))
+    return {v: (-best[v, -1], best[v, 1]) for v in nodes}
+
+
+def mode_behaviour(family: Family, number: int, component: Component) -> str | None:
+    """Return what a mode does to a component where it acts for ever, its weights changing; None if that is not told."""
+    structure, edges = family.modes[number].structure, component.part.edges[number]
+    closed = component.part.closed[number]
+    if not any(structure.gauges[k] is not None for k in closed):
+        return STABILITY
+    if len(closed) == 1 and _camps_fit(component.nodes, edges):
+        return CONSENSUS
+    if any(low < high for _, _, _, low, high in edges):
+        return None
+    return INTERVAL if len(closed) == 1 else CONTAINMENT
+
+
+def _camps_fit(nodes: Sequence[int], edges: Sequence[Edge]) -> bool:
+    near: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign, _, _ in edges:
+        near[s].append((t, sign))
+        near[t].append((s, sign))
+    camp: dict[int, int] = {}
+    for root in nodes:
+        found = [] if root in camp else [root]
+        camp.setdefault(root, 1)
+        for v in found:
+            for u, sign in near[v]:
+                if u not in camp:
+                    camp[u] = sign * camp[v]
+                    found.append(u)
+    return all(camp[t] == sign * camp[s] for s, t, sign, _, _ in edges)
+
+
+def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+    """Verify what each mode does to a component where it is the last one, and where the agents end."""
+    fields(entry, LAST_MODE, "a claim")
+    component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
+    need(component.depends, "every signal does the same")
+    need(dwell is None or dwell[1] == "t", "modes that may change for ever")
+    doc.open("last-mode", of)
+    told = entries(entry["modes"], "modes", len(family.modes))
+    known = [mode_behaviour(family, k, component) for k in range(len(family.modes))]
+    need(told == known, "another behaviour of a mode")
+    section = entry["final_state"]
+    need((section is None) == (x is None), "final states are claimed iff there is an initial state")
+    if x is not None:
+        edges = {edge[:3] for some in component.part.edges for edge in some}
+        bounds = reachable_bounds(component.nodes, edges, x)
+        labels = [family.labels[v] for v in component.nodes]
+        for v, end in zip(component.nodes, ordered(labels, section, "final_state").values(), strict=True):
+            middle, radius = interval(end)
+            low, high = bounds[v]
+            need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")
+    doc.done(", ".join(dict.fromkeys(str(b or "not told") for b in known)))

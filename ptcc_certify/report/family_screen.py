@@ -12,7 +12,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import restricted_entries
+from ptcc_certify.report.restricted_screen import last_states, restricted_entries
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -353,6 +353,12 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
         yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+    elif certificate.final_states is not None and certificate.last_modes:
+        pairs = zip(certificate.final_states, last_states(certificate), strict=True)
+        states = [other if ends is None else ends for ends, other in pairs]
+        ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)
+        rests = all(None not in claim.behaviours for claim in certificate.last_modes.values())
+        yield from ends if rests else (("x(t)", text) for _, text in ends)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:

@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import RateClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.report.text_layout import printable, shorten_label
+from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
 if TYPE_CHECKING:
@@ -33,6 +36,9 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     if not certificate.restricted:
         yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
     for claim in certificate.restricted:
+        if isinstance(claim, LastModeClaim):
+            yield head[0], f"{head[1]}: {_last_mode_text(certificate, claim)}"
+            continue
         name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
         where = f"component of {printable(name)}: " if several else ""
         yield head[0], f"{where}{head[1]}: {_rate_text(certificate, claim)}"
@@ -49,6 +55,29 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
     if isinstance(signal, DwellTime):
         return "dwell", f"at least {near(signal.least, 6)} of {CLOCK[signal.clock]} between switches"
     return "constant", "if mode and weights never change"
+
+
+def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
+    """Tell what the last mode does, of each mode where they differ."""
+    begin = "the last mode decides" if len(claim.behaviours) > 1 and claim.signal != "constant" else ""
+    untold = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
+    told = [behaviour or untold for behaviour in claim.behaviours]
+    if len(set(told)) == 1:
+        camps = ", camps of that mode" if begin and told[0] == BIPARTITE_CONSENSUS else ""
+        return f"{begin}: {told[0]}{camps}".removeprefix(": ")
+    names = (printable(mode_name(certificate.family, k)) for k in range(len(told)))
+    each = "; ".join(f"{name} {behaviour}" for name, behaviour in zip(names, told, strict=True))
+    return f"{begin}: {each}".removeprefix(": ")
+
+
+def last_states(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the ends between which agents stay whose last mode decides; None of the others."""
+    result: list[Interval | None] = [None] * certificate.family.n_nodes
+    for number, claim in certificate.last_modes.items():
+        nodes = certificate.parts[number].component.nodes.tolist()
+        for v, ends in zip(nodes, claim.final_states or (), strict=False):
+            result[v] = ends
+    return result
 
 
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import random
 from fractions import Fraction
 from functools import cache
 from itertools import pairwise
@@ -12,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 from common_kernel_families import random_family
+from families import random_family as any_family
 from scipy.linalg import expm
 
 from ptcc_certify import DwellTime, Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import RateClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -200,3 +202,58 @@ def test_no_claim_is_larger_than_its_proof():
     longer = copy.deepcopy(data)
     longer["restricted"][0]["signals"]["dwell"] = str(2 * ON_CLOCK.least)
     assert check(resealed(longer)).accepted
+
+
+# ---------------------------------------------------------------------- the last mode
+
+
+def last(family: Family, signal: Any = IN_TIME, **more: Any) -> FamilyCertificate:
+    return certify_family(family, PROTOCOL, range(1, family.n_nodes + 1), signal=signal, **more)
+
+
+def against() -> Family:
+    """Two modes with different camps."""
+    one = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    return Family.switching({"one": one, "other": SignedDigraph.from_edges([("a", "b", -1), ("b", "c", 2)])})
+
+
+def test_where_kernels_differ_the_last_mode_decides():
+    made = last(against())
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and made.behaviours == ("depends on the signal",)
+    assert isinstance(claim, LastModeClaim) and set(claim.behaviours) == {"bipartite consensus"}
+    assert claim.final_states == ((1, 1), (-1, 2), (-1, 3)) and last(against(), ON_CLOCK).restricted == ()
+
+
+def test_an_expectation_is_judged_by_the_last_mode():
+    for expected, met in (("bipartite consensus", True), ("bipartite containment", True), ("stability", False)):
+        answers = [last(against(), signal, expectations=expected).assessment.asked for signal in (IN_TIME, "any")]
+        assert answers == (["met", "refuted"] if met else ["refuted", "refuted"])
+    outage = Family.switching([against().modes[0].mandatory, SignedDigraph.from_edges([], nodes="abc")])
+    assert last(outage).restricted[0].behaviours == ("bipartite consensus", "bipartite containment")
+    assert last(outage, expectations="bipartite consensus").assessment.asked == "refuted"
+    assert last(outage, expectations="bipartite containment").assessment.asked == "met"
+
+
+def test_a_mode_whose_uncertain_weights_move_targets_is_not_told():
+    unsure = Family.from_intervals([("a", "c", 1, 2), ("b", "c", 1, 1)])
+    made = last(unsure, expectations="bipartite containment")
+    assert made.restricted[0].behaviours == (None,) and made.assessment.asked not in ("met", "refuted")
+    assert made.restricted[0].final_states == ((1, 1), (1, 3), (3, 3))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_signal_leaves_the_ends_of_the_last_mode(seed: int):
+    draw, rng = random.Random(seed), np.random.default_rng(seed)
+    family = any_family(draw, "depends", nodes=draw.randint(3, 6)).family
+    made = last(family)
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    low, high = np.array(claim.final_states, dtype=float).T
+    for _ in range(20):
+        x = np.arange(1.0, family.n_nodes + 1)
+        for _ in range(6):
+            mode = family.modes[int(rng.integers(len(family.modes)))]
+            L = np.array(mode.member(rng.random(mode.n_edges) < 0.5).dense_laplacian(), dtype=float)
+            x = expm(-L * rng.exponential(1.0)) @ x
+            assert (x >= low - 1e-9).all() and (x <= high + 1e-9).all()

@@ -95,6 +95,11 @@ def restricted_cases() -> list[tuple[str, Json]]:
         for name, signal in signals.items():
             made = certify_family(family, PROTOCOL, time_limit=5, signal=signal)
             found.append((f"{name} {kind} {share}", {**made.to_dict(), "unverified": {}}))
+    for k in range(6):
+        made = random_family(random.Random(k), "depends", nodes=4 - k % 2).family
+        state = list(range(1, made.n_nodes + 1)) if k else None
+        last = certify_family(made, PROTOCOL, state, signal=signals["constant" if k == 2 else "time"])
+        found.append((f"last mode {k}", {**last.to_dict(), "unverified": {}}))
     return found
 
 
