@@ -403,8 +403,8 @@ class FamilyOracle:
         """Rates of restricted signals, by members in rationals: the forms, their ratio, and what follows."""
         for said in self.data.get("restricted", ()):
             nodes = self.pieces[said["component"]]
-            if said["claim"] == "last mode":
-                self.last_mode(nodes, said)
+            if said["claim"] != "rate":
+                (self.last_mode if said["claim"] == "last mode" else self.windows)(nodes, said)
                 continue
             basis = self.common_kernel(nodes)
             if basis is None or len(nodes) == 1:
@@ -470,13 +470,53 @@ class FamilyOracle:
             elif found is None:
                 found = "interval bipartite consensus" if single else "bipartite containment"
             self.require(told == found, "a behaviour of the last mode")
+        for excess in self.ends_of(nodes, said, self.switched):
+            self.require(
+                excess <= 1e-7 * max(1.0, *(abs(float(z)) for z in self.start or ())), "an end of the last mode"
+            )
+
+    def ends_of(self, nodes: list[int], said: Json, runs: Any) -> Iterator[float]:
+        """How far agents end outside of what is said, under signals that are played."""
         ends = said["final_state"]
-        self.require((ends is None) == (self.start is None), "final states of the last mode")
-        if ends is not None:
-            self.require(list(ends) == [self.labels[v] for v in nodes], "final states by agent")
-            size = max(1.0, *(abs(float(z)) for z in self.start or ()))
-            for x in self.switched(nodes):
-                for entry, y in zip(ends.values(), x, strict=True):
-                    mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
-                    radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
-                    self.require(abs(y - float(mid)) <= float(radius) + 1e-7 * size, "an end of the last mode")
+        self.require((ends is None) == (self.start is None), "final states of restricted signals")
+        if ends is None:
+            return
+        self.require(list(ends) == [self.labels[v] for v in nodes], "final states by agent")
+        for x in runs(nodes):
+            for entry, y in zip(ends.values(), x, strict=True):
+                mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
+                radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
+                yield abs(y - float(mid)) - float(radius)
+
+    def windows(self, nodes: list[int], said: Json) -> None:
+        """Joint windows: the mean of all modes by its kernel, the contraction in floats, and modes played in turn."""
+        self.require(self.common_kernel(nodes) is None, "windows where every signal does the same")
+        window, on, eta = (number(x) for x in (said["signals"]["window"], said["signals"]["on"], said["eta"]))
+        self.require(0 < on <= window, "a window")
+        m, mandatory = len(self.modes), [self.part(some[0], nodes) for some in self.members]
+        mean = [[sum((L[i][j] for L in mandatory), Fraction(0)) for j in range(len(nodes))] for i in range(len(nodes))]
+        for i, row in enumerate(mean):  # edges of both signs on one pair cancel: they are told by the sizes
+            row[i] = sum((L[i][i] for L in mandatory), Fraction(0))
+        basis = kernel(mean)
+        camps = len(basis) == 1 and len(set(map(abs, basis[0]))) == 1
+        every = [self.part(L, nodes) for some in self.members for L in some]
+        fit = camps and not any(x for L in every for (x,) in times(L, [[y] for y in basis[0]]))
+        self.require(fit or not basis, "what windows do")
+        self.require(said["behaviour"] == ("bipartite consensus" if fit else "stability"), "a behaviour of windows")
+        largest = max(float(L[i][i]) for L in every for i in range(len(nodes)))
+        edges = [e for some, _ in self.modes for e in some if e[0] in nodes]
+        least = min(abs(float(self.ends(e)[0])) for e in edges if self.ends(e)[0])
+        bound = np.exp(-largest * float(window)) * min(1.0, float(on) * least)
+        self.require(eta > 0 and float(eta) <= bound * (1 + SLACK), "the contraction of windows")
+
+        def in_turn(own: list[int]) -> Iterator[np.ndarray]:
+            floats = [[np.array(self.part(L, own), dtype=float) for L in some] for some in self.members]
+            for _ in range(SIGNALS):
+                x = np.array([float(self.start[v]) for v in own])  # type: ignore[index]
+                for _ in range(300):
+                    for k in self.draw.sample(range(m), m):
+                        x = expm(-self.draw.choice(floats[k]) * self.draw.choice((0.5, 2)) / largest) @ x
+                yield x
+
+        for excess in self.ends_of(nodes, said, in_turn):
+            self.require(excess <= 1e-3 * max(1.0, *(abs(float(z)) for z in self.start or ())), "an end of windows")

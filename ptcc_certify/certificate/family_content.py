@@ -15,7 +15,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, WindowClaim
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -131,9 +131,9 @@ class FamilyContent:
         return None if None in rates else min((r for r in rates if r is not None), default=None)
 
     @property
-    def last_modes(self) -> Mapping[int, LastModeClaim]:
-        """What is claimed of the last mode, by the number of the component."""
-        return {claim.component: claim for claim in self.restricted if isinstance(claim, LastModeClaim)}
+    def ends_of_signal(self) -> Mapping[int, LastModeClaim | WindowClaim]:
+        """Where agents end under restricted signals, by the numbers of components that depend on the signal."""
+        return {claim.component: claim for claim in self.restricted if not isinstance(claim, RateClaim)}
 
     @property
     def member_bound(self) -> Fraction | None:

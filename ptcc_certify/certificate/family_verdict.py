@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
@@ -78,15 +79,18 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
 
 def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComponent], expected: str) -> Answer:
     """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
-    last = certificate.last_modes
+    last = certificate.ends_of_signal
     others = [component for k, component in enumerate(components) if k not in last]
     answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
     for claim in last.values():
-        shows = [last_mode_shows(told, expected) for told in claim.behaviours]
+        behaviours = (claim.behaviour,) if isinstance(claim, WindowClaim) else claim.behaviours
+        shows = [last_mode_shows(told, expected) for told in behaviours]
+        if isinstance(claim, WindowClaim) and shows == [False] and answer.status != REFUTED:
+            return Answer(REFUTED, expected, f"it is {claim.behaviour}")
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
             mode = mode_name(certificate.family, number)
-            return Answer(REFUTED, expected, f"{mode} by itself: {claim.behaviours[number]}")
+            return Answer(REFUTED, expected, f"{mode} by itself: {behaviours[number]}")
         if None in shows and answer.status == MET:
             answer = Answer(OPEN, expected, "not decided of the last mode")
     return answer

@@ -7,11 +7,12 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.numbers import longest
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, WindowClaim
 from ptcc_certify.checker.reading import exact, interval, triangle
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov.mode_forms import ModeForms
-from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
+from ptcc_certify.theorems.joint_windows import contraction
+from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
 
 #: Bits of the middles and radii of final states, which are rounded outwards.
 _BITS = 64
@@ -26,6 +27,8 @@ def signal_entry(signal: SignalClass) -> Any:
     >>> signal_entry(DwellTime("0.5", clock="t"))
     {'dwell': '1/2', 'clock': 't'}
     """
+    if isinstance(signal, JointWindows):
+        return {"window": format_exact(signal.length), "on": format_exact(signal.on)}
     if isinstance(signal, DwellTime):
         return {"dwell": format_exact(signal.least), "clock": signal.clock}
     return signal
@@ -49,15 +52,14 @@ def enclosed(low: Fraction, high: Fraction) -> Any:
 
 def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
     """Return a claim about the component of the agents ``labels`` as JSON."""
-    if isinstance(claim, LastModeClaim):
+    if not isinstance(claim, RateClaim):
         ends = claim.final_states
-        return {
-            "claim": "last mode",
-            "signals": signal_entry(claim.signal),
-            "component": claim.component,
-            "modes": list(claim.behaviours),
-            "final_state": None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)},
-        }
+        about = {"signals": signal_entry(claim.signal), "component": claim.component}
+        final = None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)}
+        if isinstance(claim, LastModeClaim):
+            return {"claim": "last mode", **about, "modes": list(claim.behaviours), "final_state": final}
+        told = {"behaviour": claim.behaviour, "eta": format_exact(claim.rate.eta)}
+        return {"claim": "windows", **about, **told, "final_state": final}
     forms = claim.forms
     return {
         "claim": "rate",
@@ -76,8 +78,8 @@ def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
 
 def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
     """Yield kind, place, witness and numbers of the obligations of a claim."""
-    if isinstance(claim, LastModeClaim):
-        yield "last-mode", of, None, {}
+    if not isinstance(claim, RateClaim):
+        yield "last-mode" if isinstance(claim, LastModeClaim) else "joint-windows", of, None, {}
         return
     if claim.forms is not None:
         for mode, (rate, tau) in enumerate(zip(claim.forms.rates, claim.forms.multipliers, strict=True)):
@@ -86,13 +88,25 @@ def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
     yield "restricted-rate", of, None, {}
 
 
-def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]]) -> Claim:
-    """Return a claim of a certificate that was accepted."""
-    said, forms = entry["signals"], None
-    signal = said if isinstance(said, str) else DwellTime(exact(said["dwell"]), clock=said["clock"])
-    if entry["claim"] == "last mode":
+def _read_signal(said: Any) -> SignalClass:
+    if isinstance(said, str):
+        return said
+    if "window" in said:
+        return JointWindows(exact(said["window"]), on=exact(said["on"]), clock="s")
+    return DwellTime(exact(said["dwell"]), clock=said["clock"])
+
+
+def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]], sizes: Sequence[int]) -> Claim:
+    """Return a claim of a certificate that was accepted; ``sizes`` are those of its components."""
+    size = sizes[entry["component"]]
+    number, signal, forms = entry["component"], _read_signal(entry["signals"]), None
+    if entry["claim"] != "rate":
         ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
-        return LastModeClaim(entry["component"], signal, tuple(entry["modes"]), ends)
+        if entry["claim"] == "last mode":
+            return LastModeClaim(number, signal, tuple(entry["modes"]), ends)
+        assert isinstance(signal, JointWindows), "the check has verified what a claim is about"
+        behaviour, eta = entry["behaviour"], exact(entry["eta"])
+        return WindowClaim(number, signal, behaviour, contraction(size, signal, behaviour, eta), ends)
     if (triangles := entry["forms"]) is not None:
         steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
         forms = ModeForms(

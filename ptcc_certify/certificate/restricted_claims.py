@@ -14,13 +14,16 @@ from lmi.errors import LMIError
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.checker.restricted_signals import reachable_bounds
+from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
+from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.family_rate import ExplicitRate
+from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours
-from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
+from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import ComponentProof
@@ -88,7 +91,30 @@ class LastModeClaim:
     final_states: tuple[Interval, ...] | None
 
 
-Claim = RateClaim | LastModeClaim
+@dataclass(frozen=True, eq=False)
+class WindowClaim:
+    """What joint windows do to a component without common states at rest.
+
+    Attributes
+    ----------
+    component : int
+        Its number.
+    signal : JointWindows
+    behaviour : "stability" or "bipartite consensus"
+    rate : ExplicitRate
+        The contraction in as many windows as there are nodes, or one less.
+    final_states : tuple of (Fraction, Fraction), or None
+        Of each node of the component.
+    """
+
+    component: int
+    signal: JointWindows
+    behaviour: str
+    rate: ExplicitRate
+    final_states: tuple[Interval, ...] | None
+
+
+Claim = RateClaim | LastModeClaim | WindowClaim
 
 
 def claims_for(
@@ -117,9 +143,11 @@ def claims_for(
         if part.component.nodes.size == 1 or part.component.behaviour is None:
             continue
         if part.component.behaviour == DEPENDS:
-            if not isinstance(signal, DwellTime) or signal.clock == "t":
+            if isinstance(signal, JointWindows):
+                claims += filter(None, [_window_claim(number, signal, part, state)])
+            elif not isinstance(signal, DwellTime) or signal.clock == "t":
                 claims.append(_last_mode_claim(number, signal, part, state))
-        elif (claim := _rate_claim(number, signal, part, protocol, notes)) is not None:
+        elif not isinstance(signal, JointWindows) and (claim := _rate_claim(number, signal, part, protocol, notes)):
             claims.append(claim)
     return tuple(claims)
 
@@ -142,6 +170,22 @@ def _rate_claim(
         forms = None
     rate = best if forms is None else own_rate(signal, forms)
     return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
+
+
+def _window_claim(
+    number: int, signal: JointWindows, part: ComponentProof, state: Sequence[Fraction] | None
+) -> WindowClaim | None:
+    component, bounds = part.component, None
+    behaviour = joint_behaviour(component)
+    rate = None if behaviour is None else window_rate(component, signal, behaviour)
+    if behaviour is None or rate is None:
+        return None
+    if state is not None:
+        edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+        x = [state[v] for v in component.nodes.tolist()]
+        camps = None if behaviour == STABILITY else dict(enumerate(component.gauge.tolist()))  # type: ignore[union-attr]
+        bounds = tuple(agreed_bounds(range(len(x)), edges, x, camps).values())
+    return WindowClaim(number, signal, behaviour, rate, bounds)
 
 
 def _last_mode_claim(

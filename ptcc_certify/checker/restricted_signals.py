@@ -1,4 +1,4 @@
-"""Verifies what is claimed of a family for restricted signals: under a dwell time, or if nothing ever changes.
+"""Verifies what is claimed of a family for restricted signals: dwell times, windows, nothing that ever changes.
 
 Section 19 of the format, "Restricted signals". In mode ``i`` the value ``xi' P_i xi`` decays at the rate ``b_i`` for
 all members, and at a switch ``P_j <= ratio P_i`` bounds what it becomes.
@@ -6,13 +6,13 @@ all members, and at a switch ``P_j <= ratio P_i`` bounds what it becomes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
-from lmi.exact.elementary_enclosures import log
+from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
@@ -26,6 +26,7 @@ from ptcc_certify.checker.reading import Interval, entries, exact, fields, inter
 MANY_CLAIMS = 100
 RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
 LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
+WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
 #: Longest ratio, in bits, of which the logarithm is enclosed.
 RATIO_BITS = 4000
 
@@ -46,11 +47,14 @@ def check_restricted(
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
-        need(isinstance(entry, dict) and entry.get("claim") in ("rate", "last mode"), "an unknown claim")
-        if entry["claim"] == "rate":
+        kind = entry.get("claim") if isinstance(entry, dict) else None
+        if kind == "rate":
             _check_rate(doc, family, functions, gains, entry, of)
-        else:
+        elif kind == "last mode":
             _check_last_mode(doc, family, x, entry, of)
+        else:
+            need(kind == "windows", "an unknown claim")
+            _check_windows(doc, family, x, entry, of)
 
 
 def _component(family: Family, number: Any) -> Component:
@@ -208,9 +212,133 @@ def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None
     if x is not None:
         edges = {edge[:3] for some in component.part.edges for edge in some}
         bounds = reachable_bounds(component.nodes, edges, x)
-        labels = [family.labels[v] for v in component.nodes]
-        for v, end in zip(component.nodes, ordered(labels, section, "final_state").values(), strict=True):
-            middle, radius = interval(end)
-            low, high = bounds[v]
-            need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")
+        _check_intervals(family, component, section, bounds)
     doc.done(", ".join(dict.fromkeys(str(b or "not told") for b in known)))
+
+
+# ---------------------------------------------------------------------- windows
+
+
+def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -> list[tuple[list[int], bool]]:
+    """Return the closed strong components of a graph, each with whether it is balanced; a pair may have both signs.
+
+    Nodes are finished by a first search; in the opposite order, a second search begins once in every component that
+    hears nobody else, and this is all that its beginning hears.
+
+    Examples
+    --------
+    >>> closed_groups([0, 1, 2], [(0, 1, 1), (1, 0, -1), (1, 2, 1)]), closed_groups([3, 5], [(5, 3, 1), (5, 3, -1)])
+    ([([0, 1], False)], [([5], True)])
+    """
+    out: dict[int, list[int]] = {v: [] for v in nodes}
+    into: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign in edges:
+        out[s].append(t)
+        into[t].append((s, sign))
+    groups, reached = [], set[int]()
+    for root in reversed(_finished(nodes, out)):
+        if root in reached:
+            continue
+        camp, found, balanced = {root: 1}, [root], True
+        for v in found:
+            for u, sign in into[v]:
+                if u not in camp:
+                    camp[u] = sign * camp[v]
+                    found.append(u)
+                balanced &= camp[u] == sign * camp[v]
+        groups.append((sorted(found), balanced))
+        ahead = [root]
+        reached.add(root)
+        for v in ahead:
+            for u in out[v]:
+                if u not in reached:
+                    reached.add(u)
+                    ahead.append(u)
+    return groups
+
+
+def _finished(nodes: Sequence[int], out: dict[int, list[int]]) -> list[int]:
+    """Return the nodes in the order in which a search in depth leaves them."""
+    order: list[int] = []
+    seen = set[int]()
+    for root in nodes:
+        stack = [] if root in seen else [(root, iter(out[root]))]
+        seen.add(root)
+        while stack:
+            v, rest = stack[-1]
+            following = next((u for u in rest if u not in seen), None)
+            if following is None:
+                order.append(v)
+                stack.pop()
+            else:
+                seen.add(following)
+                stack.append((following, iter(out[following])))
+    return order
+
+
+def contraction_below(largest: Fraction, least: Fraction, window: Fraction, on: Fraction) -> Fraction:
+    """Return ``e^(-D h) min(1, on w)``, or a little less: 0 where it is below ``e^-100,000``.
+
+    Examples
+    --------
+    >>> round(float(contraction_below(Fraction(1), Fraction(1), Fraction(1), Fraction(1, 2))), 6)
+    0.18394
+    """
+    return exp(-largest * window)[0] * min(Fraction(1), on * least)
+
+
+def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+    """Verify what joint windows do, and the contraction in as many as there are nodes."""
+    fields(entry, WINDOWS, "a claim")
+    component, signals = _component(family, entry["component"]), fields(entry["signals"], ("window", "on"), "signals")
+    window, on, eta = exact(signals["window"]), exact(signals["on"]), exact(entry["eta"])
+    need(0 < on <= window, "a window, or the part of it in which an edge is on")
+    need(component.depends, "every signal does the same")
+    doc.open("joint-windows", of)
+    part, sums = component.part, [Fraction(0)]
+    weights = []
+    for edges, mode in zip(part.edges, family.modes, strict=True):
+        total = dict.fromkeys(component.nodes, 0)
+        for _, t, _, low, high in edges:
+            total[t] += high
+            weights += [Fraction(low, mode.unit)] * (low > 0)
+        sums.append(Fraction(max(total.values()), mode.unit))
+    on_edges = {edge[:3] for edges in part.edges for edge in edges if edge[3]}
+    groups = closed_groups(component.nodes, on_edges)
+    consensus = part.camps is not None and len(groups) == 1
+    need(consensus or not any(balanced for _, balanced in groups), "nothing follows from these windows")
+    need(entry["behaviour"] == (CONSENSUS if consensus else STABILITY), "another behaviour")
+    need(0 < eta <= contraction_below(max(sums), min(weights), window, on), "the contraction is not proved")
+    section = entry["final_state"]
+    need((section is None) == (x is None), "final states are claimed iff there is an initial state")
+    if x is not None:
+        every = {edge[:3] for edges in part.edges for edge in edges}
+        bounds = agreed_bounds(component.nodes, every, x, part.camps if consensus else None)
+        _check_intervals(family, component, section, bounds)
+    doc.done(entry["behaviour"])
+
+
+def agreed_bounds(
+    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]], x: Sequence[Fraction], camps: Mapping[int, int] | None
+) -> dict[int, Interval]:
+    """Return ends of agents that end at 0 (no camps), or at one value up to camps, within all their bounds.
+
+    Examples
+    --------
+    >>> agreed_bounds([0, 1], [(0, 1, -1)], [3, 5], {0: 1, 1: -1})
+    {0: (3, 3), 1: (-3, -3)}
+    """
+    if camps is None:
+        return dict.fromkeys(nodes, (Fraction(0), Fraction(0)))
+    bounds = reachable_bounds(nodes, edges, x)
+    ends = [bounds[v] if camps[v] > 0 else (-bounds[v][1], -bounds[v][0]) for v in nodes]
+    low, high = max(low for low, _ in ends), min(high for _, high in ends)
+    return {v: (low, high) if camps[v] > 0 else (-high, -low) for v in nodes}
+
+
+def _check_intervals(family: Family, component: Component, section: Any, bounds: Mapping[int, Interval]) -> None:
+    labels = [family.labels[v] for v in component.nodes]
+    for v, end in zip(component.nodes, ordered(labels, section, "final_state").values(), strict=True):
+        middle, radius = interval(end)
+        low, high = bounds[v]
+        need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")

@@ -81,19 +81,34 @@ restricted_options = shared.options_of(
     shared.number_option(
         "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
     ),
+    shared.number_option(
+        "--clock-window", metavar="H", help="Families: every edge is on in each window of so much stretched clock,"
+    ),
+    shared.number_option("--window-on", metavar="DELTA", help="for so much of it at least."),
+    shared.number_option("--window", metavar="H", hidden=True),
 )
 
 
 def signals_of(options: shared.Options) -> SignalClass:
     """Return the signals of which more is asked, or refuse two kinds of them at once."""
-    from ptcc_certify.theorems.restricted_signals import DwellTime
+    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, DwellTime, JointWindows
 
+    if options["window"] is not None:
+        raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window")
     dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
-    given = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
+    given: list[Any] = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
     if len(given) > 1:
         raise ParameterError("--dwell is of time, --clock-dwell of the clock: give one of them")
+    length, on = options["clock_window"], options["window_on"]
+    if (length is None) != (on is None):
+        raise ParameterError(
+            "--clock-window is the length of windows, --window-on what each edge is on in them: give both"
+        )
+    given += [] if length is None else [JointWindows(length, on=on, clock="s")]
+    if len(given) > 1:
+        raise ParameterError("--clock-window is for one kind of signals, a dwell time for another: give one of them")
     if given and options["signal"] == "constant":
-        raise ParameterError("--signal constant never switches: leave --dwell and --clock-dwell out")
+        raise ParameterError("--signal constant never switches: leave dwell times and windows out")
     return given[0] if given else options["signal"]
 
 

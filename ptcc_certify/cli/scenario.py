@@ -45,6 +45,8 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "signal": ("signal", '"any"'),
             "dwell": ("dwell", '"0.1"'),
             "clock_dwell": ("clock_dwell", '"0.1"'),
+            "clock_window": ("clock_window", '"2"'),
+            "window_on": ("window_on", '"0.5"'),
         },
     ),
     "protocol": (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.restricted_screen import last_states, restricted_entries
@@ -353,11 +354,12 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
         yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
-    elif certificate.final_states is not None and certificate.last_modes:
+    elif certificate.final_states is not None and certificate.ends_of_signal:
         pairs = zip(certificate.final_states, last_states(certificate), strict=True)
         states = [other if ends is None else ends for ends, other in pairs]
         ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)
-        rests = all(None not in claim.behaviours for claim in certificate.last_modes.values())
+        claims = certificate.ends_of_signal.values()
+        rests = not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
         yield from ends if rests else (("x(t)", text) for _, text in ends)
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, WindowClaim
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.report.text_layout import printable, shorten_label
 from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
+from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
@@ -27,7 +28,7 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
     >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
     >>> print(*next(restricted_entries(cert)), sep=": ")
-    constant: if mode and weights never change: rate 1.99999, input bounded
+    constant: if mode and weights never change: rate 1.58578, input bounded
     """
     if certificate.signal == "any":
         return
@@ -38,6 +39,9 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     for claim in certificate.restricted:
         if isinstance(claim, LastModeClaim):
             yield head[0], f"{head[1]}: {_last_mode_text(certificate, claim)}"
+            continue
+        if isinstance(claim, WindowClaim):
+            yield head[0], f"{head[1]}: {_window_text(certificate, claim)}"
             continue
         name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
         where = f"component of {printable(name)}: " if several else ""
@@ -54,6 +58,8 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
     """
     if isinstance(signal, DwellTime):
         return "dwell", f"at least {near(signal.least, 6)} of {CLOCK[signal.clock]} between switches"
+    if isinstance(signal, JointWindows):
+        return "windows", f"each edge on for {near(signal.on, 6)} of every {near(signal.length, 6)} of the clock"
     return "constant", "if mode and weights never change"
 
 
@@ -70,10 +76,16 @@ def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
     return f"{begin}: {each}".removeprefix(": ")
 
 
+def _window_text(certificate: FamilyContent, claim: WindowClaim) -> str:
+    rate = claim.rate
+    left = math.floor(math.log10(rate.multiple) + rate.exponent * math.log10(rate.eta))
+    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it in {near(rate.window, 6)} of the clock"
+
+
 def last_states(certificate: FamilyContent) -> list[Interval | None]:
     """Return the ends between which agents stay whose last mode decides; None of the others."""
     result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, claim in certificate.last_modes.items():
+    for number, claim in certificate.ends_of_signal.items():
         nodes = certificate.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends

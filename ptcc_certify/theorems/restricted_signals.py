@@ -17,6 +17,11 @@ from ptcc_certify.protocols.parameters import parameter, readable
 
 #: ``t`` is the user's time, ``s`` the stretched clock.
 CLOCKS = ("t", "s")
+#: Why windows of time are refused.
+WINDOWS_OF_TIME = (
+    "windows of time prove nothing at T: in the last one, the graph of the last instants acts for infinite clock, and "
+    "must do it alone; give windows of the stretched clock"
+)
 
 
 @gated
@@ -70,8 +75,55 @@ class DwellTime:
         return f"DwellTime({readable(self.least)}, clock={self.clock!r})"
 
 
+@gated
+@dataclass(frozen=True, repr=False)
+class JointWindows:
+    """Signals that turn every edge on for ``on`` or more of every window ``[j length, (j+1) length]`` of the clock.
+
+    That is every edge that is mandatory in some mode: such modes act for so long, together. No mode need be connected.
+
+    Attributes
+    ----------
+    length, on : Fraction
+        In units of the stretched clock; ``on`` is at most ``length``.
+    clock : {"s"}
+        Windows of time are refused: inside the last one the graph of the last instants acts for infinite clock.
+
+    Raises
+    ------
+    ParameterError
+        A number is not positive, ``on`` is longer than a window, or these are not of the clock.
+
+    References
+    ----------
+    docs/theory/families.md, "Joint windows".
+
+    Examples
+    --------
+    >>> JointWindows(2, on="0.5", clock="s")
+    JointWindows(2, on=0.5, clock='s')
+    """
+
+    length: Fraction
+    on: Fraction
+    clock: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "length", parameter("window", self.length))
+        object.__setattr__(self, "on", parameter("on", self.on))
+        if self.clock == "t":
+            raise ParameterError(WINDOWS_OF_TIME)
+        if self.clock != "s":
+            raise ParameterError(f'windows are of the stretched clock, "s", not "{shorten(str(self.clock))}"')
+        if self.on > self.length:
+            raise ParameterError("an edge is on for at most the whole window: on <= length")
+
+    def __repr__(self) -> str:
+        return f"JointWindows({readable(self.length)}, on={readable(self.on)}, clock={self.clock!r})"
+
+
 #: What a certificate may be asked for: all signals, constant ones, or restricted ones.
-SignalClass = str | DwellTime
+SignalClass = str | DwellTime | JointWindows
 
 
 def read_signal(signal: Any) -> SignalClass:
@@ -87,7 +139,7 @@ def read_signal(signal: Any) -> SignalClass:
     >>> read_signal("constant")
     'constant'
     """
-    if isinstance(signal, DwellTime) or signal in ("any", "constant"):
+    if isinstance(signal, DwellTime | JointWindows) or signal in ("any", "constant"):
         return signal
-    more = 'signals are "any", "constant", or DwellTime(least, clock)'
+    more = 'signals are "any", "constant", DwellTime(least, clock) or JointWindows(length, on, clock)'
     raise ParameterError(f"{more}, not {shorten(repr(signal))}")

@@ -16,7 +16,7 @@ from common_kernel_families import random_family
 from families import random_family as any_family
 from scipy.linalg import expm
 
-from ptcc_certify import DwellTime, Family, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import DwellTime, Family, JointWindows, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import Expectations
@@ -257,3 +257,76 @@ def test_no_signal_leaves_the_ends_of_the_last_mode(seed: int):
             L = np.array(mode.member(rng.random(mode.n_edges) < 0.5).dense_laplacian(), dtype=float)
             x = expm(-L * rng.exponential(1.0)) @ x
             assert (x >= low - 1e-9).all() and (x <= high + 1e-9).all()
+
+
+# ---------------------------------------------------------------------- windows
+
+WINDOWS = JointWindows(2, on="0.4", clock="s")
+
+
+def cut_up(rng: np.random.Generator, n: int, stable: bool) -> Family:
+    """Modes that share out the edges of a connected graph, most of them alone in theirs."""
+    edges = [(f"n{k}", f"n{k + 1}", int(rng.choice([1, -1]))) for k in range(n - 1)]
+    sign = int(np.prod([w for *_, w in edges])) * (-1 if stable else 1)
+    edges.append((f"n{n - 1}", "n0", sign))
+    labels = [f"n{k}" for k in range(n)]
+    graphs = [SignedDigraph.from_edges([edge], nodes=labels) for edge in edges]
+    return Family.switching(graphs)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_joint_windows_contract_as_much_as_is_claimed(seed: int):
+    rng = np.random.default_rng(seed)
+    n, stable = int(rng.integers(2, 5)), bool(seed % 2)
+    family = cut_up(rng, n, stable)
+    signal = JointWindows(n, on=Fraction(1, 2), clock="s")
+    made = certify_family(family, PROTOCOL, range(1, n + 1), signal=signal)
+    (claim,) = made.restricted
+    assert claim.behaviour == ("stability" if stable else "bipartite consensus")
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    camps = made.parts[0].component.gauge
+    laplacians = [mode.mandatory.dense_laplacian() for mode in family.modes]
+    x = np.arange(1.0, n + 1)
+    size = (lambda x: abs(x).max()) if stable else (lambda x: np.ptp(camps * x))
+    for _ in range(4):
+        before = size(x)
+        for _ in range(claim.rate.exponent):
+            spare = rng.dirichlet(np.ones(n)) * (n - n / 2)
+            for k in rng.permutation(n):
+                x = expm(-laplacians[k] * (0.5 + spare[k])) @ x
+        assert size(x) <= before * float(claim.rate.contraction) + 1e-15
+    low, high = np.array(claim.final_states, dtype=float).T
+    if not stable:
+        assert (x >= low - size(x) - 1e-9).all() and (x <= high + size(x) + 1e-9).all()
+
+
+def test_windows_without_a_joint_graph_prove_nothing():
+    apart = Family.switching([SignedDigraph.from_edges([("a", "c", 1)], nodes="abc")] * 2)
+    assert last(apart, WINDOWS).restricted == ()
+    spoiled = Family.from_intervals([("a", "b", 1, 1), ("b", "a", -1, 0), ("b", "c", 0, 1)])
+    assert last(spoiled, WINDOWS).restricted == ()
+    assert last(slowed_by_switches(), WINDOWS).restricted == ()  # every signal brings it to 0 already
+
+
+def test_windows_of_time_and_windows_that_are_none_are_refused():
+    with pytest.raises(ParameterError, match="prove nothing at T"):
+        JointWindows(1, on=1, clock="t")
+    for length, on, clock in ((0, 1, "s"), (1, 2, "s"), (1, 0, "s"), (1, 1, None)):
+        with pytest.raises(ParameterError):
+            JointWindows(length, on=on, clock=clock)
+
+
+def test_windows_are_read_back_and_judged(tmp_path: Path):
+    made = certify_family(cut_up(np.random.default_rng(0), 3, False), PROTOCOL, [1, 2, 3], signal=WINDOWS)
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert again.restricted[0].rate == made.restricted[0].rate and again.signal == WINDOWS
+    data = made.to_dict()
+    eta = Fraction(data["restricted"][0]["eta"])
+    for key, new in (("eta", str(eta * 2)), ("eta", "0"), ("behaviour", "stability"), ("component", 1)):
+        forged = copy.deepcopy(data)
+        forged["restricted"][0][key] = new
+        assert not check(resealed(forged)).accepted, key
+    forged = copy.deepcopy(data)
+    forged["restricted"][0]["signals"]["window"] = "3"
+    assert not check(resealed(forged)).accepted

@@ -30,11 +30,12 @@ from ptcc_certify.certificate.certificate import RejectedCertificate, read_certi
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import DwellTime
+from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -100,6 +101,12 @@ def restricted_cases() -> list[tuple[str, Json]]:
         state = list(range(1, made.n_nodes + 1)) if k else None
         last = certify_family(made, PROTOCOL, state, signal=signals["constant" if k == 2 else "time"])
         found.append((f"last mode {k}", {**last.to_dict(), "unverified": {}}))
+    for k, signs in enumerate(((1, -1, 1), (-1, 1, 1))):
+        cut = [[(f"n{j}", f"n{(j + 1) % 3}", sign)] for j, sign in enumerate(signs[: 3 - k])]
+        modes = [SignedDigraph.from_edges(edges, nodes=["n0", "n1", "n2"]) for edges in cut]
+        windows = JointWindows(2, on="0.3", clock="s")
+        made = certify_family(Family.switching(modes), PROTOCOL, None if k else [1, 2, -3], signal=windows)
+        found.append((f"windows {k}", {**made.to_dict(), "unverified": {}}))
     return found
 
 
