@@ -11,7 +11,7 @@ The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``,
-  ``DwellTime``, ``JointWindows``
+  ``DwellTime``, ``JointWindows``, ``ClockShares``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
@@ -56,6 +56,7 @@ _EXPORTS = {
     "decide": "theorems.family_behaviour",
     "DwellTime": "theorems.restricted_signals",
     "JointWindows": "theorems.restricted_signals",
+    "ClockShares": "theorems.restricted_signals",
     # Protocols, disturbances, actuators
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",

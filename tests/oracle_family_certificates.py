@@ -401,8 +401,11 @@ class FamilyOracle:
 
     def restricted(self) -> None:
         """Rates of restricted signals, by members in rationals: the forms, their ratio, and what follows."""
-        for said in self.data.get("restricted", ()):
+        for place, said in enumerate(self.data.get("restricted", ())):
             nodes = self.pieces[said["component"]]
+            if said["claim"] == "shares":
+                self.shares(nodes, said, f"restricted[{place}]")
+                continue
             if said["claim"] != "rate":
                 (self.last_mode if said["claim"] == "last mode" else self.windows)(nodes, said)
                 continue
@@ -520,3 +523,32 @@ class FamilyOracle:
 
         for excess in self.ends_of(nodes, said, in_turn):
             self.require(excess <= 1e-3 * max(1.0, *(abs(float(z)) for z in self.start or ())), "an end of windows")
+
+    def shares(self, nodes: list[int], said: Json, of: str) -> None:
+        """Shares of the clock: one form, the rates of its modes by members in rationals, and their mean."""
+        shares = [number(x) for x in said["signals"]["shares"]]
+        self.require(len(shares) == len(self.modes) and min(shares) >= 0 and sum(shares) == 1, "shares")
+        steps = {x["of"]: x for x in self.data["proof"] if x["kind"] == "family-rate"}
+        rates = [number(steps[f"{of}.modes[{k}]"]["numbers"]["b"]) for k in range(len(shares))]
+        mean = sum((s * b for s, b in zip(shares, rates, strict=True)), Fraction(0))
+        rate, free = number(said["rate"]), [self.index[label] for label in said["nodes"]]
+        self.require(rate <= mean and free == sorted(set(free)) and set(free) <= set(nodes), "a mean rate")
+        pivots, P, basis = [v for v in nodes if v not in free], self.symmetric(said["form"]), list[Vector]()
+        every = [self.part(L, nodes) for some in self.members for L in some]
+        if pivots:
+            stacked = [row for L in every for row in L]
+            near = [b for b in kernel(stacked) if all(abs(x) == abs(b[0]) for x in b)]
+            self.require(len(pivots) == 1 and len(near) == 1, "camps of all modes")
+            basis = near[:1]
+        if len(pivots) != len(basis):
+            return
+        told = None if rate <= 0 else "bipartite consensus" if basis else "stability"
+        self.require(said["behaviour"] == told, "a behaviour by shares")
+        self.require(len(P) == len(free) and self.definite(P), "P is not definite")
+        to_zero = self.lift(basis, nodes, free, pivots)
+        for some, b in zip(self.members, rates, strict=True):
+            for L in some:
+                own = self.part(L, nodes)
+                PA = times(P, times(to_zero, [[row[nodes.index(v)] for v in free] for row in own]))
+                S = [[PA[i][j] + PA[j][i] - b * P[i][j] for j in range(len(P))] for i in range(len(P))]
+                self.require(semidefinite(S), "a rate by shares")

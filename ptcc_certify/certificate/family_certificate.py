@@ -45,7 +45,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
-from ptcc_certify.theorems.restricted_signals import SignalClass, read_signal
+from ptcc_certify.theorems.restricted_signals import ClockShares, SignalClass, read_signal
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
@@ -216,6 +216,8 @@ def certify_family(
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     signal = read_signal(signal)
+    if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
+        raise ParameterError(f"{len(signal.shares)} shares of the clock for {len(family.modes)} modes")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])

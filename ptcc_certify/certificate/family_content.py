@@ -15,7 +15,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, WindowClaim
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
 from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -126,14 +126,16 @@ class FamilyContent:
     @property
     def rate_of_signal(self) -> Fraction | None:
         """The rate that every component has for the signals that were asked for; None if some has none."""
-        own = {claim.component: claim.rate for claim in self.restricted if isinstance(claim, RateClaim)}
+        own = {claim.component: claim.rate for claim in self.restricted if isinstance(claim, RateClaim | ShareClaim)}
         rates = [own.get(k, part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
         return None if None in rates else min((r for r in rates if r is not None), default=None)
 
     @property
-    def ends_of_signal(self) -> Mapping[int, LastModeClaim | WindowClaim]:
+    def ends_of_signal(self) -> Mapping[int, LastModeClaim | WindowClaim | ShareClaim]:
         """Where agents end under restricted signals, by the numbers of components that depend on the signal."""
-        return {claim.component: claim for claim in self.restricted if not isinstance(claim, RateClaim)}
+        own = {k for k, part in enumerate(self.parts) if part.component.behaviour == DEPENDS}
+        claims = (claim for claim in self.restricted if not isinstance(claim, RateClaim))
+        return {claim.component: claim for claim in claims if claim.component in own}
 
     @property
     def member_bound(self) -> Fraction | None:

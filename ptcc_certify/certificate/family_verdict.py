@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
-from ptcc_certify.certificate.restricted_claims import WindowClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
@@ -83,16 +83,13 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     others = [component for k, component in enumerate(components) if k not in last]
     answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
     for claim in last.values():
-        behaviours = (claim.behaviour,) if isinstance(claim, WindowClaim) else claim.behaviours
-        shows = [last_mode_shows(told, expected) for told in behaviours]
-        if isinstance(claim, WindowClaim) and shows == [False] and answer.status != REFUTED:
-            return Answer(REFUTED, expected, f"it is {claim.behaviour}")
+        shows = [last_mode_shows(told, expected) for told in claim.behaviours]
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
-            mode = mode_name(certificate.family, number)
-            return Answer(REFUTED, expected, f"{mode} by itself: {behaviours[number]}")
+            whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
+            return Answer(REFUTED, expected, f"{whose or 'it is '}{claim.behaviours[number]}")
         if None in shows and answer.status == MET:
-            answer = Answer(OPEN, expected, "not decided of the last mode")
+            answer = Answer(OPEN, expected, "not decided of these signals")
     return answer
 
 

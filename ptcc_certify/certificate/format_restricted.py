@@ -7,12 +7,16 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.numbers import longest
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, WindowClaim
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
 from ptcc_certify.checker.reading import exact, interval, triangle
 from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.lyapunov.clock_shares import ShareForm
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.joint_windows import contraction
-from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 
 #: Bits of the middles and radii of final states, which are rounded outwards.
 _BITS = 64
@@ -27,6 +31,8 @@ def signal_entry(signal: SignalClass) -> Any:
     >>> signal_entry(DwellTime("0.5", clock="t"))
     {'dwell': '1/2', 'clock': 't'}
     """
+    if isinstance(signal, ClockShares):
+        return {"shares": [format_exact(share) for share in signal.shares]}
     if isinstance(signal, JointWindows):
         return {"window": format_exact(signal.length), "on": format_exact(signal.on)}
     if isinstance(signal, DwellTime):
@@ -52,6 +58,16 @@ def enclosed(low: Fraction, high: Fraction) -> Any:
 
 def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
     """Return a claim about the component of the agents ``labels`` as JSON."""
+    if isinstance(claim, ShareClaim):
+        return {
+            "claim": "shares",
+            "signals": signal_entry(claim.signal),
+            "component": claim.component,
+            "nodes": [labels[v] for v in claim.form.function.nodes],
+            "form": _lower_triangle(claim.form.function.matrix),
+            "rate": format_exact(claim.rate),
+            "behaviour": claim.behaviour,
+        }
     if not isinstance(claim, RateClaim):
         ends = claim.final_states
         about = {"signals": signal_entry(claim.signal), "component": claim.component}
@@ -78,6 +94,13 @@ def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
 
 def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
     """Yield kind, place, witness and numbers of the obligations of a claim."""
+    if isinstance(claim, ShareClaim):
+        V = claim.form.function
+        for mode, (rate, tau, rests) in enumerate(zip(V.rates, V.multipliers, claim.form.at_rest, strict=True)):
+            witness = None if rests else {"multipliers": [format_exact(x) for x in tau]}
+            yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
+        yield "clock-shares", of, None, {}
+        return
     if not isinstance(claim, RateClaim):
         yield "last-mode" if isinstance(claim, LastModeClaim) else "joint-windows", of, None, {}
         return
@@ -91,15 +114,23 @@ def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
 def _read_signal(said: Any) -> SignalClass:
     if isinstance(said, str):
         return said
+    if "shares" in said:
+        return ClockShares(tuple(map(exact, said["shares"])))
     if "window" in said:
         return JointWindows(exact(said["window"]), on=exact(said["on"]), clock="s")
     return DwellTime(exact(said["dwell"]), clock=said["clock"])
 
 
-def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]], sizes: Sequence[int]) -> Claim:
-    """Return a claim of a certificate that was accepted; ``sizes`` are those of its components."""
-    size = sizes[entry["component"]]
+def read_claim(
+    of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]], components: Sequence[FamilyComponent]
+) -> Claim:
+    """Return a claim of a certificate that was accepted; about one of its components."""
+    size = components[entry["component"]].nodes.size
     number, signal, forms = entry["component"], _read_signal(entry["signals"]), None
+    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
+    if entry["claim"] == "shares":
+        assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
+        return ShareClaim(number, signal, _read_share_form(entry, steps, components[number]), exact(entry["rate"]))
     if entry["claim"] != "rate":
         ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
         if entry["claim"] == "last mode":
@@ -108,7 +139,6 @@ def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, A
         behaviour, eta = entry["behaviour"], exact(entry["eta"])
         return WindowClaim(number, signal, behaviour, contraction(size, signal, behaviour, eta), ends)
     if (triangles := entry["forms"]) is not None:
-        steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
         forms = ModeForms(
             tuple(triangle(lower, len(lower)) for lower in triangles),
             tuple(exact(step["numbers"]["b"]) for step in steps),
@@ -116,3 +146,19 @@ def read_claim(of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, A
             exact(entry["ratio"]),
         )
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))
+
+
+def _read_share_form(
+    entry: Mapping[str, Any], steps: Sequence[Mapping[str, Any]], component: FamilyComponent
+) -> ShareForm:
+    index = {label: v for v, label in enumerate(component.family.labels)}
+    nodes = tuple(index[label] for label in entry["nodes"])
+    pivots = tuple(v for v in range(component.nodes.size) if v not in set(nodes))
+    matrix, witnesses = triangle(entry["form"], len(nodes)), [step["witness"] for step in steps]
+    ends = prove_ends(matrix)
+    assert ends is not None, "the check has proved it definite"
+    rates = tuple(exact(step["numbers"]["b"]) for step in steps)
+    taus = tuple(() if witness is None else tuple(map(exact, witness["multipliers"])) for witness in witnesses)
+    function = FamilyFunction("full", pivots, nodes, matrix, rates, taus, *ends)
+    behaviour = BIPARTITE_CONSENSUS if pivots else STABILITY
+    return ShareForm(function, behaviour, tuple(witness is None for witness in witnesses))

@@ -46,9 +46,8 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
     state = Reader(family.labels, source.path.parent).state(document["initial_state"])
     expectations = _read_expectations(document["unverified"].get("asked"))
-    sizes = [component.nodes.size for component in components]
     restricted = enumerate(document.get("restricted", ()))
-    said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], sizes) for k, entry in restricted)
+    said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
     kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said}
     protocol = read_protocol(document["protocol"])
     return FamilyCertificate(family, protocol, parts, state, expectations, source=source, **kept)

@@ -16,6 +16,7 @@ from lmi.search_time import share_of_time
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.lyapunov.clock_shares import ShareForm, search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -23,7 +24,7 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.family_rate import ExplicitRate
 from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours
-from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import ComponentProof
@@ -113,8 +114,44 @@ class WindowClaim:
     rate: ExplicitRate
     final_states: tuple[Interval, ...] | None
 
+    @property
+    def behaviours(self) -> tuple[str | None, ...]:
+        """What they show: one behaviour."""
+        return (self.behaviour,)
 
-Claim = RateClaim | LastModeClaim | WindowClaim
+
+@dataclass(frozen=True, eq=False)
+class ShareClaim:
+    """A decay rate of one component whose modes have shares of the clock, whether or not they rest at the same states.
+
+    Attributes
+    ----------
+    component : int
+        Its number.
+    signal : ClockShares
+    form : ShareForm
+    rate : Fraction
+        The mean of the rates over the shares, per unit of the stretched clock.
+    """
+
+    component: int
+    signal: ClockShares
+    form: ShareForm
+    rate: Fraction
+    final_states = None
+
+    @property
+    def behaviours(self) -> tuple[str | None, ...]:
+        """What they show: one behaviour, or None."""
+        return (self.behaviour,)
+
+    @property
+    def behaviour(self) -> str | None:
+        """What the component does under these signals; None if nothing decays."""
+        return self.form.behaviour if self.rate > 0 else None
+
+
+Claim = RateClaim | LastModeClaim | WindowClaim | ShareClaim
 
 
 def claims_for(
@@ -142,7 +179,9 @@ def claims_for(
     for number, part in enumerate(parts):
         if part.component.nodes.size == 1 or part.component.behaviour is None:
             continue
-        if part.component.behaviour == DEPENDS:
+        if isinstance(signal, ClockShares):
+            claims += filter(None, [_share_claim(number, signal, part, notes)])
+        elif part.component.behaviour == DEPENDS:
             if isinstance(signal, JointWindows):
                 claims += filter(None, [_window_claim(number, signal, part, state)])
             elif not isinstance(signal, DwellTime) or signal.clock == "t":
@@ -170,6 +209,13 @@ def _rate_claim(
         forms = None
     rate = best if forms is None else own_rate(signal, forms)
     return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
+
+
+def _share_claim(number: int, signal: ClockShares, part: ComponentProof, notes: list[str]) -> ShareClaim | None:
+    with share_of_time(1.0, STEP, notes):
+        form = search_share_form(part.component, signal.shares)
+        return None if form is None else ShareClaim(number, signal, form, form.mean(signal.shares))
+    return None
 
 
 def _window_claim(

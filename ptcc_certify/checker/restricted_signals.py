@@ -17,7 +17,7 @@ from lmi.exact.numbers import integers
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
 from ptcc_certify.checker.family_rows import Function
-from ptcc_certify.checker.graph import ordered
+from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import Interval, entries, exact, fields, interval, need, triangle
@@ -27,6 +27,7 @@ MANY_CLAIMS = 100
 RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
 LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
 WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
+SHARES = ("claim", "signals", "component", "nodes", "form", "rate", "behaviour")
 #: Longest ratio, in bits, of which the logarithm is enclosed.
 RATIO_BITS = 4000
 
@@ -52,9 +53,11 @@ def check_restricted(
             _check_rate(doc, family, functions, gains, entry, of)
         elif kind == "last mode":
             _check_last_mode(doc, family, x, entry, of)
-        else:
-            need(kind == "windows", "an unknown claim")
+        elif kind == "windows":
             _check_windows(doc, family, x, entry, of)
+        else:
+            need(kind == "shares", "an unknown claim")
+            _check_shares(doc, family, entry, of)
 
 
 def _component(family: Family, number: Any) -> Component:
@@ -342,3 +345,40 @@ def _check_intervals(family: Family, component: Component, section: Any, bounds:
         middle, radius = interval(end)
         low, high = bounds[v]
         need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")
+
+
+# ---------------------------------------------------------------------- shares of the clock
+
+
+def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
+    """Verify one form for all modes, of which each has a rate of its own, and the mean of these rates."""
+    fields(entry, SHARES, "a claim")
+    part = _component(family, entry["component"]).part
+    shares = [exact(x) for x in entries(fields(entry["signals"], ("shares",), "signals")["shares"], "shares")]
+    need(len(shares) == len(family.modes) and min(shares) >= 0 and sum(shares) == 1, "shares of the modes")
+    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a form")
+    pivots = [v for v in part.nodes if v not in set(nodes)]
+    need(bool(nodes) and set(nodes) <= set(part.nodes) and nodes == sorted(nodes), "nodes of a form")
+    if pivots:
+        need(len(pivots) == 1 and part.camps is not None, "states at rest that no camps tell")
+        camps = part.camps or {}
+        kernel = {v: {1: Fraction(camps[v] * camps[pivots[0]])} for v in part.nodes}
+        drawn = Component(part, CONSENSUS, kernel, {1: pivots[0]})
+    else:
+        drawn = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
+    need_rows(len(nodes))
+    form = integers(triangle(entry["form"], len(nodes)))
+    need(doc.exact.definite(form[0]), "P is not proved definite")
+    mean = Fraction(0)
+    for k, share in enumerate(shares):
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        decreases(
+            doc.exact, quotient_of(family, k, drawn, nodes), form, drawn.whole[1], numbers["b"], numbers["witness"]
+        )
+        mean += share * numbers["b"]
+        doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
+    doc.open("clock-shares", of)
+    rate = exact(entry["rate"])
+    need(rate <= mean, "the rate is not proved")
+    need(entry["behaviour"] == (drawn.behaviour if rate > 0 else None), "another behaviour")
+    doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")

@@ -86,12 +86,18 @@ restricted_options = shared.options_of(
     ),
     shared.number_option("--window-on", metavar="DELTA", help="for so much of it at least."),
     shared.number_option("--window", metavar="H", hidden=True),
+    click.option(
+        "--share",
+        multiple=True,
+        metavar="NU",
+        help="Families: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
+    ),
 )
 
 
 def signals_of(options: shared.Options) -> SignalClass:
     """Return the signals of which more is asked, or refuse two kinds of them at once."""
-    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, DwellTime, JointWindows
+    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
 
     if options["window"] is not None:
         raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window")
@@ -105,10 +111,11 @@ def signals_of(options: shared.Options) -> SignalClass:
             "--clock-window is the length of windows, --window-on what each edge is on in them: give both"
         )
     given += [] if length is None else [JointWindows(length, on=on, clock="s")]
+    given += [ClockShares(options["share"])] if options["share"] else []
     if len(given) > 1:
-        raise ParameterError("--clock-window is for one kind of signals, a dwell time for another: give one of them")
+        raise ParameterError("dwell times, windows and shares are for signals of different kinds: give one of them")
     if given and options["signal"] == "constant":
-        raise ParameterError("--signal constant never switches: leave dwell times and windows out")
+        raise ParameterError("--signal constant never switches: leave dwell times, windows and shares out")
     return given[0] if given else options["signal"]
 
 

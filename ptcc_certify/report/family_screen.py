@@ -354,7 +354,7 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
         yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
-    elif certificate.final_states is not None and certificate.ends_of_signal:
+    elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
         pairs = zip(certificate.final_states, last_states(certificate), strict=True)
         states = [other if ends is None else ends for ends, other in pairs]
         ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)

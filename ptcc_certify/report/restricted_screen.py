@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, WindowClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim, WindowClaim
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.report.text_layout import printable, shorten_label
 from ptcc_certify.theorems.counterexample_text import mode_name
-from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows, SignalClass
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
@@ -40,6 +40,9 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
         if isinstance(claim, LastModeClaim):
             yield head[0], f"{head[1]}: {_last_mode_text(certificate, claim)}"
             continue
+        if isinstance(claim, ShareClaim):
+            yield head[0], f"{head[1]}: {_share_text(certificate, claim)}"
+            continue
         if isinstance(claim, WindowClaim):
             yield head[0], f"{head[1]}: {_window_text(certificate, claim)}"
             continue
@@ -58,6 +61,8 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
     """
     if isinstance(signal, DwellTime):
         return "dwell", f"at least {near(signal.least, 6)} of {CLOCK[signal.clock]} between switches"
+    if isinstance(signal, ClockShares):
+        return "shares", f"modes at {', '.join(near(share, 4) for share in signal.shares)} of the clock"
     if isinstance(signal, JointWindows):
         return "windows", f"each edge on for {near(signal.on, 6)} of every {near(signal.length, 6)} of the clock"
     return "constant", "if mode and weights never change"
@@ -80,6 +85,15 @@ def _window_text(certificate: FamilyContent, claim: WindowClaim) -> str:
     rate = claim.rate
     left = math.floor(math.log10(rate.multiple) + rate.exponent * math.log10(rate.eta))
     return f"{claim.behaviour}; what is left shrinks by 1e{left} of it in {near(rate.window, 6)} of the clock"
+
+
+def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
+    if claim.behaviour is None:
+        return "no rate is proved"
+    names = (printable(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes)))
+    own = map(down, claim.form.function.rates)
+    each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
+    return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}"
 
 
 def last_states(certificate: FamilyContent) -> list[Interval | None]:

@@ -122,8 +122,48 @@ class JointWindows:
         return f"JointWindows({readable(self.length)}, on={readable(self.on)}, clock={self.clock!r})"
 
 
+@gated
+@dataclass(frozen=True, repr=False)
+class ClockShares:
+    """Signals under which each mode has a share of the stretched clock: ``s_i`` stays near ``shares_i s``.
+
+    That is ``|s_i - shares_i s| <= c`` for some number ``c``, where ``s_i`` is the clock that mode ``i`` has had until
+    ``s``. A mode may be an outage, without edges.
+
+    Attributes
+    ----------
+    shares : tuple of Fraction
+        One of each mode; their sum is 1.
+
+    Raises
+    ------
+    ParameterError
+        A share is negative, or their sum is not 1.
+
+    References
+    ----------
+    docs/theory/families.md, "Shares of the clock".
+
+    Examples
+    --------
+    >>> ClockShares(["0.7", "0.3"])
+    ClockShares(0.7, 0.3)
+    """
+
+    shares: tuple[Fraction, ...]
+
+    def __post_init__(self) -> None:
+        shares = tuple(parameter("share", share, zero_allowed=True) for share in self.shares)
+        object.__setattr__(self, "shares", shares)
+        if sum(shares) != 1:
+            raise ParameterError(f"shares of the clock sum to {readable(sum(shares, Fraction(0)))}; they must sum to 1")
+
+    def __repr__(self) -> str:
+        return f"ClockShares({', '.join(map(readable, self.shares))})"
+
+
 #: What a certificate may be asked for: all signals, constant ones, or restricted ones.
-SignalClass = str | DwellTime | JointWindows
+SignalClass = str | DwellTime | JointWindows | ClockShares
 
 
 def read_signal(signal: Any) -> SignalClass:
@@ -139,7 +179,7 @@ def read_signal(signal: Any) -> SignalClass:
     >>> read_signal("constant")
     'constant'
     """
-    if isinstance(signal, DwellTime | JointWindows) or signal in ("any", "constant"):
+    if isinstance(signal, DwellTime | JointWindows | ClockShares) or signal in ("any", "constant"):
         return signal
-    more = 'signals are "any", "constant", DwellTime(least, clock) or JointWindows(length, on, clock)'
+    more = 'signals are "any", "constant", DwellTime(..), JointWindows(..) or ClockShares(..)'
     raise ParameterError(f"{more}, not {shorten(repr(signal))}")

@@ -16,7 +16,7 @@ from common_kernel_families import random_family
 from families import random_family as any_family
 from scipy.linalg import expm
 
-from ptcc_certify import DwellTime, Family, JointWindows, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import ClockShares, DwellTime, Family, JointWindows, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import Expectations
@@ -330,3 +330,63 @@ def test_windows_are_read_back_and_judged(tmp_path: Path):
     forged = copy.deepcopy(data)
     forged["restricted"][0]["signals"]["window"] = "3"
     assert not check(resealed(forged)).accepted
+
+
+# ---------------------------------------------------------------------- shares of the clock
+
+
+def with_outage(kind: str) -> Family:
+    modes = [random_family(np.random.default_rng(k), kind, 4).modes[0].mandatory for k in (2, 2)]
+    outage = SignedDigraph.from_edges([], nodes=range(4))
+    return Family.switching({"one": modes[0], "outage": outage, "other": modes[1]})
+
+
+@pytest.mark.parametrize("kind", ["stability", "consensus"])
+def test_shares_of_the_clock_weigh_the_rates_of_modes(kind: str):
+    family, shares = with_outage(kind), [Fraction(5, 10), Fraction(3, 10), Fraction(2, 10)]
+    made = certify_family(family, PROTOCOL, signal=ClockShares(shares))
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    assert claim.behaviour == {"stability": "stability", "consensus": "bipartite consensus"}[kind]
+    V = claim.form.function
+    assert V.rates[1] == 0 < claim.rate == sum(s * r for s, r in zip(shares, V.rates, strict=True))
+    P, quotient, rng = np.array(V.matrix, dtype=float), Quotient(family), np.random.default_rng(0)
+    for _ in range(30):
+        xi, spent = rng.normal(size=len(P)), np.zeros(3)
+        first = xi @ P @ xi
+        for _ in range(8):
+            mode, step = int(rng.integers(3)), rng.exponential(0.3)
+            xi = expm(-np.array(quotient.modes[mode].center, dtype=float) * step) @ xi
+            spent[mode] += step
+            decay = np.exp(-np.array(V.rates, dtype=float) @ spent)
+            assert xi @ P @ xi <= decay * first * (1 + 1e-9)
+
+
+def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
+    signal = ClockShares(["0.9", "0.1", "0"])
+    made = certify_family(with_outage("consensus"), PROTOCOL, signal=signal, expectations="bipartite consensus")
+    assert made.assessment.asked == "met"
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert again.signal == signal and again.restricted[0].rate == made.restricted[0].rate
+    data = made.to_dict()
+    for key, new in (
+        ("rate", str(made.restricted[0].rate + Fraction(1, 1000))),
+        ("behaviour", "stability"),
+        ("behaviour", None),
+        ("nodes", data["graph"]["nodes"]),
+        ("signals", {"shares": ["1", "0.1", "0"]}),
+        ("signals", {"shares": ["1.5", "-0.5", "0"]}),
+        ("signals", {"shares": ["1", "0"]}),
+    ):
+        forged = copy.deepcopy(data)
+        forged["restricted"][0][key] = new
+        assert not check(resealed(forged)).accepted, (key, new)
+
+
+def test_shares_that_are_none_are_refused():
+    for wrong in (["0.5"], ["0.5", "0.6"], ["1.5", "-0.5"], ["x", "1"]):
+        with pytest.raises(ParameterError):
+            ClockShares(wrong)
+    with pytest.raises(ParameterError, match="2 shares"):
+        certify_family(with_outage("consensus"), PROTOCOL, signal=ClockShares(["0.5", "0.5"]))

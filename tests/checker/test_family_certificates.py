@@ -35,7 +35,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -107,6 +107,14 @@ def restricted_cases() -> list[tuple[str, Json]]:
         windows = JointWindows(2, on="0.3", clock="s")
         made = certify_family(Family.switching(modes), PROTOCOL, None if k else [1, 2, -3], signal=windows)
         found.append((f"windows {k}", {**made.to_dict(), "unverified": {}}))
+    outage = Family.from_intervals([], nodes=["a", "b", "c"])
+    for k, back in enumerate((0, -1)):
+        pair = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -1, -1), *[("c", "a", 1, 1)] * -back], nodes="abc")
+        other = Family.from_intervals([("a", "b", 1, 1), *[("b", "a", -1, 0)] * -back], nodes="abc")
+        modes = Family.switching({"pair": pair, "outage": outage, "other": other})
+        made = certify_family(modes, PROTOCOL, None, signal=ClockShares(["0.8", "0.1", "0.1"]))
+        assert made.restricted
+        found.append((f"shares {k}", {**made.to_dict(), "unverified": {}}))
     return found
 
 
