@@ -10,8 +10,7 @@ cert.save("certificate.json")
 The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
-- Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``,
-  ``DwellTime``, ``JointWindows``, ``ClockShares``
+- Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
@@ -54,9 +53,6 @@ _EXPORTS = {
     "as_family": "graphs.io",
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
-    "DwellTime": "theorems.restricted_signals",
-    "JointWindows": "theorems.restricted_signals",
-    "ClockShares": "theorems.restricted_signals",
     # Protocols, disturbances, actuators
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",

@@ -146,8 +146,8 @@ class ClockShares:
 
     Examples
     --------
-    >>> ClockShares(["0.7", "0.3"])
-    ClockShares(0.7, 0.3)
+    >>> ClockShares(["0.75", "0.25"])
+    ClockShares(0.75, 0.25)
     """
 
     shares: tuple[Fraction, ...]

@@ -16,7 +16,7 @@ from common_kernel_families import random_family
 from families import random_family as any_family
 from scipy.linalg import expm
 
-from ptcc_certify import ClockShares, DwellTime, Family, JointWindows, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import Expectations
@@ -24,6 +24,7 @@ from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 IN_TIME, ON_CLOCK = DwellTime("0.2", clock="t"), DwellTime(3, clock="s")
