@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from lmi.errors import LMIError
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.clock_shares import ShareForm, search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -197,13 +197,8 @@ def _rate_claim(
     best, forms = part.rate, None
     own = [V for V in part.functions if isinstance(V, FamilyFunction)]
     with share_of_time(1.0, STEP, notes):
-        quotient = Quotient.of(part.component)
-        if within_reach(quotient):
-            try:
-                forms = _search(quotient, signal, own, protocol)
-            except LMIError as error:
-                if type(error).__name__ == "OutOfTime":
-                    raise
+        if part.component.nodes.size <= EXACT_NODES and within_reach(quotient := Quotient.of(part.component)):
+            forms = _search(quotient, signal, own, protocol)
     price = switch_price(signal, protocol)
     if forms is not None and best is not None and _worth(forms, price) <= float(best) + _GAIN * abs(float(best)):
         forms = None

@@ -14,6 +14,7 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import integers
+from lmi.exact.work import spend
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
 from ptcc_certify.checker.family_rows import Function
@@ -28,6 +29,8 @@ RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
 LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
 WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
 SHARES = ("claim", "signals", "component", "nodes", "form", "rate", "behaviour")
+#: Products of short integers that an edge of a claim costs, about.
+EACH_EDGE = 100
 #: Longest ratio, in bits, of which the logarithm is enclosed.
 RATIO_BITS = 4000
 
@@ -207,6 +210,7 @@ def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None
     need(component.depends, "every signal does the same")
     need(dwell is None or dwell[1] == "t", "modes that may change for ever")
     doc.open("last-mode", of)
+    spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
     told = entries(entry["modes"], "modes", len(family.modes))
     known = [mode_behaviour(family, k, component) for k in range(len(family.modes))]
     need(told == known, "another behaviour of a mode")
@@ -298,6 +302,7 @@ def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, 
     need(0 < on <= window, "a window, or the part of it in which an edge is on")
     need(component.depends, "every signal does the same")
     doc.open("joint-windows", of)
+    spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
     part, sums = component.part, [Fraction(0)]
     weights = []
     for edges, mode in zip(part.edges, family.modes, strict=True):
@@ -358,7 +363,7 @@ def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
     need(len(shares) == len(family.modes) and min(shares) >= 0 and sum(shares) == 1, "shares of the modes")
     nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a form")
     pivots = [v for v in part.nodes if v not in set(nodes)]
-    need(bool(nodes) and set(nodes) <= set(part.nodes) and nodes == sorted(nodes), "nodes of a form")
+    need(bool(nodes) and set(nodes) <= set(part.nodes) and nodes == sorted(set(nodes)), "nodes of a form")
     if pivots:
         need(len(pivots) == 1 and part.camps is not None, "states at rest that no camps tell")
         camps = part.camps or {}

@@ -119,6 +119,13 @@ def signals_of(options: shared.Options) -> SignalClass:
     return given[0] if given else options["signal"]
 
 
+def refuse_restricted(options: shared.Options) -> None:
+    """Refuse restricted signals where one graph acts for ever."""
+    for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
+        if options[name]:
+            raise ParameterError(f"{shared.flag_of(name)}: is for families of graphs; this is one graph: leave it out")
+
+
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
     """Return what files and options make: a family, or the graph where there is one, with known weights."""
     from ptcc_certify.graphs.io import read_family

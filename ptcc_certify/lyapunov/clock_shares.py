@@ -13,6 +13,7 @@ from fractions import Fraction
 
 from lmi.errors import LMIError
 from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_search import search_family
@@ -64,6 +65,8 @@ def search_share_form(component: FamilyComponent, shares: Sequence[Fraction]) ->
     >>> form.behaviour, [round(float(r), 6) for r in form.function.rates]
     ('bipartite consensus', [2.0, 0.0])
     """
+    if component.nodes.size > EXACT_NODES:
+        return None
     try:
         quotient = Quotient(component.family)
     except HypothesisError:
