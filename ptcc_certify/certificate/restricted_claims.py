@@ -35,6 +35,11 @@ STEP = "restricted signals"
 _WEIGHED = 0.01
 #: Relative gain for which forms of their own are written, and bits of rates.
 _GAIN, _RATE_BITS = 1e-6, 60
+#: What is told with every claim of windows.
+_OF_THE_CLOCK = (
+    "the windows are of the stretched clock: in time they shrink towards T, and who switches at a fixed pace in time "
+    "does not keep them"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +193,8 @@ def claims_for(
                 claims.append(_last_mode_claim(number, signal, part, state))
         elif not isinstance(signal, JointWindows) and (claim := _rate_claim(number, signal, part, protocol, notes)):
             claims.append(claim)
+    if any(isinstance(claim, WindowClaim) for claim in claims):
+        notes.append(_OF_THE_CLOCK)
     return tuple(claims)
 
 
